@@ -1,0 +1,34 @@
+# Recipes use names relative to this directory only, and never the scripts in .venv/bin, whose first
+# line breaks when the path has a space or a quote in it.
+
+PYTHON = .venv/bin/python
+ARGS =
+
+.DEFAULT_GOAL = help
+.PHONY: help study test lint setup lock clean
+
+help:  ## list the targets
+	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-7s %s\n", $$1, $$2}' Makefile
+
+study: setup  ## run the study
+	$(PYTHON) -m orchestrator study $(ARGS)
+
+test: lint  ## lint, then run the tests
+	$(PYTHON) -m pytest $(ARGS)
+
+lint:  ## ruff and mypy
+	@sh tools/setup.sh test
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+
+setup:  ## install all that the study needs: Debian packages (as root or by sudo) and .venv
+	@sh tools/setup.sh run
+
+lock:  ## pin anew, from pyproject.toml, what goes into .venv
+	@sh tools/setup.sh lock
+
+clean:  ## remove .venv, caches and built packages; results stay
+	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
+	find orchestrator tests -type d -name __pycache__ -prune -exec rm -rf {} +

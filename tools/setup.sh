@@ -1,0 +1,165 @@
+#!/bin/sh
+# Makes a Debian 12 machine ready.  A second call finds all in place and asks no server for anything.
+#
+#   sh tools/setup.sh run    Debian packages, and .venv with what requirements.lock pins
+#   sh tools/setup.sh test   the same, and what requirements-test.lock pins
+#   sh tools/setup.sh lock   resolve pyproject.toml anew into the two lock files
+set -eu
+unset CDPATH
+cd -- "$(dirname -- "$0")/.."
+
+solvers="openfoam liggghts"
+# What the gmsh wheel links against.
+gmsh_libraries="libgl1 libglu1-mesa libxft2 libxcursor1 libxinerama1 libgomp1"
+# What VTK draws with where there is no screen; with neither this nor EGL it crashes.
+vtk_libraries="libosmesa6"
+
+environment=.venv
+# Written last, so that a set-up cut short leaves none: the checksums of the lock files installed.
+stamp=$environment/installed.sha256
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+die() {
+    say "$@"
+    exit 1
+}
+
+missing_packages() {
+    wanted="$solvers $gmsh_libraries $vtk_libraries"
+    # Any Python will do to make the environment with; Debian's comes without the means.
+    if ! venv_works && ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
+        wanted="python3 python3-venv $wanted"
+    fi
+    # shellcheck disable=SC2086  # a list of words
+    found=" $(dpkg-query -W -f='${db:Status-Status}:${Package} ' $wanted 2>/dev/null || :)"
+    for package in $wanted; do
+        case $found in
+        *" installed:$package "*) ;;
+        *) printf '%s ' "$package" ;;
+        esac
+    done
+}
+
+# The import fails once Debian's python3 has moved on to another minor version.
+venv_works() { "$environment/bin/python" -c 'import pip' 2>/dev/null; }
+
+venv_holds() {
+    for file in "$@"; do
+        grep -qs "  $file\$" "$stamp" || return 1
+    done
+    sha256sum --check --status "$stamp" 2>/dev/null && venv_works
+}
+
+check_python() {
+    if command -v python3 >/dev/null &&
+        ! python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
+        die "needs Python 3.11 or newer; $(command -v python3) is $(python3 -V 2>&1)"
+    fi
+}
+
+install_packages() {
+    missing=$(missing_packages)
+    missing=${missing% }
+    [ -n "$missing" ] || return 0
+    by_hand="    apt-get update && apt-get install --no-install-recommends $missing"
+
+    if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+        die "this system has no apt-get.  On Debian 12 one would call, as root:
+
+$by_hand
+
+Here, provide OpenFOAM (1912), LIGGGHTS, Python 3.11 or newer and these libraries by other means
+and install the package itself with pip.  Nothing was installed."
+    fi
+    if [ "$(id -u)" -eq 0 ]; then
+        sudo=
+    elif command -v sudo >/dev/null &&
+        { sudo -n true 2>/dev/null || { [ -t 0 ] && say "needs root for: $missing" && sudo true; }; }; then
+        sudo=sudo
+    else
+        die "missing Debian packages: $missing
+Installing them takes root or sudo.  Call this once as root, then make again:
+
+$by_hand
+
+Nothing was installed."
+    fi
+
+    say "installing Debian packages: $missing"
+    as_root apt-get -qq update || say "apt-get update failed; trying with the lists there are"
+    as_root dpkg --configure -a || : # ends what an interrupted call left half done
+    # shellcheck disable=SC2086
+    as_root apt-get -q -y -o DPkg::Lock::Timeout=600 --fix-broken --no-install-recommends \
+        install $missing || die "apt-get failed, see above.  Call make again, or as root:
+
+$by_hand"
+}
+
+as_root() { $sudo env DEBIAN_FRONTEND=noninteractive "$@" </dev/null 9<&-; }
+
+pip() { "$environment/bin/python" -m pip --disable-pip-version-check --no-input "$@"; }
+
+pip_install() { pip install --no-user --only-binary :all: "$@"; }
+
+install_venv() {
+    if venv_holds requirements.lock; then
+        rm -f "$stamp" # the test tools are to be added
+    else
+        say "making $environment"
+        rm -rf "$environment"
+        python3 -m venv "$environment" || die "$(command -v python3) -m venv failed, see above"
+    fi
+    for file in "$@"; do
+        pip_install --no-deps -r "$file" || die "pip failed, see above.  Call make again to go on."
+    done
+    sha256sum "$@" >"$stamp.new"
+    mv "$stamp.new" "$stamp"
+}
+
+ready() { venv_holds "$@" && [ -z "$(missing_packages)" ]; }
+
+set_up() {
+    ! ready "$@" || return 0
+    # Two calls at once: the second waits, and finds all done.
+    exec 9<.
+    flock 9
+    check_python
+    install_packages
+    check_python
+    venv_holds "$@" || install_venv "$@"
+    exec 9<&-
+}
+
+# The dependencies that pyproject.toml names, one a line: those of the package, or those of the tests.
+dependencies() {
+    "$environment/bin/python" -c '
+import sys, tomllib
+with open("pyproject.toml", "rb") as file:
+    data = tomllib.load(file)
+run, test = data["project"]["dependencies"], data["dependency-groups"]["test"]
+print(*(run if sys.argv[1] == "run" else test), sep="\n")
+' "$1"
+}
+
+lock() {
+    check_python
+    scratch=$(mktemp -d)
+    trap 'rm -rf "$scratch"' EXIT
+    environment=$scratch/venv
+    python3 -m venv "$environment"
+    dependencies run >"$scratch/run.in"
+    pip_install -r "$scratch/run.in"
+    pip freeze >"$scratch/run.lock"
+    dependencies test >"$scratch/test.in"
+    pip_install -c "$scratch/run.lock" -r "$scratch/test.in"
+    pip freeze | grep -vxFf "$scratch/run.lock" >"$scratch/test.lock"
+    cp "$scratch/run.lock" requirements.lock
+    cp "$scratch/test.lock" requirements-test.lock
+}
+
+case ${1-} in
+run) set_up requirements.lock ;;
+test) set_up requirements.lock requirements-test.lock ;;
+lock) lock ;;
+*) die "usage: sh tools/setup.sh run|test|lock" ;;
+esac
