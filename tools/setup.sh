@@ -45,7 +45,7 @@ venv_works() { "$environment/bin/python" -c 'import pip' 2>/dev/null; }
 
 venv_holds() {
     for file in "$@"; do
-        grep -qs "  $file\$" "$stamp" || return 1
+        grep -qsF "  $file" "$stamp" || return 1
     done
     sha256sum --check --status "$stamp" 2>/dev/null && venv_works
 }
@@ -122,7 +122,7 @@ set_up() {
     ! ready "$@" || return 0
     # Two calls at once: the second waits, and finds all done.
     exec 9<.
-    flock 9
+    ! command -v flock >/dev/null || flock 9
     check_python
     install_packages
     check_python
@@ -153,8 +153,9 @@ lock() {
     dependencies test >"$scratch/test.in"
     pip_install -c "$scratch/run.lock" -r "$scratch/test.in"
     pip freeze | grep -vxFf "$scratch/run.lock" >"$scratch/test.lock"
-    cp "$scratch/run.lock" requirements.lock
-    cp "$scratch/test.lock" requirements-test.lock
+    header="# Written by make lock with $("$environment/bin/python" -V) on $(uname -sm)."
+    { echo "$header" && cat "$scratch/run.lock"; } >requirements.lock
+    { echo "$header" && cat "$scratch/test.lock"; } >requirements-test.lock
 }
 
 case ${1-} in
