@@ -1,0 +1,174 @@
+"""A case directory: who it is, what it holds, how far it came. It knows nothing of any solver."""
+
+import shutil
+from abc import ABC, abstractmethod
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator import assets
+from orchestrator.files import (
+    canonical_json,
+    digest_file,
+    digest_files,
+    digest_text,
+    read_json,
+    write_durably,
+    write_json,
+)
+
+IDENTITY = "case.json"
+DONE = "done.json"
+FAILED = "failed.json"
+CHECKSUMS = "results.sha256"
+
+
+class Case(ABC):
+    """One run of a solver: what it depends on, how its inputs are written, what its end means.
+
+    A subclass is a frozen value. Its `parameters` and the template it copies are its identity,
+    so two scenes that need the same run name the same directory.
+    """
+
+    kind: ClassVar[str]
+    """Name of the kind, and first word of the directory's name."""
+    template: ClassVar[str]
+    """Folder below `templates/` that the directory starts as a copy of."""
+    recipe: ClassVar[int]
+    """Raised whenever the same parameters come to give other inputs or results."""
+    results: ClassVar[tuple[str, ...]]
+    """Glob patterns of the files that a rerun by hand must reproduce byte for byte."""
+    derived: ClassVar[tuple[str, ...]] = ()
+    """Tables that `collect` makes of the results; not the solver's own."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, Any]:
+        """All that the run depends on, as JSON; SI units."""
+
+    @property
+    @abstractmethod
+    def cost_s(self) -> float:
+        """Expected wall time on one core, s: for ordering and for the time left, nothing else."""
+
+    @property
+    def needs(self) -> tuple["Case", ...]:
+        """The cases whose results this one's inputs are made of."""
+        return ()
+
+    @abstractmethod
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write parameter files, meshes and tables into a fresh copy of the template."""
+
+    @abstractmethod
+    def collect(self, directory: Path) -> None:
+        """Check how the run ended and derive its tables.
+
+        Raises
+        ------
+        SolverError
+            If the results cannot be trusted, whatever the exit code was.
+        """
+
+    @abstractmethod
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+
+    @cached_property
+    def id(self) -> str:
+        """Digest of all that the results depend on."""
+        return digest_text(
+            canonical_json(
+                {
+                    "kind": self.kind,
+                    "recipe": self.recipe,
+                    "template": assets.template_digest(self.template),
+                    "parameters": self.parameters,
+                    "needs": [case.id for case in self.needs],
+                }
+            )
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the case's directory."""
+        return f"{self.kind}-{self.id[:12]}"
+
+
+def prepare(case: Case, cases: Path) -> Path:
+    """Make the case's directory afresh, inputs and identity, and return it.
+
+    What an interrupted run left there is thrown away: it is never trusted half-written.
+    """
+    directory = cases / case.name
+    shutil.rmtree(directory, ignore_errors=True)
+    shutil.copytree(assets.templates() / case.template, directory)
+    case.write(directory, cases)
+    inputs = [path for path in directory.rglob("*") if path.is_file()]
+    identity = {
+        "id": case.id,
+        "kind": case.kind,
+        "recipe": case.recipe,
+        "template": case.template,
+        "template_sha256": assets.template_digest(case.template),
+        "parameters": case.parameters,
+        "needs": [need.name for need in case.needs],
+        "inputs_sha256": digest_files(inputs, root=directory),
+        "programs": case.versions(),
+    }
+    write_json(directory / IDENTITY, identity)
+    return directory
+
+
+def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> None:
+    """Mark a case as done: the last file written, with the digests of what it vouches for."""
+    results = digest_files(_matching(directory, case.results), root=directory)
+    derived = digest_files(_matching(directory, case.derived), root=directory)
+    sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
+    write_durably(directory / CHECKSUMS, sums)
+    (directory / FAILED).unlink(missing_ok=True)
+    write_json(
+        directory / DONE,
+        {
+            "ended": "done",
+            "solver_s": solver_s,
+            "wall_s": wall_s,
+            "results_sha256": results,
+            "derived_sha256": derived,
+        },
+    )
+
+
+def fail(directory: Path, cause: str) -> None:
+    """Leave a note of why a case failed, for `status`; the next study run tries it again."""
+    if directory.is_dir():
+        write_json(directory / FAILED, {"ended": "failed", "cause": cause})
+
+
+def is_done(case: Case, cases: Path) -> bool:
+    """Whether the case's directory holds its finished results, unharmed."""
+    return done_state(case, cases) is not None
+
+
+def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
+    """The marker of a finished case, or None where anything about it cannot be trusted."""
+    directory = cases / case.name
+    identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
+    if not isinstance(identity, dict) or identity.get("id") != case.id:
+        return None
+    return state if isinstance(state, dict) and _vouched(directory, state) else None
+
+
+def _vouched(directory: Path, state: dict[str, Any]) -> bool:
+    try:
+        digests = {**state["results_sha256"], **state["derived_sha256"]}
+        return bool(digests) and all(
+            digest_file(directory / name) == digest for name, digest in digests.items()
+        )
+    except (KeyError, TypeError, OSError):
+        return False
+
+
+def _matching(directory: Path, patterns: tuple[str, ...]) -> list[Path]:
+    found = {path for pattern in patterns for path in directory.glob(pattern) if path.is_file()}
+    return sorted(found)

@@ -1,0 +1,46 @@
+"""Failures that a user can act on: each says what, where and what to do."""
+
+
+class OrchestratorError(Exception):
+    """A failure with a place and a remedy; the command line prints it without a traceback.
+
+    Parameters
+    ----------
+    what : str
+        What went wrong, in one sentence.
+    where : str, optional
+        The file, field or case that it happened in.
+    remedy : str, optional
+        What the user can do about it.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.remedy = remedy
+        super().__init__(what, where, remedy)
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        advice = f" ({self.remedy})" if self.remedy else ""
+        return f"{place}{self.what}{advice}"
+
+
+class InputError(OrchestratorError):
+    """The study file, an option or a value given by the user is not usable."""
+
+    exit_code = 2
+
+
+class SolverError(OrchestratorError):
+    """A solver is missing, or its run did not end as it must."""
+
+    exit_code = 3
+
+
+class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error
+    """The user stopped the run; the same command continues it."""
+
+    exit_code = 130

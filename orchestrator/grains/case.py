@@ -1,0 +1,24 @@
+"""What every case of LIGGGHTS on a bed of grains has in common."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from orchestrator.case import Case
+from orchestrator.solvers import liggghts
+
+
+class GrainCase(Case):
+    """A case that runs the deck ``in.bed``."""
+
+    template: ClassVar[str] = "liggghts/bed"
+    results: ClassVar[tuple[str, ...]] = ("levels.csv", "passage.dump", "bed.dump")
+    derived: ClassVar[tuple[str, ...]] = ("holds.csv", "motion.csv")
+
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+        return {liggghts.PROGRAM: liggghts.version()}
+
+    @staticmethod
+    def check(directory: Path) -> None:
+        """See that the run came to its own end."""
+        liggghts.check_log(directory)

@@ -1,0 +1,136 @@
+"""Single grains on their two fixed neighbours: many cells, one case of LIGGGHTS.
+
+In units of d, W and sqrt(d/g') a bed knows no scale, so the cells are models of one size: every
+grain has the reference diameter, its forces are those of its own scene times the ratio of the
+weights. The flow of the deck is the friction velocity over that of the closed form.
+"""
+
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.closures import Powers
+from orchestrator.files import canonical_json
+from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains.case import GrainCase
+from orchestrator.scene import Scene
+
+DIAMETER = 1e-3
+DENSITY = 2500.0
+GRAVITY = 9.81
+"""The reference grain of a deck, SI; GRAVITY is its g'."""
+LAST = 1.2
+"""Flow of the last hold: a grain that still lies then contradicts the closed form by 20 %."""
+SPACING = 3.0
+"""Of the cells across the flow, diameters: grains of two cells never meet."""
+UNUSED = {"fractions", "until"}
+"""Fields of the protocol that mean nothing to one grain."""
+BLOCK = 512
+"""Most cells of a deck."""
+
+
+@dataclass(frozen=True)
+class CellsCase(GrainCase):
+    """Cells of three grains, one for each scene; all scenes share grain contact and protocol."""
+
+    scenes: tuple[Scene, ...]
+    kind: ClassVar[str] = "cells"
+    recipe: ClassVar[int] = 1
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The scenes, but for what only the reading of the results depends on."""
+        hidden = {"protocol": UNUSED}
+        return {"scenes": [scene.model_dump(mode="json", exclude=hidden) for scene in self.scenes]}
+
+    @property
+    def cost_s(self) -> float:
+        """Expected wall time, s."""
+        rules = self.scenes[0].protocol
+        holds = np.log(1.02 / protocol.START) / np.log1p(rules.step)
+        return protocol.run_cost_s(holds, 3 * len(self.scenes), rules, self._grain.stiffness)
+
+    @property
+    def _grain(self) -> Any:
+        return self.scenes[0].grain
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains with their forces, and the holds of the protocol."""
+        rules = self.scenes[0].protocol
+        parameters = {
+            "diameter": DIAMETER,
+            "density": DENSITY,
+            "gravity": GRAVITY,
+            **protocol.contact(self._grain, rules),
+            **protocol.holds(rules, first=protocol.START, last=LAST, enough=0),
+            # no face, no ceiling: the planes lie far above the box
+            "slope": 0.0,
+            "ceiling_x": 0.0,
+            "ceiling_z": 1e3 * DIAMETER,
+        }
+        deck.write(directory, self._grains(), parameters, margin=4 * DIAMETER)
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write what each grain did to ``motion.csv``."""
+        self.check(directory)
+        grains = self._grains()
+        found = motion.read(directory, grains, self.scenes[0].protocol.marker)
+        found.to_csv(directory, grains)
+
+    def _grains(self) -> deck.GrainTable:
+        cells = [_cell(scene) for scene in self.scenes]
+        centres = np.concatenate([cell[0] for cell in cells]) * DIAMETER
+        across = np.repeat(np.arange(len(cells)) * SPACING * DIAMETER, 3)
+        force = np.zeros((len(deck.POWERS), len(centres), 2))
+        force[:, 2::3] = np.concatenate([cell[2] for cell in cells], axis=1)
+        return deck.GrainTable(
+            position=np.column_stack([centres[:, 0], across, centres[:, 1]]),
+            kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
+            along=np.repeat([cell[1] for cell in cells], 3, axis=0),
+            force=force,
+            diameter=DIAMETER,
+            density=DENSITY,
+        )
+
+
+def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray, deck.FloatArray]:
+    """Two neighbours and the grain (3, 2), unit vector up the slope (2,), force (powers, 1, 2)."""
+    alpha = np.radians(scene.bed.slope_deg)
+    beta = np.radians(scene.bed.entrainment_angle_deg)
+    along = np.array([np.cos(alpha), np.sin(alpha)])
+    outward = np.array([-along[1], along[0]])
+    behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
+    own_threshold = scene.closed_form(scene.closure).friction_velocity
+    scale = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY / scene.weight
+    drag, lift = (
+        Powers(tuple(scale * c for c in force.coefficients), force.exponents)
+        for force in scene.powers()
+    )
+    speed = np.atleast_1d(own_threshold)
+    force = deck.force_table(drag, lift, speed, along[None], outward[None])
+    return np.vstack([behind, ahead, [0.0, 0.0]]), along, force
+
+
+def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:
+    """Cases for the single-grain scenes of a study: those that can share a deck, in fixed blocks.
+
+    The split depends on the study alone, never on what is left to do: a study that was interrupted
+    must not differ from one that was not.
+    """
+    ordered = sorted(scenes, key=_shared_key)
+    for _, group in itertools.groupby(ordered, key=_shared_key):
+        members = sorted(group, key=lambda scene: scene.id)
+        for start in range(0, len(members), BLOCK):
+            yield CellsCase(tuple(members[start : start + BLOCK]))
+
+
+def _shared_key(scene: Scene) -> str:
+    contact = scene.grain.model_dump(include={"friction_angle_deg", "stiffness", "damping"})
+    rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
+    return canonical_json([contact, rules])
+
+

@@ -1,0 +1,122 @@
+"""The tables and parameters that LIGGGHTS reads beside a copy of the template deck."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.closures import Powers
+
+FloatArray = NDArray[np.float64]
+
+FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
+"""Grain types of the deck: fixed; mobile; mobile, exposed and counted; mobile, exposed elsewhere."""
+POWERS = (1.0, 1.5, 1.687, 2.0, 3.0)
+"""Exponents of the friction velocity in Eqs. 2 and 4; the deck has a pair of tables for each."""
+
+
+@dataclass(frozen=True)
+class GrainTable:
+    """The grains of a deck, n of them.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n, 3)
+        x, y, z of the centres, m.
+    kind : ndarray of int, shape (n,)
+        One of FIXED, MOBILE, COUNTED, PUSHED.
+    along : ndarray, shape (n, 2)
+        Unit vector downstream along the bed, in which displacement is counted.
+    force : ndarray, shape (len(POWERS), n, 2)
+        Vectors F_p: the flow's force on a grain is sum_p F_p flow**p, N.
+    diameter, density : float
+        Of every grain, m and kg/m3.
+    """
+
+    position: FloatArray
+    kind: NDArray[np.int64]
+    along: FloatArray
+    force: FloatArray
+    diameter: float
+    density: float
+
+    @property
+    def counted_ids(self) -> NDArray[np.int64]:
+        """Ids (from 1) of the grains whose motion is counted."""
+        return np.flatnonzero(self.kind == COUNTED) + 1
+
+
+def force_table(
+    drag: Powers, lift: Powers, speed: FloatArray, along: FloatArray, outward: FloatArray
+) -> FloatArray:
+    """Vectors F_p of n grains, shape (len(POWERS), n, 2).
+
+    Parameters
+    ----------
+    drag, lift : Powers
+        Closure of the scene; coefficients of shape () or (n,).
+    speed : ndarray, shape (n,)
+        The local friction velocity over the deck's flow speed; negative where the flow runs back.
+    along, outward : ndarray, shape (n, 2)
+        Unit vectors along the bed and normal to it. Drag follows the flow's direction, lift is
+        never negative.
+    """
+    table = np.zeros((len(POWERS), len(speed), 2))
+    for force, direction in ((drag, np.sign(speed)[:, None] * along), (lift, outward)):
+        for coefficient, power in zip(force.coefficients, force.exponents, strict=True):
+            size = coefficient * np.abs(speed) ** power
+            table[POWERS.index(power)] += size[:, None] * direction
+    return table
+
+
+def write(
+    directory: Path, grains: GrainTable, parameters: Mapping[str, float | int], margin: float
+) -> None:
+    """Write the grains and parameters of a deck.
+
+    Parameters
+    ----------
+    directory : Path
+        A copy of the template ``liggghts/bed``.
+    grains : GrainTable
+        The grains; ids are their places, from 1.
+    parameters : mapping
+        Each becomes a variable of the deck.
+    margin : float
+        Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
+    """
+    (directory / "grains.data").write_text(_data_file(grains, margin))
+    # float() because a numpy number's repr is not one that the deck could read
+    numbers = {k: v if isinstance(v, int) else float(v) for k, v in parameters.items()}
+    lines = (f"variable        {name} equal {value!r}\n" for name, value in numbers.items())
+    (directory / "parameters.liggghts").write_text("".join(lines))
+    for power, vectors in zip(POWERS, grains.force, strict=True):
+        _write_vectors(directory / "force", f"{power}.", vectors)
+    _write_vectors(directory / "along", "", grains.along)
+
+
+def _write_vectors(folder: Path, prefix: str, vectors: FloatArray) -> None:
+    folder.mkdir(exist_ok=True)
+    for axis, values in zip("xz", vectors.T, strict=True):
+        lines = (f"{number} {value!r}\n" for number, value in enumerate(values.tolist(), 1))
+        (folder / f"{prefix}{axis}.txt").write_text(f"{len(values)}\n" + "".join(lines))
+
+
+def _data_file(grains: GrainTable, margin: float) -> str:
+    # a rounded bound would lose the grains that lie on it: every number has all its digits
+    low = (grains.position.min(axis=0) - margin).tolist()
+    high = (grains.position.max(axis=0) + margin).tolist()
+    bounds = "".join(
+        f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in zip(low, high, "xyz", strict=True)
+    )
+    size = f"{grains.diameter!r} {grains.density!r}"
+    rows = "".join(
+        f"{number} {kind} {size} {x!r} {y!r} {z!r}\n"
+        for number, (kind, (x, y, z)) in enumerate(
+            zip(grains.kind.tolist(), grains.position.tolist(), strict=True), 1
+        )
+    )
+    head = f"grains: id type diameter density x y z\n\n{len(grains.kind)} atoms\n4 atom types\n\n"
+    return f"{head}{bounds}\nAtoms\n\n{rows}"

@@ -1,0 +1,199 @@
+"""A pile of grains under the flow over it: one case of LIGGGHTS for each scene."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator import closures, packing
+from orchestrator.case import Case
+from orchestrator.errors import InputError
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains.case import GrainCase
+from orchestrator.scene import PileBed, Scene
+
+FloatArray = NDArray[np.float64]
+
+MARGIN = 3.0
+"""From the outermost grains to the walls of the box, and from a face to the height at which a
+grain in flight is gone, diameters."""
+AVERAGE_OVER_HEIGHT = 1 / 40
+"""Least bed length, over h, that a grain's stress is averaged on: the crest's own value never
+converges with the mesh."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """The exposed windward grains of a pile, N of them, from the toe to the crest.
+
+    Attributes
+    ----------
+    ids : ndarray of int, shape (N,)
+        Ids in the deck.
+    arc_length : ndarray, shape (N,)
+        Position along the bed line from the windward toe, m.
+    speed : ndarray, shape (N,)
+        Local friction velocity over the undisturbed one, signed.
+    """
+
+    ids: NDArray[np.int64]
+    arc_length: FloatArray
+    speed: FloatArray
+
+
+@dataclass(frozen=True)
+class PileCase(GrainCase):
+    """The grains of one pile."""
+
+    scene: Scene
+    kind: ClassVar[str] = "pile"
+    recipe: ClassVar[int] = 1
+
+    @property
+    def bed(self) -> PileBed:
+        """The scene's bed."""
+        assert isinstance(self.scene.bed, PileBed)
+        return self.scene.bed
+
+    @cached_property
+    def flow(self) -> FlowCase:
+        """The flow that gives the stress; scenes that differ in their grains alone share it."""
+        return FlowCase(
+            slope_deg=self.bed.slope_deg,
+            height_m=self.bed.height,
+            roughness_m=self.bed.roughness,
+            speed_m_s=self.scene.flow.speed,
+            viscosity_m2_s=self.scene.flow.viscosity,
+            first_cell_m=self.scene.first_cell_height,
+            cells_per_face=self.scene.flow.cells_per_face,
+        )
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        """The flow."""
+        return (self.flow,)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The scene, but for what only the reading of the results depends on."""
+        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+
+    @property
+    def cost_s(self) -> float:
+        """Expected wall time, s."""
+        rules = self.scene.protocol
+        count = self.bed.height / np.sin(np.radians(self.bed.slope_deg)) / self.scene.grain.diameter
+        grains = count * (self.bed.mobile_layers + packing.CORE_LAYERS) * 2
+        holds = np.log(3.5) / np.log1p(rules.step)
+        return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
+
+    @cached_property
+    def triangle(self) -> packing.Triangle:
+        """The bed line, in diameters."""
+        return packing.Triangle(self.bed.slope_deg, self.bed.height / self.scene.grain.diameter)
+
+    @cached_property
+    def packing(self) -> packing.Packing:
+        """The grains' places, in diameters."""
+        return packing.pile(
+            self.triangle,
+            entrainment_angle_deg=self.bed.entrainment_angle_deg,
+            gap=self.bed.roughness / self.scene.grain.diameter,
+            pattern=self.bed.packing,
+            mobile_layers=self.bed.mobile_layers,
+        )
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains with their forces, and the holds of the protocol."""
+        speed = self._speed(cases)
+        rules = self.scene.protocol
+        thresholds = self.pivot_thresholds(speed[self.packing.windward])
+        last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
+        if not np.isfinite(last):
+            last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
+        d = self.scene.grain.diameter
+        ceiling = (MARGIN + 0.5) / np.cos(np.radians(self.bed.slope_deg))
+        parameters = {
+            "diameter": d,
+            "density": self.scene.grain.density,
+            "gravity": self.scene.reduced_gravity,
+            **protocol.contact(self.scene.grain, rules),
+            **protocol.holds(
+                rules,
+                first=protocol.START * thresholds[0],
+                last=protocol.BEYOND * last,
+                enough=int((1 - rules.until) * self.packing.count + 1e-9),
+            ),
+            "slope": self.bed.slope_deg,
+            "ceiling_x": self.triangle.crest[0] * d,
+            "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
+        }
+        deck.write(directory, self._grains(speed), parameters, margin=MARGIN * d)
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write what each windward grain did to ``motion.csv``."""
+        self.check(directory)
+        grains = self._grains(self._speed(directory.parent))
+        motion.read(directory, grains, self.scene.protocol.marker).to_csv(directory, grains)
+
+    def face(self, cases: Path) -> Face:
+        """The windward grains and the stress on them, from the finished flow case."""
+        chosen = self.packing.windward
+        return Face(
+            ids=np.flatnonzero(chosen) + 1,
+            arc_length=self.packing.arc_length[chosen] * self.scene.grain.diameter,
+            speed=self._speed(cases)[chosen],
+        )
+
+    def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which each grain's own stress reaches Eq. 3 or 5, m/s.
+
+        Sorted, shape (N,); infinite for grains in flow that runs back.
+        """
+        alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
+        if not np.any(speed > 0):
+            raise InputError(
+                "no grain of the windward face feels a flow up the slope",
+                where=f"scene {self.scene.id}: flow",
+                remedy="look at the flow case; the mesh or the stress is wrong",
+            )
+        return np.sort(np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf))
+
+    def _speed(self, cases: Path) -> FloatArray:
+        """Signed friction velocity at each grain over the undisturbed one."""
+        stress = WallStress.from_csv(cases / self.flow.name / "wall_stress.csv")
+        d = self.scene.grain.diameter
+        length = max(d, AVERAGE_OVER_HEIGHT * self.bed.height)
+        tau = stress.mean_over(self.packing.arc_length * d, length, self.scene.flow.stress)
+        return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+
+    def _grains(self, speed: FloatArray) -> deck.GrainTable:
+        bed, d = self.packing, self.scene.grain.diameter
+        up = self.triangle.tangent
+        along = np.where(bed.lee[:, None], up * [1, -1], up)
+        outward = np.where(bed.lee[:, None], *reversed(self.triangle.normals))
+        kind = np.select(
+            [~bed.mobile, bed.windward, bed.lee], [deck.FIXED, deck.COUNTED, deck.PUSHED], deck.MOBILE
+        )
+        drag, lift = self.scene.powers()
+        force = deck.force_table(drag, lift, speed, along, outward)
+        force[:, kind < deck.COUNTED] = 0
+        x, z = bed.centres.T * d
+        return deck.GrainTable(
+            position=np.column_stack([x, np.zeros_like(x), z]),
+            kind=kind,
+            along=np.tile(up, (len(x), 1)),
+            force=force,
+            diameter=d,
+            density=self.scene.grain.density,
+        )
+
+
+def undisturbed_ustar(speed: float, height: float, roughness: float) -> float:
+    """u*_0 under a speed U_e at the lid, 10 h above the flat bed (Eq. 10), m/s."""
+    return float(closures.log_law_ustar(speed, 10 * height, roughness))

@@ -1,0 +1,130 @@
+"""Thresholds from motion: of single grains, and of a pile at a fraction of its grains."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.grains.motion import Motion
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Values that the holds enclose, arrays of one shape; NaN where a grain never moved.
+
+    Attributes
+    ----------
+    value : ndarray
+        The geometric mean of `low` and `high`.
+    low, high : ndarray
+        At `low` it had not yet happened, at `high` it had.
+    """
+
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def of_grains(motion: Motion) -> Thresholds:
+    """The deck's flow at which each counted grain moved, shape (N,)."""
+    moved = motion.level > 0
+    low = np.where(moved, motion.flow[np.maximum(motion.level, 1) - 1], np.nan)
+    high = np.where(moved, motion.flow[motion.level], np.nan)
+    return Thresholds(np.sqrt(low * high), low, high)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """How a pile answers to the flow; arrays over the holds, shape (levels + 1,).
+
+    Attributes
+    ----------
+    ustar0 : ndarray
+        Undisturbed friction velocity, m/s.
+    fraction : ndarray
+        n/N that had moved by the end of the hold.
+    mean_tau : ndarray
+        Mean signed wall stress over the grains that had moved, Pa; NaN before any had.
+    """
+
+    ustar0: FloatArray
+    fraction: FloatArray
+    mean_tau: FloatArray
+
+
+def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
+    """The fraction that moved and the mean stress on it, at each hold.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of the N windward grains.
+    speed : ndarray, shape (N,)
+        Signed local friction velocity over the undisturbed one.
+    fluid_density : float
+        kg/m3.
+    """
+    mean = np.array([_mean_stress(motion, speed, level) for level in range(len(motion.flow))])
+    return Curve(motion.flow, motion.fraction, fluid_density * motion.flow**2 * mean)
+
+
+@dataclass(frozen=True)
+class PileThreshold:
+    """The flow at which a fraction of a pile's grains has moved.
+
+    Attributes
+    ----------
+    fraction : float
+        n/N.
+    ustar0 : float
+        Undisturbed friction velocity, m/s; NaN if the fraction was not reached.
+    tau, tau_low, tau_high : float
+        tau_c and its interval, Pa: the mean signed wall stress over the grains that have moved.
+        The interval holds the step between two flows and the count's resolution of 1/N.
+    """
+
+    fraction: float
+    ustar0: float
+    tau: float
+    tau_low: float
+    tau_high: float
+
+
+def of_pile(
+    motion: Motion, speed: FloatArray, fraction: float, fluid_density: float
+) -> PileThreshold:
+    """tau_c of a pile at a fraction; arguments as in `curve`."""
+    level = _first_level(motion, fraction)
+    if level is None:
+        return PileThreshold(fraction, *(math.nan,) * 4)
+    half_a_grain = 0.5 / motion.count
+    below = _first_level(motion, fraction - half_a_grain) or level
+    # a neighbouring fraction that is out of reach leaves the interval open; it then ends at the last
+    above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
+    flow = math.sqrt(motion.flow[level - 1] * motion.flow[level])
+
+    def stress(at: int, ustar0: float) -> float:
+        return fluid_density * float(ustar0) ** 2 * _mean_stress(motion, speed, at)
+
+    return PileThreshold(
+        fraction=fraction,
+        ustar0=flow,
+        tau=stress(level, flow),
+        tau_low=stress(below, motion.flow[below - 1]),
+        tau_high=stress(above, motion.flow[above]),
+    )
+
+
+def _first_level(motion: Motion, fraction: float) -> int | None:
+    needed = max(math.ceil(fraction * motion.count - 1e-9), 1)
+    reached = np.flatnonzero(motion.fraction * motion.count >= needed - 1e-9)
+    return int(reached[0]) if len(reached) else None
+
+
+def _mean_stress(motion: Motion, speed: FloatArray, level: int) -> float:
+    """Mean signed stress over the moved grains, in units of the undisturbed stress."""
+    moved = motion.moved_by(level)
+    return float(np.mean((np.sign(speed) * speed**2)[moved])) if moved.any() else math.nan

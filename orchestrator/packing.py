@@ -1,0 +1,227 @@
+"""Where the grains of a bed lie, which of them are exposed, and which may move.
+
+A packing is a lattice of equal spheres in the plane of the flow: rows in which the centres are
+``2 d cos(beta)`` apart, each row resting in the pockets of the one below, ``d sin(beta)`` lower.
+Lengths here are in diameters, with the windward toe of the flow's bed line at the origin.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.scene import Packing as Pattern
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+TIE = 1e-6
+"""Of a diameter: neighbours of a lattice lie exactly on the limits below, and a tie must not be
+decided by round-off."""
+APRON = 10.0
+"""Length of the fixed flat bed beyond each toe, diameters."""
+CORE_LAYERS = 2
+"""Fixed layers that are kept below the mobile ones: a grain touches no deeper one."""
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """The bed line of a pile: flat, up the windward face, down the lee face, flat.
+
+    Attributes
+    ----------
+    slope_deg : float
+        Slope of both faces, alpha.
+    height : float
+        Height h of the crest over the flat bed, diameters.
+    """
+
+    slope_deg: float
+    height: float
+
+    @property
+    def tangent(self) -> FloatArray:
+        """Unit vector up the windward face, (x, z)."""
+        alpha = np.radians(self.slope_deg)
+        return np.array([np.cos(alpha), np.sin(alpha)])
+
+    @property
+    def normals(self) -> tuple[FloatArray, FloatArray]:
+        """Outward unit normals of the windward and of the lee face."""
+        x, z = self.tangent
+        return np.array([-z, x]), np.array([z, x])
+
+    @property
+    def crest(self) -> FloatArray:
+        """Position of the crest, diameters."""
+        return np.array([self.height / np.tan(np.radians(self.slope_deg)), self.height])
+
+    def depth(self, points: FloatArray, face: int) -> FloatArray:
+        """Signed distance of points (n, 2) below a face's line (0 windward, 1 lee), diameters."""
+        return -(points - self.crest) @ self.normals[face]
+
+    def arc_length(self, points: FloatArray) -> FloatArray:
+        """Arc length from the windward toe to the foot of each point's normal, diameters."""
+        top = self.height / np.sin(np.radians(self.slope_deg))
+        up = (points - self.crest) @ self.tangent
+        down = (points - self.crest) @ (self.tangent * [1, -1])
+        return np.where(self.is_windward(points), np.minimum(top + up, top), top + down)
+
+    def is_windward(self, points: FloatArray) -> BoolArray:
+        """Which points belong to the windward face; the crest's own grain does."""
+        return np.asarray(points[:, 0] <= self.crest[0] + TIE)
+
+
+@dataclass(frozen=True)
+class Packing:
+    """The grains of a pile, n of them, lengths in diameters.
+
+    Attributes
+    ----------
+    centres : ndarray, shape (n, 2)
+        x and z of each centre.
+    mobile : ndarray of bool, shape (n,)
+        May move; the others are fixed.
+    windward, lee : ndarray of bool, shape (n,)
+        Exposed on that face.
+    arc_length : ndarray, shape (n,)
+        Position along the bed line; it means something for exposed grains.
+    """
+
+    centres: FloatArray
+    mobile: BoolArray
+    windward: BoolArray
+    lee: BoolArray
+    arc_length: FloatArray
+
+    @property
+    def count(self) -> int:
+        """N(d): how many grains the windward face exposes."""
+        return int(self.windward.sum())
+
+
+def pile(
+    triangle: Triangle,
+    *,
+    entrainment_angle_deg: float,
+    gap: float,
+    pattern: Pattern,
+    mobile_layers: int,
+) -> Packing:
+    """Pack a triangular pile.
+
+    Parameters
+    ----------
+    triangle : Triangle
+        The bed line of the flow.
+    entrainment_angle_deg : float
+        beta of the lattice.
+    gap : float
+        Height of the exposed grains' lowest points over the bed line, z0/d.
+    pattern : {"aligned", "horizontal"}
+        Direction of the rows: along the windward face, or level.
+    mobile_layers : int
+        Layers of the windward face that may move.
+    """
+    beta = np.radians(entrainment_angle_deg)
+    surface = 0.5 + gap
+    row_height = float(np.sin(beta))
+    body = _body(triangle, beta, surface, pattern, layers=mobile_layers + CORE_LAYERS)
+    buried = body[:, 1] < surface - TIE
+    in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
+    windward, lee = (face & ~buried for face in exposed(body, triangle))
+    mobile = (in_layers & ~buried) | windward
+    idle = buried & ~_touching(body, mobile)
+    body, mobile, windward, lee = (array[~idle] for array in (body, mobile, windward, lee))
+    centres = np.vstack([body, _apron(body, surface)])
+    rest = np.zeros(len(centres) - len(body), bool)
+    return Packing(
+        centres=centres,
+        mobile=np.append(mobile, rest),
+        windward=np.append(windward, rest),
+        lee=np.append(lee, rest),
+        arc_length=triangle.arc_length(centres),
+    )
+
+
+def _body(
+    triangle: Triangle, beta: float, surface: float, pattern: Pattern, layers: int
+) -> FloatArray:
+    """Lattice grains near both faces, with one grain on the crest, and some below the ground."""
+    direction = triangle.tangent if pattern == "aligned" else np.array([1.0, 0.0])
+    apex = triangle.crest + [0, surface / np.cos(np.radians(triangle.slope_deg))]
+    lattice = _lattice(triangle, apex, direction, beta)
+    depth = np.minimum(triangle.depth(lattice, 0), triangle.depth(lattice, 1)) + surface
+    level = lattice[:, 1] - surface
+    inside = (depth >= -TIE) & (depth < layers * np.sin(beta) + TIE)
+    covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))
+    return np.asarray(lattice[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
+
+
+def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
+    """Which points touch one of the chosen ones."""
+    wanted = points[chosen]
+    order = np.argsort(wanted[:, 0])
+    wanted = wanted[order]
+    reach = 1 + 1e-3
+    start = np.searchsorted(wanted[:, 0], points[:, 0] - reach)
+    stop = np.searchsorted(wanted[:, 0], points[:, 0] + reach)
+    return np.array(
+        [
+            bool(np.any(np.hypot(*(wanted[low:high] - point).T) < reach))
+            for point, low, high in zip(points, start, stop, strict=True)
+        ]
+    )
+
+
+def exposed(centres: FloatArray, triangle: Triangle) -> tuple[BoolArray, BoolArray]:
+    """Which grains are exposed on the windward and on the lee face.
+
+    A grain is exposed when no other centre lies higher along the normal of its face within d/2 of
+    the line along that normal through its own centre.
+    """
+    side = triangle.is_windward(centres)
+    found = []
+    for face, own in enumerate((side, ~side)):
+        normal = triangle.normals[face]
+        along = centres @ np.array([normal[1], -normal[0]])
+        free = _unshadowed(along, centres @ normal)
+        found.append(free & own)
+    return found[0], found[1]
+
+
+def _unshadowed(along: FloatArray, height: FloatArray) -> BoolArray:
+    order = np.argsort(along)
+    sorted_along, sorted_height = along[order], height[order]
+    start = np.searchsorted(sorted_along, sorted_along - 0.5 - TIE)
+    stop = np.searchsorted(sorted_along, sorted_along + 0.5 + TIE)
+    free = np.empty(len(along), bool)
+    for place, (low, high) in enumerate(zip(start, stop, strict=True)):
+        free[order[place]] = sorted_height[low:high].max() <= sorted_height[place] + TIE
+    return free
+
+
+def _lattice(
+    triangle: Triangle, anchor: FloatArray, direction: FloatArray, beta: float
+) -> FloatArray:
+    """Every lattice point within the triangle's corners, with a margin."""
+    normal = np.array([-direction[1], direction[0]])
+    toe = [2 * triangle.crest[0], 0.0]
+    corners = np.array([[0.0, 0.0], toe, triangle.crest]) - anchor
+    along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
+    rows = np.arange(0, np.ceil(down.max()) + 3)
+    columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)
+    row, column = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
+    offset = (2 * column + row % 2) * np.cos(beta)
+    return anchor + np.outer(offset, direction) - np.outer(row * np.sin(beta), normal)
+
+
+def _apron(body: FloatArray, surface: float) -> FloatArray:
+    """Two flat rows of touching fixed grains, each starting where it touches the pile."""
+    drop = np.abs(body[:, 1] - surface)
+    near = body[drop < 1]
+    clearance = np.sqrt(1 - drop[drop < 1] ** 2)
+    first = (near[:, 0] - clearance).min(), (near[:, 0] + clearance).max()
+    steps = np.arange(0, APRON)
+    x = np.concatenate([first[0] - steps, first[1] + steps])
+    return np.column_stack([x, np.full(len(x), surface)])

@@ -1,0 +1,36 @@
+"""From scenes to cases: which runs a study needs, shared where scenes agree."""
+
+from dataclasses import dataclass
+
+from orchestrator.case import Case
+from orchestrator.grains.cells import CellsCase, batches
+from orchestrator.grains.pile import PileCase
+from orchestrator.scene import PileBed
+from orchestrator.study import Study
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The cases of a study.
+
+    Attributes
+    ----------
+    piles : dict of str to PileCase
+        By the id of the scene that each answers.
+    cells : tuple of CellsCase
+        Each answers all of its scenes.
+    cases : dict of str to Case
+        Every case once, by name, a case after those whose results it needs.
+    """
+
+    piles: dict[str, PileCase]
+    cells: tuple[CellsCase, ...]
+    cases: dict[str, Case]
+
+
+def make(study: Study) -> Plan:
+    """The cases that a study needs."""
+    piles = {s.id: PileCase(s) for s in study.scenes if isinstance(s.bed, PileBed)}
+    cells = tuple(batches(s for s in study.scenes if not isinstance(s.bed, PileBed)))
+    ordered: list[Case] = [need for pile in piles.values() for need in pile.needs]
+    return Plan(piles, cells, {case.name: case for case in (*ordered, *cells, *piles.values())})

@@ -1,0 +1,289 @@
+"""One scene: a fluid, its grains, their bed, the flow and the protocol; frozen, validated, SI.
+
+The fields' names and defaults are the study file's too. Angles are in degrees and say so in their
+names; everything else is in SI units or, where the comment says so, in units of the grain.
+"""
+
+import re
+from functools import cached_property
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from orchestrator import closures
+from orchestrator.closures import Closure, Regime, Threshold
+from orchestrator.files import canonical_json, digest_text
+
+Positive = Annotated[float, Field(gt=0)]
+Packing = Literal["aligned", "horizontal"]
+Stress = Literal["wall", "eq10"]
+
+
+class Part(BaseModel):
+    """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Fluid(Part):
+    """The fluid; the default is the paper's air."""
+
+    density: Positive = 1.0
+    """rho_f, kg/m3"""
+    viscosity: Positive = 1e-5
+    """nu, kinematic, m2/s"""
+    gravity: Positive = closures.GRAVITY
+    """g, m/s2"""
+
+
+class Grain(Part):
+    """Equal spheres and their contact law."""
+
+    diameter: Positive
+    """d, m"""
+    density: Positive = 2500.0
+    """rho_sol, kg/m3"""
+    friction_angle_deg: Annotated[float, Field(gt=0, lt=90)] = 35.0
+    """phi, Coulomb's"""
+    stiffness: Annotated[float, Field(ge=1e2, le=1e9)] = 1e4
+    """K d/W of the contact's spring, normal and tangential"""
+    damping: Annotated[float, Field(gt=0, lt=1)] = 0.1
+    """damping ratio of a collision"""
+
+
+class Bed(Part):
+    """What every bed has. Subclasses say which grains it is made of."""
+
+    slope_deg: Annotated[float, Field(ge=0, lt=90)] = 0.0
+    """alpha; the flow goes up the slope"""
+    entrainment_angle_deg: Annotated[float, Field(gt=0, le=60)] = 60.0
+    """beta; the neighbours below a grain are 2 d cos(beta) apart"""
+    roughness: Positive
+    """z0, m; a study file may say "d/30" """
+
+
+class GrainBed(Bed):
+    """One grain on its two fixed neighbours, in an undisturbed boundary layer (paper, 3.1)."""
+
+    kind: Literal["grain"] = "grain"
+
+
+class PileBed(Bed):
+    """A triangular pile of grains across the flow (paper, 3.2)."""
+
+    kind: Literal["pile"]
+    height: Positive = 0.02
+    """h of the flow's bed line, m"""
+    packing: Packing = "aligned"
+    """rows along the windward slope, or horizontal"""
+    mobile_layers: Annotated[int, Field(ge=1)] = 2
+    """layers of the windward face that may move; below them the grains are fixed"""
+
+
+class Flow(Part):
+    """The flow over the bed, and how a grain feels it."""
+
+    speed: Positive = 10.0
+    """U_e at which the flow over a pile is solved, m/s; it is then scaled"""
+    viscosity: Positive = 1e-5
+    """nu of that solve, m2/s: the wall is rough, the fluid's own nu moves only the grain's Re*"""
+    first_cell_height: Positive | None = None
+    """of the mesh on the bed, m; default max(h/40, 20 z0)"""
+    cells_per_face: Annotated[int, Field(ge=10)] = 40
+    """of the mesh along each face of the pile"""
+    closure: Literal["auto", "low", "high"] = "auto"
+    """which of Eqs. 2 and 4 gives the forces; auto: the valid one, or both in the transition"""
+    lift_coefficient: Annotated[float, Field(ge=0)] = closures.LIFT_COEFFICIENT
+    """alpha_s"""
+    stress: Stress = "wall"
+    """the flow's wall stress, or Eq. 10 at the first cell"""
+
+
+class Protocol(Part):
+    """How the threshold is found: the flow is raised in steps and held at each."""
+
+    step: Annotated[float, Field(gt=0, le=0.2)] = 0.02
+    """relative rise of u* from one hold to the next"""
+    quiet: Annotated[float, Field(ge=1)] = 10.0
+    """a hold ends when no grain has passed the marker for this long, in sqrt(d/g')"""
+    marker: Annotated[float, Field(gt=0, le=0.5)] = 0.3
+    """a grain has moved when displaced by this along the bed, in d"""
+    until: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """the flow is raised until this fraction should have moved"""
+    fractions: tuple[Annotated[float, Field(gt=0, le=1)], ...] = (0.1, 0.3, 0.5, 0.7)
+    """n/N at which the thresholds of a pile are reported"""
+    timestep: Annotated[float, Field(gt=0, le=0.3)] = 0.2
+    """of the grains' integration, in sqrt(m/K)"""
+
+    @field_validator("fractions", mode="before")
+    @classmethod
+    def _tuple_of_a_list(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+
+class Scene(Part):
+    """One point of a study.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        Naming each field that is missing, unknown, of the wrong type or out of range.
+    """
+
+    fluid: Fluid = Fluid()
+    grain: Grain
+    bed: Annotated[GrainBed | PileBed, Field(discriminator="kind")]
+    flow: Flow = Flow()
+    protocol: Protocol = Protocol()
+
+    @model_validator(mode="after")
+    def _parts_fit(self) -> Self:
+        check_density(self.grain.density, self.fluid.density)
+        check_slope(
+            self.bed.slope_deg, self.bed.entrainment_angle_deg, self.grain.friction_angle_deg
+        )
+        if isinstance(self.bed, PileBed):
+            check_pile(self.bed, self.grain.diameter)
+            check_first_cell(self.bed.roughness, self.first_cell_height)
+        elif self.bed.roughness >= self.grain.diameter:
+            raise Unfit("bed.roughness", "z0 is not below the grain's diameter", "typical: d/30")
+        return self
+
+    @cached_property
+    def id(self) -> str:
+        """Digest of the scene's canonical JSON."""
+        return digest_text(canonical_json(self.model_dump(mode="json")))[:12]
+
+    @property
+    def reduced_gravity(self) -> float:
+        """g' = g (rho_sol - rho_f)/rho_sol, m/s2."""
+        return self.fluid.gravity * (1 - self.fluid.density / self.grain.density)
+
+    @property
+    def weight(self) -> float:
+        """Submerged weight W of a grain, N."""
+        return float(
+            closures.weight(
+                diameter=self.grain.diameter,
+                density=self.grain.density,
+                fluid_density=self.fluid.density,
+                gravity=self.fluid.gravity,
+            )
+        )
+
+    @property
+    def first_cell_height(self) -> float:
+        """Height of the flow's first cell on the bed of a pile, m."""
+        assert isinstance(self.bed, PileBed)
+        return self.flow.first_cell_height or max(self.bed.height / 40, 20 * self.bed.roughness)
+
+    def closed_form(self, closure: Closure) -> Threshold:
+        """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
+        return closures.threshold(
+            closure,
+            diameter=self.grain.diameter,
+            density=self.grain.density,
+            fluid_density=self.fluid.density,
+            viscosity=self.fluid.viscosity,
+            slope_deg=self.bed.slope_deg,
+            entrainment_angle_deg=self.bed.entrainment_angle_deg,
+            roughness=self.bed.roughness,
+            lift_coefficient=self.flow.lift_coefficient,
+            gravity=self.fluid.gravity,
+        )
+
+    @cached_property
+    def regime(self) -> Regime:
+        """Which closure is valid at the scene's own single-grain threshold."""
+        found = closures.regime(self.closed_form("low"), self.closed_form("high"))
+        return str(found)  # type: ignore[return-value]
+
+    @property
+    def closure(self) -> Closure:
+        """The one closure of a resolved scene."""
+        assert self.flow.closure != "auto", "resolve() the scene first"
+        return self.flow.closure
+
+    def resolved(self) -> tuple["Scene", ...]:
+        """The scene with its closure decided; in the transition one scene for each closure."""
+        if self.flow.closure != "auto":
+            return (self,)
+        chosen = closures.CLOSURES if self.regime == "transition" else (self.regime,)
+        flows = (self.flow.model_copy(update={"closure": closure}) for closure in chosen)
+        parts = {name: getattr(self, name) for name in Scene.model_fields}
+        return tuple(Scene(**{**parts, "flow": flow}) for flow in flows)
+
+    def powers(self) -> tuple[closures.Powers, closures.Powers]:
+        """Drag and lift on an exposed grain, as powers of the friction velocity."""
+        where = {
+            "diameter": self.grain.diameter,
+            "roughness": self.bed.roughness,
+            "fluid_density": self.fluid.density,
+            "viscosity": self.fluid.viscosity,
+        }
+        lift = closures.lift(self.closure, **where, lift_coefficient=self.flow.lift_coefficient)
+        return closures.drag(self.closure, **where), lift
+
+
+class Unfit(ValueError):
+    """Two fields of a scene that do not go together: which, why and what would."""
+
+    def __init__(self, field: str, what: str, remedy: str) -> None:
+        self.field, self.what, self.remedy = field, what, remedy
+        super().__init__(f"{field}: {what} ({remedy})")
+
+
+def check_density(density: float, fluid_density: float) -> None:
+    """A grain must sink."""
+    if density <= fluid_density:
+        raise Unfit(
+            "grain.density",
+            f"{density:g} kg/m3 is not above the fluid's {fluid_density:g} kg/m3",
+            "the grain would float; raise it, or lower fluid.density",
+        )
+
+
+def check_slope(slope_deg: float, entrainment_angle_deg: float, friction_angle_deg: float) -> None:
+    """Beyond these limits a grain rolls or slides back without any flow."""
+    limit = min(friction_angle_deg, 90 - entrainment_angle_deg)
+    if slope_deg > limit + 1e-9:
+        raise Unfit(
+            "bed.slope_deg",
+            f"{slope_deg:g} deg is beyond min(friction angle, 90 deg - entrainment angle)"
+            f" = {limit:g} deg",
+            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
+        )
+
+
+def check_pile(bed: PileBed, diameter: float) -> None:
+    """What the meshes and packings of piles can be built for."""
+    if not 10 <= bed.slope_deg <= 35:
+        raise Unfit("bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", "choose 10 ... 35 deg")
+    if bed.height < 5 * diameter:
+        raise Unfit(
+            "bed.height",
+            f"{bed.height:g} m is less than five grains of {diameter:g} m",
+            "a pile needs some rows: raise bed.height or lower grain.diameter",
+        )
+
+
+def check_first_cell(roughness: float, first_cell_height: float) -> None:
+    """The rough wall's logarithm turns negative where the cell's centre is inside the roughness."""
+    if roughness >= first_cell_height / 2:
+        raise Unfit(
+            "bed.roughness",
+            f"z0 = {roughness:g} m is not below z_e = {first_cell_height / 2:g} m, the height of"
+            " the first cell's centre",
+            "lower it, or raise flow.first_cell_height; ten times z0 is a sound z_e",
+        )
+
+
+def roughness_length(value: Any, diameter: float) -> Any:
+    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``."""
+    if not isinstance(value, str):
+        return value
+    match = re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", value)
+    if not match or float(match[1]) == 0:
+        raise Unfit("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
+    return float(np.float64(diameter) / float(match[1]))

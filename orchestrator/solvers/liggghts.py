@@ -1,0 +1,75 @@
+"""LIGGGHTS: which version is here, and what the end of a run means."""
+
+import re
+import shutil
+import subprocess
+import warnings
+from functools import cache
+from pathlib import Path
+
+from orchestrator.errors import SolverError
+
+PROGRAM = "liggghts"
+TRIED = (3, 8)
+LAST_WORDS = "the protocol has ended"
+
+
+@cache
+def version() -> str:
+    """Version of the LIGGGHTS on the path, such as ``3.8.0``.
+
+    Raises
+    ------
+    SolverError
+        If it is missing, does not say its version, or is older than any that works.
+    """
+    path = shutil.which(PROGRAM)
+    if path is None:
+        raise SolverError(
+            f"the program {PROGRAM} is not on the PATH",
+            remedy="install it: apt-get install --no-install-recommends liggghts",
+        )
+    try:
+        said = subprocess.run([path, "-h"], capture_output=True, text=True, timeout=30).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SolverError(f"{path} does not run: {error}", remedy="reinstall liggghts") from None
+    found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said)
+    if not found:
+        raise SolverError(f"{path} does not say its version", remedy="reinstall liggghts")
+    _judge((int(found[1]), int(found[2])), path)
+    return ".".join(found.groups())
+
+
+def _judge(number: tuple[int, int], path: str) -> None:
+    if number < TRIED:
+        raise SolverError(
+            f"{path} is version {number[0]}.{number[1]}, older than the decks need",
+            remedy="install LIGGGHTS 3.8",
+        )
+    if number > TRIED:
+        warnings.warn(
+            f"{path} is version {number[0]}.{number[1]}; the decks were tried with 3.8",
+            stacklevel=3,
+        )
+
+
+def check_log(directory: Path, last_words: str = LAST_WORDS) -> None:
+    """See that a run came to its own end: LIGGGHTS ends with 0 even without any grain left.
+
+    Raises
+    ------
+    SolverError
+        With the log's own line where there is one.
+    """
+    log = directory / "log.liggghts"
+    text = log.read_text(errors="replace") if log.is_file() else ""
+    # the message of an error follows a banner of MPI; the deck's own words hold no such line
+    error = re.search(r"^ERROR.*$", text, re.MULTILINE)
+    if error:
+        raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
+    if last_words not in text:
+        raise SolverError(
+            "LIGGGHTS ended before its protocol did",
+            where=str(log),
+            remedy="it was killed, or the disk is full; run the same command again",
+        )

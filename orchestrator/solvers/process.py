@@ -1,0 +1,116 @@
+"""Run one external program: in its own session, logged, limited in time, never orphaned."""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.errors import Interrupted
+
+GRACE_S = 2.0
+POLL_S = 0.02
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a program ended.
+
+    Attributes
+    ----------
+    returncode : int
+        As `subprocess` gives it: negative where a signal ended the program.
+    seconds : float
+        Wall time, s.
+    timed_out : bool
+        Whether it was killed at its time limit.
+    """
+
+    returncode: int
+    seconds: float
+    timed_out: bool
+
+
+def run(
+    command: Sequence[str],
+    *,
+    cwd: Path,
+    log: Path,
+    limit_s: float,
+    stop: threading.Event | None = None,
+    env: Mapping[str, str] | None = None,
+) -> Ended:
+    """Run a program to its end and keep what it says.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments; no shell reads them.
+    cwd, log : Path
+        Working directory; file that takes both output streams.
+    limit_s : float
+        Wall time after which the program and all it started are killed, s.
+    stop : threading.Event, optional
+        Set by another thread to end the program early.
+    env : mapping, optional
+        Added to this process's environment.
+
+    Raises
+    ------
+    Interrupted
+        If `stop` was set; the program has ended by then.
+    """
+    started = time.monotonic()
+    with log.open("wb") as stream:
+        process = subprocess.Popen(
+            [*_dies_with_its_parent(), *command],
+            cwd=cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            # OpenFOAM takes its case directory from PWD, not from getcwd
+            env={**os.environ, "PWD": str(cwd), **(env or {})},
+        )
+        try:
+            timed_out = _wait(process, started + limit_s, stop)
+        except BaseException:
+            end_group(process)
+            raise
+    return Ended(process.returncode, time.monotonic() - started, timed_out)
+
+
+def _wait(
+    process: "subprocess.Popen[bytes]", deadline: float, stop: threading.Event | None
+) -> bool:
+    while True:
+        try:
+            process.wait(POLL_S)
+            return False
+        except subprocess.TimeoutExpired:
+            if stop is not None and stop.is_set():
+                raise Interrupted("stopped", remedy="the same command continues") from None
+            if time.monotonic() > deadline:
+                end_group(process)
+                return True
+
+
+def end_group(process: "subprocess.Popen[bytes]") -> None:
+    """End a program and all that it started: ask first, then kill."""
+    for request in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, request)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE_S)
+    process.wait()
+
+
+def _dies_with_its_parent() -> list[str]:
+    """Without this a killed driver leaves its solver running; util-linux has it since 2.33."""
+    setpriv = shutil.which("setpriv")
+    return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []

@@ -1,0 +1,224 @@
+"""A study file: fluid, grain, bed, flow, protocol and axes in TOML, read into scenes.
+
+The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them, and its
+``axes`` span a grid: every combination of the listed values is a scene. Without groups the file
+is one group.
+"""
+
+import difflib
+import itertools
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from orchestrator import assets
+from orchestrator.errors import InputError
+from orchestrator.scene import PileBed, Scene, Unfit, roughness_length
+
+PARTS = tuple(Scene.model_fields)
+GROUP_KEYS = (*PARTS, "axes", "name")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "group")
+TIME_LIMIT_S = 3600.0
+MOST_SCENES = 100_000
+
+
+@dataclass(frozen=True)
+class Group:
+    """Scenes of a study that belong together: the points of one experiment."""
+
+    name: str
+    scenes: tuple[Scene, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study file asks for.
+
+    Attributes
+    ----------
+    name : str
+        The file's name without its ending.
+    title : str
+        A line for the page.
+    groups : tuple of Group
+        In the file's order; every scene has its closure decided.
+    time_limit_s : float
+        Wall time after which one solver run counts as hung, s.
+    text : str
+        The file itself.
+    """
+
+    name: str
+    title: str
+    groups: tuple[Group, ...]
+    time_limit_s: float
+    text: str
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """Every scene once, in the file's order."""
+        return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
+
+
+def preset_names() -> list[str]:
+    """Names of the study files that the package brings."""
+    return sorted(path.stem for path in assets.presets().glob("*.toml"))
+
+
+def load(source: str) -> Study:
+    """Read a study file, or a preset by its name.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the field and the remedy.
+    """
+    preset = assets.presets() / f"{source}.toml"
+    path = preset if source in preset_names() else Path(source)
+    if not path.is_file():
+        known = ", ".join(preset_names())
+        raise InputError(
+            "there is no such study file, nor a preset of this name",
+            where=source,
+            remedy=f"presets: {known}; or give the path of a TOML file",
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+        data = tomllib.loads(text)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"not a readable TOML file: {error}", where=source) from None
+    return parse(data, name=path.stem, text=text, where=source)
+
+
+def parse(data: Mapping[str, Any], *, name: str, text: str, where: str) -> Study:
+    """Make a study of a TOML file's content; `where` names the file in messages."""
+    _known(data, TOP_KEYS, where, "")
+    limit = data.get("time_limit", TIME_LIMIT_S)
+    if not isinstance(limit, int | float) or isinstance(limit, bool) or not limit > 0:
+        raise InputError(
+            f"{limit!r} is not a time in seconds above 0", where=f"{where}: time_limit"
+        )
+    title = data.get("title", name)
+    if not isinstance(title, str):
+        raise InputError("the title is not a text", where=f"{where}: title")
+    groups = tuple(_groups(data, where))
+    return Study(name, title, groups, float(limit), text)
+
+
+def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
+    listed = data.get("group", [{}])
+    if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
+        raise InputError(
+            "not a list of tables", where=f"{where}: group", remedy="write [[group]] for each"
+        )
+    for number, item in enumerate(listed, 1):
+        place = f"{where}: group {number}" if "group" in data else where
+        _known(item, GROUP_KEYS, place, "")
+        merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
+        scenes = tuple(_scenes(merged, place))
+        yield Group(str(item.get("name", f"group {number}")), scenes)
+
+
+def _merged(
+    data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
+) -> dict[str, Any]:
+    tables = (data.get(part, {}), item.get(part, {}))
+    for table in tables:
+        if not isinstance(table, dict):
+            raise InputError(
+                f"{table!r} is not a table", where=f"{where}: {part}", remedy=f"write [{part}]"
+            )
+    return {**tables[0], **tables[1]}
+
+
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
+    axes = tables["axes"]
+    for key, values in axes.items():
+        part, dot, field = key.partition(".")
+        if part not in PARTS or not dot or not field:
+            raise InputError(
+                "an axis is named by its table and field",
+                where=f"{where}: axes.{key}",
+                remedy='for instance "grain.diameter" = [1e-4, 1e-3]',
+            )
+        if not isinstance(values, list) or not values:
+            raise InputError(
+                f"{values!r} is not a list of values",
+                where=f"{where}: axes.{key}",
+                remedy="write [first, second, ...]",
+            )
+    grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
+    if len(grid) > MOST_SCENES:
+        raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
+    for point in grid:
+        parts = {part: dict(tables[part]) for part in PARTS}
+        for key, value in zip(axes, point, strict=True):
+            part, _, field = key.partition(".")
+            parts[part][field] = value
+        yield from make_scene(parts, where).resolved()
+
+
+def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
+    """Validate the tables of one scene; `where` names the file in messages.
+
+    Raises
+    ------
+    InputError
+        For the first thing wrong: the file, the field and the remedy.
+    """
+    bed = {"kind": "grain", **parts["bed"]}
+    diameter = parts["grain"].get("diameter")
+    try:
+        if isinstance(diameter, int | float):
+            bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
+        return Scene.model_validate({**parts, "bed": bed})
+    except Unfit as error:
+        raise InputError(
+            error.what, where=f"{where}: {error.field}", remedy=error.remedy
+        ) from None
+    except ValidationError as error:
+        raise _explained(error, where) from None
+
+
+def _explained(error: ValidationError, where: str) -> InputError:
+    first = error.errors()[0]
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, Unfit):
+        return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
+    path = [str(step) for step in first["loc"]]
+    if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):
+        del path[1]  # the branch of the union, not a key of the file
+    field = ".".join(path)
+    given = first.get("input")
+    if first["type"] == "extra_forbidden":
+        return _unknown(path[-1], _fields_beside(path), f"{where}: {field}")
+    if first["type"] == "missing":
+        return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
+    return InputError(
+        f"{given!r} will not do", where=f"{where}: {field}", remedy=first["msg"].lower()
+    )
+
+
+def _fields_beside(path: list[str]) -> list[str]:
+    if len(path) < 2:
+        return list(PARTS)
+    if path[0] == "bed":
+        return list(PileBed.model_fields)
+    annotation = Scene.model_fields[path[0]].annotation
+    return list(getattr(annotation, "model_fields", {}))
+
+
+def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str, prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise _unknown(key, list(known), f"{where}: {prefix}{key}")
+
+
+def _unknown(key: str, known: list[str], where: str) -> InputError:
+    close = difflib.get_close_matches(key, known, n=1)
+    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+    return InputError("unknown key", where=where, remedy=hint)
