@@ -102,14 +102,16 @@ pip() { "$environment/bin/python" -m pip --disable-pip-version-check --no-input 
 pip_install() { pip install --no-user --only-binary :all: "$@"; }
 
 install_venv() {
+    lacking="$*"
     if venv_holds requirements.lock; then
-        rm -f "$stamp" # the test tools are to be added
+        lacking=requirements-test.lock
+        rm -f "$stamp"
     else
         say "making $environment"
         rm -rf "$environment"
         python3 -m venv "$environment" || die "$(command -v python3) -m venv failed, see above"
     fi
-    for file in "$@"; do
+    for file in $lacking; do
         pip_install --no-deps -r "$file" || die "pip failed, see above.  Call make again to go on."
     done
     sha256sum "$@" >"$stamp.new"
