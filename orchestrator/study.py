@@ -88,14 +88,23 @@ def load(source: str) -> Study:
         )
     try:
         text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"not a readable text file: {error}", where=source) from None
+    return parse(text, name=path.stem, where=source)
+
+
+def parse(text: str, *, name: str, where: str) -> Study:
+    """Make a study of a TOML file's text; `where` names the file in messages.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the field and the remedy.
+    """
+    try:
         data = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"not a readable TOML file: {error}", where=source) from None
-    return parse(data, name=path.stem, text=text, where=source)
-
-
-def parse(data: Mapping[str, Any], *, name: str, text: str, where: str) -> Study:
-    """Make a study of a TOML file's content; `where` names the file in messages."""
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where) from None
     _known(data, TOP_KEYS, where, "")
     limit = data.get("time_limit", TIME_LIMIT_S)
     if not isinstance(limit, int | float) or isinstance(limit, bool) or not limit > 0:
@@ -185,7 +194,8 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
 
 
 def _explained(error: ValidationError, where: str) -> InputError:
-    first = error.errors()[0]
+    # a misspelt key says more than the field that is missing because of it
+    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, Unfit):
         return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
@@ -199,7 +209,9 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if first["type"] == "missing":
         return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
     return InputError(
-        f"{given!r} will not do", where=f"{where}: {field}", remedy=first["msg"].lower()
+        f"{given!r} is not accepted",
+        where=f"{where}: {field}",
+        remedy=first["msg"].lower().replace("input should", "it should"),
     )
 
 

@@ -1,0 +1,201 @@
+"""The command line: parse, call, print."""
+
+import argparse
+import json
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from orchestrator import __version__
+from orchestrator.errors import InputError, OrchestratorError
+
+INTERRUPTED = 130
+NUMBERS: dict[str, tuple[float | None, str]] = {
+    "--diameter": (None, "d, m"),
+    "--density": (2500.0, "rho_sol, kg/m3"),
+    "--fluid-density": (1.0, "rho_f, kg/m3"),
+    "--viscosity": (1e-5, "nu, m2/s"),
+    "--slope": (0.0, "alpha, degrees; the flow goes up it"),
+    "--entrainment-angle": (60.0, "beta, degrees"),
+    "--lift-coefficient": (1.615, "alpha_s"),
+}
+"""Options of one grain, with the paper's values as defaults."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code: 0 only if all that was asked for was done."""
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    warnings.showwarning = _show_warning
+    options = _parser().parse_args(_plain(sys.argv[1:] if arguments is None else arguments))
+    try:
+        return int(options.run(options))
+    except OrchestratorError as error:
+        print(f"orchestrator: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("orchestrator: stopped; the same command continues", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # the reader of our output has gone; keep the interpreter's own flush quiet about it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        print(f"orchestrator: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        return 1
+
+
+VALUED = ("--out", "--workers", "--roughness", *NUMBERS)
+FLAGS = ("-h", "--help", "--version", "--json", "--")
+
+
+def _plain(arguments: Sequence[str]) -> list[str]:
+    """Give argparse values and file names that begin with a dash in a form that it takes."""
+    plain: list[str] = []
+    for text in arguments:
+        if plain and plain[-1] in VALUED:
+            plain[-1] += f"={text}"
+        elif text.startswith("-") and text not in (*VALUED, *FLAGS) and os.path.lexists(text):
+            plain.append(f"./{text}")
+        else:
+            plain.append(text)
+    return plain
+
+
+def _as_interrupt(number: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"orchestrator: warning: {message}", file=sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="orchestrator",
+        description="When does a sediment grain, or a whole bedform of grains, start to move?",
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(required=True, metavar="command")
+    _add_study(commands)
+    _add_threshold(commands)
+    _add_directory_commands(commands)
+    command = commands.add_parser("doctor", help="are the solvers here, can it draw; what to install")
+    command.set_defaults(run=_doctor)
+    return parser
+
+
+def _add_study(commands: Any) -> None:
+    command = commands.add_parser("study", help="run what is missing of a study, and draw it")
+    command.add_argument(
+        "source", nargs="?", default="first-look", metavar="FILE|PRESET", help="default: %(default)s"
+    )
+    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
+    command.add_argument(
+        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
+    )
+    command.set_defaults(run=_study)
+
+
+def _add_threshold(commands: Any) -> None:
+    command = commands.add_parser("threshold", help="one grain, closed form: an answer at once")
+    for name, (default, meaning) in NUMBERS.items():
+        text = meaning if default is None else f"{meaning}; default {default:g}"
+        command.add_argument(
+            name, type=float, default=default, required=default is None, metavar="X", help=text
+        )
+    command.add_argument(
+        "--roughness", default="d/30", metavar="Z0", help='z0, m or "d/30"; default %(default)s'
+    )
+    command.add_argument("--json", action="store_true", help="for programs")
+    command.set_defaults(run=_threshold)
+
+
+def _add_directory_commands(commands: Any) -> None:
+    for name, function, text in (
+        ("status", _status, "what of a study is done, running, failed and why"),
+        ("report", _report, "draw tables, figures and page of a study again"),
+    ):
+        command = commands.add_parser(name, help=text)
+        command.add_argument("directory", type=Path, metavar="DIR")
+        command.set_defaults(run=function)
+
+
+def _workers(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("at least 1")
+    return number
+
+
+def _study(options: argparse.Namespace) -> int:
+    from orchestrator import pipeline, study
+
+    asked = study.load(options.source)
+    out = options.out or Path("results") / asked.name
+    finished = pipeline.run(asked, out, workers=options.workers)
+    if not finished.started:
+        print("every case was done already; no solver was started", file=sys.stderr)
+    return _end(finished.page, finished.failures)
+
+
+def _report(options: argparse.Namespace) -> int:
+    from orchestrator import pipeline
+
+    finished = pipeline.redraw(options.directory)
+    return _end(finished.page, finished.failures)
+
+
+def _end(page: Path, failures: dict[str, OrchestratorError]) -> int:
+    for name, error in failures.items():
+        print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
+    print(page)
+    return 3 if failures else 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    from orchestrator import status
+
+    found = status.read(options.directory)
+    print(status.text(found))
+    return 3 if found.failed else 0
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from orchestrator import doctor
+
+    findings = doctor.examine()
+    print(doctor.text(findings))
+    return 0 if all(finding.good for finding in findings) else 1
+
+
+OPTION_OF = {
+    "grain.diameter": "--diameter",
+    "grain.density": "--density",
+    "fluid.density": "--fluid-density",
+    "fluid.viscosity": "--viscosity",
+    "bed.slope_deg": "--slope",
+    "bed.entrainment_angle_deg": "--entrainment-angle",
+    "bed.roughness": "--roughness",
+    "flow.lift_coefficient": "--lift-coefficient",
+}
+
+
+def _threshold(options: argparse.Namespace) -> int:
+    from orchestrator import answer
+
+    try:
+        scene = answer.scene(
+            {field: getattr(options, name[2:].replace("-", "_")) for field, name in OPTION_OF.items()}
+        )
+    except InputError as error:
+        field = error.where.rpartition(": ")[2]
+        raise InputError(
+            error.what, where=OPTION_OF.get(field, field), remedy=error.remedy
+        ) from None
+    found = answer.of(scene)
+    print(json.dumps(found, indent=2) if options.json else answer.text(found))
+    return 0

@@ -1,0 +1,94 @@
+"""How far a study came, read from its directory alone."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.case import DONE, FAILED
+from orchestrator.files import read_json
+from orchestrator.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class Status:
+    """The cases of a study by how far they came.
+
+    Attributes
+    ----------
+    name : str
+        The study's name.
+    running : bool
+        Whether a process holds the study.
+    done, unfinished, waiting : tuple of str
+        Names of cases: finished; begun; not begun.
+    failed : dict of str to str
+        Cases that failed, with the cause.
+    page : Path or None
+        The page, once it is drawn.
+    """
+
+    name: str
+    running: bool
+    done: tuple[str, ...]
+    unfinished: tuple[str, ...]
+    waiting: tuple[str, ...]
+    failed: dict[str, str]
+    page: Path | None
+
+
+def read(directory: Path) -> Status:
+    """Read how far a study came.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no study.
+    """
+    space = Workspace(directory.absolute())
+    about = space.description()
+    states = {str(name): _state(space.cases / str(name)) for name in about["cases"]}
+    return Status(
+        name=str(about["name"]),
+        running=space.is_held(),
+        done=_with(states, "done"),
+        unfinished=_with(states, "unfinished"),
+        waiting=_with(states, "waiting"),
+        failed={name: _cause(space.cases / name) for name in _with(states, "failed")},
+        page=space.page if space.drawn.is_file() and space.page.is_file() else None,
+    )
+
+
+def _with(states: dict[str, str], wanted: str) -> tuple[str, ...]:
+    return tuple(name for name, state in states.items() if state == wanted)
+
+
+def _state(directory: Path) -> str:
+    if isinstance(read_json(directory / DONE), dict):
+        return "done"
+    if (directory / FAILED).is_file():
+        return "failed"
+    return "unfinished" if directory.is_dir() else "waiting"
+
+
+def _cause(directory: Path) -> str:
+    state = read_json(directory / FAILED)
+    return str(state.get("cause", "")) if isinstance(state, dict) else "unreadable"
+
+
+def text(status: Status) -> str:
+    """The status for people."""
+    counts = {
+        "done": len(status.done),
+        "running" if status.running else "unfinished": len(status.unfinished),
+        "not begun": len(status.waiting),
+        "failed": len(status.failed),
+    }
+    numbers = ", ".join(f"{count} {word}" for word, count in counts.items())
+    lines = [f"study {status.name}: {numbers}"]
+    begun = "running" if status.running else "unfinished"
+    lines += [f"  {begun}: {name}" for name in status.unfinished]
+    lines += [f"  failed: {name}: {cause}" for name, cause in status.failed.items()]
+    if status.page:
+        lines.append(f"page: {status.page}")
+    elif not status.running:
+        lines.append("the same study command continues it")
+    return "\n".join(lines)

@@ -1,0 +1,49 @@
+"""The contact law as LIGGGHTS runs it, against exact answers; tolerance 1 %."""
+
+import math
+import re
+
+import pytest
+
+from tests.conftest import Deck
+
+MU = math.tan(math.radians(35))
+
+
+def _number(said: str, label: str) -> float:
+    found = re.search(rf"^{label}: (\S+)$", said, re.MULTILINE)
+    assert found, said
+    return float(found[1])
+
+
+@pytest.mark.parametrize("damping", [0.05, 0.1, 0.3])
+def test_restitution_of_a_head_on_collision(run_check: Deck, damping: float) -> None:
+    # the contact ends where the force does, not the overlap: the phase then is pi - 2 asin(zeta)
+    said = run_check("in.collision", damping=damping, timestep=0.01)
+    phase = math.pi - 2 * math.asin(damping)
+    exact = math.exp(-damping / math.sqrt(1 - damping**2) * phase)
+    assert _number(said, "restitution") == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.parametrize("angle", [5.0, 20.0, 45.0, 60.0])
+def test_sphere_rolls_on_an_incline(run_check: Deck, angle: float) -> None:
+    assert math.tan(math.radians(angle)) < 3.5 * MU
+    said = run_check("in.incline", incline=angle)
+    exact = 5 / 7 * math.sin(math.radians(angle))
+    assert _number(said, "acceleration over g") == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.parametrize("angle", [70.0, 75.0])
+def test_sphere_slides_on_a_steep_incline(run_check: Deck, angle: float) -> None:
+    assert math.tan(math.radians(angle)) > 3.5 * MU
+    said = run_check("in.incline", incline=angle)
+    exact = math.sin(math.radians(angle)) - MU * math.cos(math.radians(angle))
+    assert _number(said, "acceleration over g") == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 5.0])
+def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
+    said = run_check("in.sliding", speed=speed, timestep=0.02)
+    assert _number(said, "speed at half the time") == pytest.approx(6 / 7, rel=0.01)
+    assert _number(said, "speed when it rolls") == pytest.approx(5 / 7, rel=0.01)
+    assert _number(said, "spin when it rolls") == pytest.approx(5 / 7, rel=0.01)
