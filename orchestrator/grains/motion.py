@@ -76,7 +76,7 @@ class Motion:
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
         """Read what `to_csv` wrote."""
-        holds = pd.read_csv(directory / HOLDS, float_precision="round_trip")
+        holds = pd.read_csv(directory / HOLDS)
         grains = pd.read_csv(directory / MOTION)
         return cls(
             flow=holds["flow"].to_numpy(float),
@@ -105,20 +105,15 @@ def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
     looks = _looks(directory)
     travel = _travel(directory, grains, looks) / grains.diameter
     present = ~np.isnan(travel)
-    if not present[0].all():
-        raise SolverError(
-            f"{int((~present[0]).sum())} of {travel.shape[1]} grains were lost in the first look",
-            where=str(directory / PASSAGE),
-            remedy="the time step is too large for the stiffness, or the grains overlap",
-        )
     passed = ~present | (travel >= marker)
-    _reconcile(directory, looks, passed, present & (travel <= -marker))
+    fallen = present & (travel <= -marker)
+    _reconcile(directory, looks, passed, fallen)
     hold = looks["level"].to_numpy(np.int64)
     flow = looks.groupby("level")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
         level=_first(passed, hold),
-        fallen=_first(present & (travel <= -marker), hold),
+        fallen=_first(fallen, hold),
     )
 
 
@@ -146,15 +141,22 @@ def _travel(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> FloatAr
 
     The dump begins with the grains' places after settling.
     """
-    frames = read_dump(directory / PASSAGE, ("id", "x", "z"))
+    path = directory / PASSAGE
+    frames = read_dump(path, ("id", "x", "z"))
     ids = grains.counted_ids
-    steps = np.concatenate([frames["step"].iloc[:1], looks["step"]])
+    steps = np.concatenate([[frames["step"].min()], looks["step"]])
+    started = frames.loc[frames["step"] == steps[0], "id"]
+    if not np.array_equal(started, ids):
+        raise SolverError(
+            f"{len(ids) - len(started)} of {len(ids)} counted grains were lost before the flow rose",
+            where=str(path),
+            remedy="a smaller protocol.timestep, or look for grains that overlap",
+        )
+    row, column = np.searchsorted(steps, frames["step"]), np.searchsorted(ids, frames["id"])
+    known = np.isin(frames["step"], steps) & np.isin(frames["id"], ids)
+    if not known.all():
+        raise SolverError("it is not of these grains and holds", where=str(path))
     place = np.full((len(steps), len(ids), 2), np.nan)
-    row = np.searchsorted(steps, frames["step"])
-    column = np.searchsorted(ids, frames["id"])
-    known = (row < len(steps)) & (column < len(ids))
-    if not known.all() or not np.array_equal(ids[column], frames["id"]):
-        raise SolverError("grains that nobody counts", where=str(directory / PASSAGE))
     place[row, column] = frames[["x", "z"]]
     along = grains.along[ids - 1]
     return np.asarray(np.einsum("tnk,nk->tn", place[1:] - place[0], along))
