@@ -56,9 +56,7 @@ def text(answer: Mapping[str, Any]) -> str:
     lines = [f"{'':<24}{'low (Eq. 3)':>16}{'high (Eq. 5)':>16}"]
     for name, unit in UNITS.items():
         label = f"{name.replace('_', ' ')}{f', {unit}' if unit else ''}"
-        lines.append(
-            f"{label:<24}{answer['low'][name]:>16.6g}{answer['high'][name]:>16.6g}"
-        )
+        lines.append(f"{label:<24}{answer['low'][name]:>16.6g}{answer['high'][name]:>16.6g}")
     words = ("yes" if answer[closure]["valid"] else "no" for closure in closures.CLOSURES)
     lines.append(f"{'valid':<24}" + "".join(f"{word:>16}" for word in words))
     lines.append(f"regime: {answer['regime']}")

@@ -83,7 +83,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_study(commands)
     _add_threshold(commands)
     _add_directory_commands(commands)
-    command = commands.add_parser("doctor", help="are the solvers here, can it draw; what to install")
+    command = commands.add_parser(
+        "doctor", help="are the solvers here, can it draw; what to install"
+    )
     command.set_defaults(run=_doctor)
     return parser
 
@@ -91,7 +93,11 @@ def _parser() -> argparse.ArgumentParser:
 def _add_study(commands: Any) -> None:
     command = commands.add_parser("study", help="run what is missing of a study, and draw it")
     command.add_argument(
-        "source", nargs="?", default="first-look", metavar="FILE|PRESET", help="default: %(default)s"
+        "source",
+        nargs="?",
+        default="first-look",
+        metavar="FILE|PRESET",
+        help="default: %(default)s",
     )
     command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
     command.add_argument(
@@ -189,7 +195,10 @@ def _threshold(options: argparse.Namespace) -> int:
 
     try:
         scene = answer.scene(
-            {field: getattr(options, name[2:].replace("-", "_")) for field, name in OPTION_OF.items()}
+            {
+                field: getattr(options, name[2:].replace("-", "_"))
+                for field, name in OPTION_OF.items()
+            }
         )
     except InputError as error:
         field = error.where.rpartition(": ")[2]

@@ -54,7 +54,11 @@ class Powers:
 
 
 def drag(
-    closure: Closure, *, diameter: ArrayLike, roughness: ArrayLike, fluid_density: ArrayLike,
+    closure: Closure,
+    *,
+    diameter: ArrayLike,
+    roughness: ArrayLike,
+    fluid_density: ArrayLike,
     viscosity: ArrayLike,
 ) -> Powers:
     """Drag on an exposed grain along the bed, Eq. 2 (low) or Eq. 4 (high)."""
@@ -67,8 +71,13 @@ def drag(
 
 
 def lift(
-    closure: Closure, *, diameter: ArrayLike, roughness: ArrayLike, fluid_density: ArrayLike,
-    viscosity: ArrayLike, lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
+    closure: Closure,
+    *,
+    diameter: ArrayLike,
+    roughness: ArrayLike,
+    fluid_density: ArrayLike,
+    viscosity: ArrayLike,
+    lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
 ) -> Powers:
     """Lift on an exposed grain normal to the bed, Eq. 2 (low) or Eq. 4 (high).
 
@@ -90,7 +99,10 @@ def mean_speed_ratio(diameter: ArrayLike, roughness: ArrayLike) -> FloatArray:
 
 
 def weight(
-    *, diameter: ArrayLike, density: ArrayLike, fluid_density: ArrayLike,
+    *,
+    diameter: ArrayLike,
+    density: ArrayLike,
+    fluid_density: ArrayLike,
     gravity: ArrayLike = GRAVITY,
 ) -> FloatArray:
     """Submerged weight W of a grain, N."""

@@ -77,7 +77,7 @@ def yalin_karahan(reynolds: FloatArray) -> FloatArray:
 
 
 def van_rijn(dstar: FloatArray) -> FloatArray:
-    """van Rijn (1984), of D*."""
+    """Curve of van Rijn (1984), of D*."""
     return np.select(
         [dstar <= 4, dstar <= 10, dstar <= 20, dstar <= 150],
         [0.24 / dstar, 0.14 * dstar**-0.64, 0.04 * dstar**-0.1, 0.013 * dstar**0.29],
@@ -152,4 +152,5 @@ AIR: dict[str, Callable[[FloatArray, Air], FloatArray]] = {
 def slope_factor_on_ustar(slope_deg: FloatArray, friction_angle_deg: float) -> FloatArray:
     """Factor on the threshold friction velocity in air for flow up a slope."""
     alpha = np.radians(slope_deg)
-    return np.sqrt(np.cos(alpha) + np.sin(alpha) / np.tan(np.radians(friction_angle_deg)))
+    factor = np.cos(alpha) + np.sin(alpha) / np.tan(np.radians(friction_angle_deg))
+    return np.asarray(np.sqrt(factor))

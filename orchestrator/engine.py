@@ -176,5 +176,3 @@ def _give_up(
             error = SolverError(f"it needs {lost.name}, which failed", where=case.name)
             failed[case.name] = error
             report(Outcome(waiting.pop(case.name), error))
-
-

@@ -58,7 +58,7 @@ class Triangle:
 
     def depth(self, points: FloatArray, face: int) -> FloatArray:
         """Signed distance of points (n, 2) below a face's line (0 windward, 1 lee), diameters."""
-        return -(points - self.crest) @ self.normals[face]
+        return np.asarray(-(points - self.crest) @ self.normals[face])
 
     def arc_length(self, points: FloatArray) -> FloatArray:
         """Arc length from the windward toe to the foot of each point's normal, diameters."""
@@ -132,7 +132,8 @@ def pile(
     windward, lee = (face & ~buried for face in exposed(body, triangle))
     mobile = (in_layers & ~buried) | windward
     idle = buried & ~_touching(body, mobile)
-    body, mobile, windward, lee = (array[~idle] for array in (body, mobile, windward, lee))
+    body = body[~idle]
+    mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
     centres = np.vstack([body, _apron(body, surface)])
     rest = np.zeros(len(centres) - len(body), bool)
     return Packing(
@@ -149,7 +150,7 @@ def _body(
 ) -> FloatArray:
     """Lattice grains near both faces, with one grain on the crest, and some below the ground."""
     direction = triangle.tangent if pattern == "aligned" else np.array([1.0, 0.0])
-    apex = triangle.crest + [0, surface / np.cos(np.radians(triangle.slope_deg))]
+    apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
     lattice = _lattice(triangle, apex, direction, beta)
     depth = np.minimum(triangle.depth(lattice, 0), triangle.depth(lattice, 1)) + surface
     level = lattice[:, 1] - surface

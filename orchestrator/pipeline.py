@@ -136,4 +136,3 @@ def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:
         )
     except (KeyError, AttributeError, OSError):
         return False
-

@@ -147,7 +147,9 @@ class Scene(Part):
             check_pile(self.bed, self.grain.diameter)
             check_first_cell(self.bed.roughness, self.first_cell_height)
         elif self.bed.roughness >= self.grain.diameter:
-            raise Unfit("bed.roughness", "z0 is not below the grain's diameter", "typical: d/30")
+            raise UnfitError(
+                "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
+            )
         return self
 
     @cached_property
@@ -157,7 +159,7 @@ class Scene(Part):
 
     @property
     def reduced_gravity(self) -> float:
-        """g' = g (rho_sol - rho_f)/rho_sol, m/s2."""
+        """Gravity of the submerged grain, g' = g (rho_sol - rho_f)/rho_sol, m/s2."""
         return self.fluid.gravity * (1 - self.fluid.density / self.grain.density)
 
     @property
@@ -226,7 +228,7 @@ class Scene(Part):
         return closures.drag(self.closure, **where), lift
 
 
-class Unfit(ValueError):
+class UnfitError(ValueError):
     """Two fields of a scene that do not go together: which, why and what would."""
 
     def __init__(self, field: str, what: str, remedy: str) -> None:
@@ -237,7 +239,7 @@ class Unfit(ValueError):
 def check_density(density: float, fluid_density: float) -> None:
     """A grain must sink."""
     if density <= fluid_density:
-        raise Unfit(
+        raise UnfitError(
             "grain.density",
             f"{density:g} kg/m3 is not above the fluid's {fluid_density:g} kg/m3",
             "the grain would float; raise it, or lower fluid.density",
@@ -248,7 +250,7 @@ def check_slope(slope_deg: float, entrainment_angle_deg: float, friction_angle_d
     """Beyond these limits a grain rolls or slides back without any flow."""
     limit = min(friction_angle_deg, 90 - entrainment_angle_deg)
     if slope_deg > limit + 1e-9:
-        raise Unfit(
+        raise UnfitError(
             "bed.slope_deg",
             f"{slope_deg:g} deg is beyond min(friction angle, 90 deg - entrainment angle)"
             f" = {limit:g} deg",
@@ -259,9 +261,11 @@ def check_slope(slope_deg: float, entrainment_angle_deg: float, friction_angle_d
 def check_pile(bed: PileBed, diameter: float) -> None:
     """What the meshes and packings of piles can be built for."""
     if not 10 <= bed.slope_deg <= 35:
-        raise Unfit("bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", "choose 10 ... 35 deg")
+        raise UnfitError(
+            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", "choose 10 ... 35 deg"
+        )
     if bed.height < 5 * diameter:
-        raise Unfit(
+        raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
@@ -271,7 +275,7 @@ def check_pile(bed: PileBed, diameter: float) -> None:
 def check_first_cell(roughness: float, first_cell_height: float) -> None:
     """The rough wall's logarithm turns negative where the cell's centre is inside the roughness."""
     if roughness >= first_cell_height / 2:
-        raise Unfit(
+        raise UnfitError(
             "bed.roughness",
             f"z0 = {roughness:g} m is not below z_e = {first_cell_height / 2:g} m, the height of"
             " the first cell's centre",
@@ -285,5 +289,5 @@ def roughness_length(value: Any, diameter: float) -> Any:
         return value
     match = re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", value)
     if not match or float(match[1]) == 0:
-        raise Unfit("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
+        raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
     return float(np.float64(diameter) / float(match[1]))

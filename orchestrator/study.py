@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from orchestrator import assets
 from orchestrator.errors import InputError
-from orchestrator.scene import PileBed, Scene, Unfit, roughness_length
+from orchestrator.scene import PileBed, Scene, UnfitError, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
@@ -185,10 +185,8 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
         if isinstance(diameter, int | float):
             bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
         return Scene.model_validate({**parts, "bed": bed})
-    except Unfit as error:
-        raise InputError(
-            error.what, where=f"{where}: {error.field}", remedy=error.remedy
-        ) from None
+    except UnfitError as error:
+        raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
 
@@ -197,7 +195,7 @@ def _explained(error: ValidationError, where: str) -> InputError:
     # a misspelt key says more than the field that is missing because of it
     first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     cause = first.get("ctx", {}).get("error")
-    if isinstance(cause, Unfit):
+    if isinstance(cause, UnfitError):
         return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
     path = [str(step) for step in first["loc"]]
     if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):

@@ -72,10 +72,10 @@ COLUMNS: dict[str, str] = {
     "s_over_h": "the same over h",
     "x_m": "along the flow, from the windward toe",
     "z_m": "above the flat bed",
-    "ustar_over_ustar0_wall": "signed friction velocity of the wall stress over the undisturbed one",
+    "ustar_over_ustar0_wall": "signed friction velocity of the wall stress over ustar0",
     "ustar_over_ustar0_eq10": "the same by Eq. 10 with ln((z_e + z0)/z0)",
     "ustar_over_ustar0_eq10_printed": "the same by Eq. 10 as printed, with ln(z_e/z0)",
-    "ustar_over_ustar0": "signed friction velocity at the grain over the undisturbed one",
+    "ustar_over_ustar0": "signed friction velocity at the grain over ustar0",
     "grain_id": "id of the grain in the deck",
     "hold": "number of the hold; 0 is the settling",
     "moved_in_hold": "hold in which the grain first passed the marker; 0: never",
@@ -90,7 +90,7 @@ COLUMNS: dict[str, str] = {
     "fraction_moved": "n/N",
     "highest_fraction": "largest n/N that the holds reached",
     "mean_tau_pa": "mean signed wall stress over the grains that had moved",
-    "pivot_ustar0_m_s": "ustar0 at which the closed form with each grain's own stress has moved them",
+    "pivot_ustar0_m_s": "ustar0_m_s by the closed form with each grain's own stress",
     "kind": "kind of the case",
     "solver_s": "wall time of the solvers",
     "outside_s": "wall time of the case outside the solvers",
@@ -126,7 +126,12 @@ def timings(plan: Plan, cases: Path) -> pd.DataFrame:
         if state:
             outside = state["wall_s"] - state["solver_s"]
             rows.append(
-                {"case": name, "kind": one.kind, "solver_s": state["solver_s"], "outside_s": outside}
+                {
+                    "case": name,
+                    "kind": one.kind,
+                    "solver_s": state["solver_s"],
+                    "outside_s": outside,
+                }
             )
     return pd.DataFrame(rows)
 
@@ -137,7 +142,7 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
     for name, table in tables.items():
         write_durably(folder / f"{name}.csv", table.to_csv(index=False))
         write_durably(folder / f"{name}.parquet", table.to_parquet(index=False))
-    used = sorted({column for table in tables.values() for column in table})
+    used = sorted({str(column) for table in tables.values() for column in table})
     rows = [{"column": column, "meaning": COLUMNS[column]} for column in used]
     write_durably(folder / "columns.csv", pd.DataFrame(rows).to_csv(index=False))
 
@@ -290,7 +295,9 @@ def _pile_curve(pile: PileCase, cases: Path) -> pd.DataFrame:
             "count": motion.count,
             "moved": moved,
             "not_moved": motion.count - moved,
-            "fallen_upstream": [int(((motion.fallen > 0) & (motion.fallen <= k)).sum()) for k in holds],
+            "fallen_upstream": [
+                int(((motion.fallen > 0) & (motion.fallen <= k)).sum()) for k in holds
+            ],
             "fraction_moved": curve.fraction,
             "mean_tau_pa": curve.mean_tau,
             "shields": _shields(scene, curve.mean_tau),

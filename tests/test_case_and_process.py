@@ -1,4 +1,4 @@
-"""Case directories and processes: identity, state that is never trusted half-written, clean ends."""
+"""Case directories and processes: identity, state never trusted half-written, clean ends."""
 
 import json
 import os

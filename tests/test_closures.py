@@ -62,7 +62,9 @@ def test_eq_3_in_its_printed_form() -> None:
     assert float(found.shields) == pytest.approx(float(printed), rel=1e-12)
 
 
-@given(closure=either, d=diameters, nu=viscosities, ratio=ratios, beta=betas, alpha=st.floats(0, 85))
+@given(
+    closure=either, d=diameters, nu=viscosities, ratio=ratios, beta=betas, alpha=st.floats(0, 85)
+)
 def test_forces_balance_at_the_threshold(
     closure: Closure, d: float, nu: float, ratio: float, beta: float, alpha: float
 ) -> None:

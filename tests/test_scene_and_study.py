@@ -7,7 +7,7 @@ import pytest
 from orchestrator import study
 from orchestrator.errors import InputError
 from orchestrator.files import canonical_json
-from orchestrator.scene import GrainBed, Grain, PileBed, Scene
+from orchestrator.scene import Grain, GrainBed, PileBed, Scene
 
 PILE = """
 [grain]

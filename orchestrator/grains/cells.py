@@ -132,5 +132,3 @@ def _shared_key(scene: Scene) -> str:
     contact = scene.grain.model_dump(include={"friction_angle_deg", "stiffness", "damping"})
     rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
     return canonical_json([contact, rules])
-
-

@@ -12,7 +12,7 @@ from orchestrator.closures import Powers
 FloatArray = NDArray[np.float64]
 
 FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
-"""Grain types of the deck: fixed; mobile; mobile, exposed and counted; mobile, exposed elsewhere."""
+"""Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only."""
 POWERS = (1.0, 1.5, 1.687, 2.0, 3.0)
 """Exponents of the friction velocity in Eqs. 2 and 4; the deck has a pair of tables for each."""
 

@@ -148,7 +148,7 @@ def _travel(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> FloatAr
     started = frames.loc[frames["step"] == steps[0], "id"]
     if not np.array_equal(started, ids):
         raise SolverError(
-            f"{len(ids) - len(started)} of {len(ids)} counted grains were lost before the flow rose",
+            f"{len(ids) - len(started)} of {len(ids)} grains were lost before the flow rose",
             where=str(path),
             remedy="a smaller protocol.timestep, or look for grains that overlap",
         )

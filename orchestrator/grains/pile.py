@@ -178,7 +178,9 @@ class PileCase(GrainCase):
         along = np.where(bed.lee[:, None], up * [1, -1], up)
         outward = np.where(bed.lee[:, None], *reversed(self.triangle.normals))
         kind = np.select(
-            [~bed.mobile, bed.windward, bed.lee], [deck.FIXED, deck.COUNTED, deck.PUSHED], deck.MOBILE
+            [~bed.mobile, bed.windward, bed.lee],
+            [deck.FIXED, deck.COUNTED, deck.PUSHED],
+            deck.MOBILE,
         )
         drag, lift = self.scene.powers()
         force = deck.force_table(drag, lift, speed, along, outward)

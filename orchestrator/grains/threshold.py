@@ -102,7 +102,7 @@ def of_pile(
         return PileThreshold(fraction, *(math.nan,) * 4)
     half_a_grain = 0.5 / motion.count
     below = _first_level(motion, fraction - half_a_grain) or level
-    # a neighbouring fraction that is out of reach leaves the interval open; it then ends at the last
+    # where half a grain more was not reached, the interval is open: it ends at the last hold
     above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.flow[level - 1] * motion.flow[level])
 
