@@ -1,6 +1,9 @@
 """What several tests share."""
 
+import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,5 +31,29 @@ def run_check(tmp_path: Path) -> Deck:
         assert ended.returncode == 0, said
         assert "the check has ended" in said
         return said
+
+    return run
+
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def orchestrator(tmp_path: Path) -> Command:
+    """Run the command line in a process of its own, in a directory of its own."""
+
+    def run(
+        *arguments: str, cwd: Path = tmp_path, path: str | None = None
+    ) -> "subprocess.CompletedProcess[str]":
+        root = Path(__file__).parent.parent
+        env = {**os.environ, "PYTHONPATH": str(root), **({"PATH": path} if path else {})}
+        return subprocess.run(
+            [sys.executable, "-m", "orchestrator", *arguments],
+            cwd=cwd,
+            env=env,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
 
     return run

@@ -1,0 +1,78 @@
+"""Thresholds and curves from a motion that is known."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.grains import threshold
+from orchestrator.grains.motion import Motion
+
+# ten grains, four holds: two move in the 1st, three in the 2nd, none in the 3rd, four in the 4th
+FLOW = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
+LEVEL = np.array([1, 1, 2, 2, 2, 4, 4, 4, 4, 0])
+SPEED = np.array([2.0, 2.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, -0.5])
+MOTION = Motion(FLOW, LEVEL, np.zeros(10, int))
+DENSITY = 1.2
+
+
+def test_fraction_counts_each_grain_once_from_its_hold_on() -> None:
+    np.testing.assert_allclose(MOTION.fraction, [0, 0.2, 0.5, 0.5, 0.9])
+
+
+def test_a_grain_that_fell_upstream_has_not_moved() -> None:
+    fallen = Motion(FLOW, np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0))
+    assert fallen.fraction[-1] == pytest.approx(0.5)
+
+
+def test_thresholds_of_grains_lie_between_two_holds() -> None:
+    found = threshold.of_grains(MOTION)
+    np.testing.assert_allclose(found.low[[0, 2, 5]], [0.9, 1.0, 1.2])
+    np.testing.assert_allclose(found.high[[0, 2, 5]], [1.0, 1.1, 1.3])
+    assert np.isnan(found.value[9])
+
+
+def test_curve_holds_the_mean_stress_of_what_has_moved() -> None:
+    found = threshold.curve(MOTION, SPEED, DENSITY)
+    mean = [math.nan, 4.0, (2 * 4 + 3 * 2.25) / 5, (2 * 4 + 3 * 2.25) / 5, (8 + 6.75 + 4) / 9]
+    np.testing.assert_allclose(found.mean_tau, DENSITY * FLOW**2 * mean)
+
+
+def test_threshold_of_a_pile_at_a_fraction() -> None:
+    # 40 % is first reached in the second hold, by five of ten
+    found = threshold.of_pile(MOTION, SPEED, 0.4, DENSITY)
+    assert found.ustar0 == pytest.approx(math.sqrt(1.1))
+    assert found.tau == pytest.approx(DENSITY * 1.1 * 2.95)
+    assert found.tau_low == pytest.approx(DENSITY * 1.0 * 2.95)
+    assert found.tau_high == pytest.approx(DENSITY * 1.21 * 2.95)
+
+
+def test_the_interval_holds_the_counts_resolution() -> None:
+    # half a grain more than 50 % asks for the fourth hold
+    found = threshold.of_pile(MOTION, SPEED, 0.5, DENSITY)
+    assert found.tau == pytest.approx(DENSITY * 1.1 * 2.95)
+    assert found.tau_high == pytest.approx(DENSITY * 1.69 * 18.75 / 9)
+
+
+def test_a_fraction_that_was_not_reached_is_empty() -> None:
+    found = threshold.of_pile(MOTION, SPEED, 0.95, DENSITY)
+    assert found.fraction == 0.95
+    assert math.isnan(found.tau)
+    assert math.isnan(found.ustar0)
+
+
+@given(
+    level=st.lists(st.integers(0, 4), min_size=2, max_size=50),
+    fraction=st.floats(0.01, 1),
+)
+def test_intervals_enclose_their_value_where_the_stress_is_uniform(
+    level: list[int], fraction: float
+) -> None:
+    motion = Motion(FLOW, np.array(level), np.zeros(len(level), int))
+    found = threshold.of_pile(motion, np.ones(len(level)), fraction, 1.0)
+    if math.isnan(found.tau):
+        assert motion.fraction[-1] < fraction
+    else:
+        assert found.tau_low < found.tau < found.tau_high
