@@ -65,7 +65,8 @@ class Triangle:
         top = self.height / np.sin(np.radians(self.slope_deg))
         up = (points - self.crest) @ self.tangent
         down = (points - self.crest) @ (self.tangent * [1, -1])
-        return np.where(self.is_windward(points), np.minimum(top + up, top), top + down)
+        along = np.where(self.is_windward(points), np.minimum(top + up, top), top + down)
+        return np.asarray(along)
 
     def is_windward(self, points: FloatArray) -> BoolArray:
         """Which points belong to the windward face; the crest's own grain does."""
