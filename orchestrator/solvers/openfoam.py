@@ -1,0 +1,224 @@
+"""OpenFOAM: which version is here, what a run left, and what its end means."""
+
+import os
+import re
+import shutil
+import subprocess
+import warnings
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.errors import SolverError
+
+if TYPE_CHECKING:
+    import pyvista
+
+PROGRAMS = ("gmshToFoam", "changeDictionary", "simpleFoam")
+"""The programs of a case's `Allrun`, in their order."""
+TRIED = ("1912",)
+"""Versions that the tests ran with."""
+PACKAGE = "openfoam"
+"""The Debian package that holds the programs."""
+
+_HOME = "/usr/share/openfoam"
+_STATED = re.compile(r"Using: OpenFOAM-\S* \((\d{4})\)")
+_FATAL = re.compile(r"--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\Z)", re.DOTALL)
+_CONVERGED = re.compile(r"^SIMPLE solution converged in (\d+) iterations$", re.MULTILINE)
+_ITERATION = re.compile(r"^Time = (\d+)$", re.MULTILINE)
+_RESIDUAL = re.compile(r"Solving for Ux, Initial residual = (\S+),")
+
+
+@cache
+def version() -> str:
+    """Version of the OpenFOAM that is found first, as its programs state it, such as "1912".
+
+    Raises
+    ------
+    SolverError
+        If a program is missing, does not start, or is of a version that the case cannot run with.
+    """
+    for program in PROGRAMS:
+        _require(program)
+    stated = _help_text("simpleFoam")
+    match = _STATED.search(stated)
+    if match is None:
+        raise SolverError(
+            "this simpleFoam is not of the openfoam.com line: "
+            + (_line_with("Using:", stated) or "it states no version"),
+            remedy=f"put the one of Debian's package `{PACKAGE}` first in PATH",
+        )
+    _judge(match[1])
+    return match[1]
+
+
+def _require(program: str) -> None:
+    if shutil.which(program) is None:
+        raise SolverError(
+            f"OpenFOAM's program {program} is not in PATH",
+            remedy=f"install the Debian package `{PACKAGE}`",
+        )
+
+
+def _help_text(program: str) -> str:
+    environment = {"WM_PROJECT_DIR": _HOME, **os.environ}
+    try:
+        ended = subprocess.run(
+            [program, "-help"], env=environment, capture_output=True, text=True, timeout=60
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SolverError(f"{program} does not start: {error}") from error
+    return ended.stdout + ended.stderr
+
+
+def _judge(found: str) -> None:
+    if int(found) < int(TRIED[0]):
+        raise SolverError(
+            f"OpenFOAM {found} is older than {TRIED[0]}, which the cases are written for",
+            remedy=f"install the Debian package `{PACKAGE}`",
+        )
+    if found not in TRIED:
+        warnings.warn(
+            f"OpenFOAM {found} has not been tried, {', '.join(TRIED)} has; "
+            "later versions call the bed's nutkAtmRoughWallFunction atmNutkWallFunction",
+            stacklevel=3,
+        )
+
+
+def read_numbers(path: Path) -> dict[str, float]:
+    """The entries `name number;` of a dictionary file, such as a case's `parameters`."""
+    text = path.read_text(encoding="utf-8")
+    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([^\s;]+);", text)}
+
+
+def read_last_time(
+    directory: Path, patch: str, arrays: Sequence[str]
+) -> "tuple[pyvista.PolyData, pyvista.UnstructuredGrid]":
+    """A patch and the cells of a case, with cell arrays of its last time, in single precision.
+
+    Raises
+    ------
+    SolverError
+        If the case holds no time but 0.
+    """
+    import pyvista
+
+    reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
+    if reader.number_time_points < 2:
+        raise SolverError("no results", where=str(directory), remedy="run ./Allrun there")
+    # the reader starts at the first time, not at the last
+    reader.set_active_time_value(reader.time_values[-1])
+    reader.cell_to_point_creation = False
+    reader.disable_all_patch_arrays()
+    reader.enable_patch_array("internalMesh")
+    reader.enable_patch_array(f"patch/{patch}")
+    reader.disable_all_cell_arrays()
+    for array in arrays:
+        reader.enable_cell_array(array)
+    blocks: Any = reader.read()
+    return blocks["boundary"][patch], blocks["internalMesh"]
+
+
+def check_log(directory: Path) -> int:
+    """What the logs of a case say of its end.
+
+    Parameters
+    ----------
+    directory : Path
+        A case that `Allrun` has run in.
+
+    Returns
+    -------
+    int
+        The iterations that simpleFoam took to converge.
+
+    Raises
+    ------
+    SolverError
+        If any program failed, was stopped, or did not converge, whatever its exit code was.
+    """
+    for program in PROGRAMS:
+        text = _log(directory, program)
+        # first the crash: a NaN also makes simpleFoam stumble over its own residuals' file
+        _check_crash(program, text, directory)
+        _check_fatal(program, text, directory)
+        _check_end(program, text, directory)
+    return _iterations(text, directory)
+
+
+def _log(directory: Path, program: str) -> str:
+    try:
+        return (directory / f"log.{program}").read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        raise SolverError(
+            f"{program} has not run", where=str(directory), remedy="run ./Allrun there"
+        ) from None
+
+
+def _check_fatal(program: str, text: str, directory: Path) -> None:
+    match = _FATAL.search(text)
+    if match:
+        said = " ".join(match[1].split())
+        raise SolverError(
+            f"{program} stopped: {said}",
+            where=str(directory),
+            remedy=f"log.{program} says where",
+        )
+
+
+def _check_crash(program: str, text: str, directory: Path) -> None:
+    if re.search(r"residual = -?nan", text):
+        raise _diverged(f"the residuals are not numbers: {_line_with('nan', text)}", directory)
+    if "sigFpe::sigHandler" in text:
+        raise _diverged(f"floating point exception after {_last_time(text)}", directory)
+    if "sigSegv::sigHandler" in text:
+        raise SolverError(f"{program} crashed: segmentation fault", where=str(directory))
+
+
+def _diverged(how: str, directory: Path) -> SolverError:
+    return SolverError(
+        f"simpleFoam diverged: {how}",
+        where=str(directory),
+        remedy="lower U and k|epsilon in system/fvSolution, or take more cells per face",
+    )
+
+
+def _check_end(program: str, text: str, directory: Path) -> None:
+    lines = text.split()
+    if not lines or lines[-1] != "End":
+        raise SolverError(
+            f"{program} was stopped before its end; its log breaks off after {_last_time(text)}",
+            where=str(directory),
+            remedy="killed, out of time, memory or disk? Run the case again",
+        )
+
+
+def _iterations(text: str, directory: Path) -> int:
+    match = _CONVERGED.search(text)
+    if match is None:
+        raise SolverError(
+            f"simpleFoam did not converge: {_trend(text)} after {_last_time(text)}",
+            where=str(directory),
+            remedy="raise endTime in system/controlDict; if the residuals cycle, relax more",
+        )
+    return int(match[1])
+
+
+def _trend(text: str) -> str:
+    """How the residual of Ux went over the last two fifths of the run."""
+    residuals = [float(value) for value in _RESIDUAL.findall(text)]
+    fifth = max(len(residuals) // 5, 1)
+    before, last = residuals[-2 * fifth : -fifth] or residuals, residuals[-fifth:]
+    falls = max(last, default=0.0) < 0.5 * max(before, default=0.0)
+    verb = "still falls" if falls else "cycles, it no longer falls"
+    return f"the residual of Ux {verb} ({max(last, default=float('nan')):.1e})"
+
+
+def _last_time(text: str) -> str:
+    times = _ITERATION.findall(text)
+    return f"iteration {times[-1]}" if times else "its header"
+
+
+def _line_with(word: str, text: str) -> str:
+    return next((line.strip() for line in text.splitlines() if word in line), "")
