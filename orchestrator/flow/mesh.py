@@ -1,0 +1,150 @@
+"""The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
+
+import re
+import threading
+from math import cos, radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import SolverError
+
+GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
+"""Physical groups of the mesh; all but `air` become patches."""
+
+_GMSH = threading.Lock()  # gmsh has one global state
+_TOLERANCE = 0.01
+
+Points = NDArray[np.float64]
+Cells = NDArray[np.int64]
+
+
+def write_mesh(directory: Path) -> None:
+    """Mesh a case: `pile.geo` with its `parameters.geo` becomes `pile.msh`, ASCII 2.2.
+
+    Parameters
+    ----------
+    directory : Path
+        The case; any thread may call, one at a time makes its mesh.
+
+    Raises
+    ------
+    SolverError
+        If gmsh fails, or the mesh is not the one asked for.
+    """
+    with _GMSH:
+        _generate(directory)
+    check_mesh(directory)
+
+
+def _generate(directory: Path) -> None:
+    gmsh = _gmsh()
+    # the default installs a signal handler, which only the main thread may
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(directory / "pile.geo"))
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(directory / "pile.msh"))
+    except Exception as error:  # gmsh raises nothing narrower
+        raise _unusable(f"gmsh failed: {error}", directory) from error
+    finally:
+        gmsh.finalize()
+
+
+def _gmsh() -> Any:
+    try:
+        import gmsh
+    except OSError as error:
+        raise SolverError(
+            f"gmsh does not load: {error}",
+            remedy="install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1",
+        ) from error
+    return gmsh
+
+
+def check_mesh(directory: Path) -> None:
+    """Check that `pile.msh` is what `parameters.geo` asks for.
+
+    It must hold hexahedra only, none of them inverted, the physical groups in `GROUPS`, and
+    first cells of the height `first_cell` (normal to the faces of the pile) within 1 %.
+
+    Raises
+    ------
+    SolverError
+        If it is not.
+    """
+    import meshio
+
+    mesh = meshio.read(directory / "pile.msh", file_format="gmsh")
+    missing = GROUPS - mesh.field_data.keys()
+    if missing:
+        raise _unusable(f"without the physical groups {sorted(missing)}", directory)
+    solids = {block.type for block in mesh.cells if block.dim == 3}
+    if solids != {"hexahedron"}:
+        raise _unusable(f"of {sorted(solids)}, not of hexahedra only", directory)
+    cells = mesh.cells_dict["hexahedron"]
+    inverted = int(np.count_nonzero(smallest_jacobian(mesh.points, cells) <= 0.0))
+    if inverted:
+        raise _unusable(f"with {inverted} inverted cells", directory)
+    _check_first_cells(first_cell_heights(mesh), directory)
+
+
+def smallest_jacobian(points: Points, cells: Cells) -> NDArray[np.float64]:
+    """Smallest determinant of the edges that meet at a corner, for each hexahedron.
+
+    Parameters
+    ----------
+    points : (P, 3) array
+        Nodes, m.
+    cells : (C, 8) array
+        Nodes of each cell, in the order of VTK.
+
+    Returns
+    -------
+    (C,) array
+        m3; positive where the cell is convex and not inverted.
+    """
+    ahead = [1, 2, 3, 0, 7, 4, 5, 6]
+    behind = [3, 0, 1, 2, 5, 6, 7, 4]
+    across = [4, 5, 6, 7, 0, 1, 2, 3]
+    corners = points[cells]
+    edges = [corners[:, to] - corners for to in (ahead, behind, across)]
+    determinants = np.einsum("cij,cij->ci", np.cross(edges[0], edges[1]), edges[2])
+    return np.asarray(determinants.min(axis=1), dtype=np.float64)
+
+
+def first_cell_heights(mesh: Any) -> NDArray[np.float64]:
+    """Vertical extent of the cells on the bed, m; shape (faces of the bed,)."""
+    tag = mesh.field_data["bed"][0]
+    quads = mesh.cells_dict["quad"][mesh.cell_data_dict["gmsh:physical"]["quad"] == tag]
+    on_bed = np.zeros(len(mesh.points), dtype=bool)
+    on_bed[quads] = True
+    cells = mesh.cells_dict["hexahedron"]
+    below = on_bed[cells]
+    lowest = below.sum(axis=1) == 4
+    heights = np.where(below[lowest], -1.0, 1.0) * mesh.points[cells[lowest], 2]
+    return np.asarray(heights.sum(axis=1) / 4.0, dtype=np.float64)
+
+
+def _check_first_cells(heights: NDArray[np.float64], directory: Path) -> None:
+    asked = _shape(directory)
+    vertical = asked["first_cell"] / cos(radians(asked["slope_deg"]))
+    off = float(np.abs(heights / vertical - 1.0).max(initial=0.0))
+    if not heights.size or off > _TOLERANCE:
+        raise _unusable(f"with first cells {off:.0%} off the height asked for", directory)
+
+
+def _shape(directory: Path) -> dict[str, float]:
+    text = (directory / "parameters.geo").read_text(encoding="utf-8")
+    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+) = ([^;]+);", text)}
+
+
+def _unusable(how: str, directory: Path) -> SolverError:
+    return SolverError(
+        f"no usable mesh: {how}",
+        where=str(directory / "pile.msh"),
+        remedy="check the slope, the height and the first cell in parameters.geo",
+    )

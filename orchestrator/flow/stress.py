@@ -1,0 +1,237 @@
+"""The stress that the flow puts on the bed, along the whole of it."""
+
+import csv
+import io
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orchestrator.errors import InputError, SolverError
+from orchestrator.files import write_durably
+from orchestrator.solvers.openfoam import read_last_time, read_numbers
+
+if TYPE_CHECKING:
+    import pyvista
+
+_DERIVED = "ustar_over_ustar0_wall"
+
+KAPPA = 0.41
+"""Von Karman's constant of the approaching flow, the wall function and Eq. 10."""
+
+Array = NDArray[np.float64]
+Measure = Literal["wall", "eq10"]
+
+
+def undisturbed_ustar(speed_m_s: float, lid_height_m: float, roughness_m: float) -> float:
+    """Friction velocity of the approaching flow, m/s: u*_0 = 0.41 U_e / ln((z_lid + z0)/z0)."""
+    return float(KAPPA * speed_m_s / np.log((lid_height_m + roughness_m) / roughness_m))
+
+
+@dataclass(frozen=True, eq=False)
+class WallStress:
+    """Stress on each face of the bed, in the order of the flow; every array has shape (F,).
+
+    Stresses are kinematic and in units of u*_0^2, friction velocities in units of u*_0, the
+    undisturbed friction velocity; both are positive where the flow at the bed goes downstream.
+
+    Attributes
+    ----------
+    s_m : array
+        Arc length along the bed from the windward toe to the middle of the face, m.
+    x_m, z_m : array
+        Middle of the face: downstream of the windward toe, above the flat bed, m.
+    length_m : array
+        Length of the face along the bed, m; the values hold over it.
+    z_e_m : array
+        Distance of the first cell's centre from the bed, along its normal, m.
+    tau_wall : array
+        Stress on the wall, from the flow solver.
+    ustar_over_ustar0_eq10 : array
+        Eq. 10 at the first cell's centre: 0.41 u_t / ln((z_e + z0)/z0).
+    ustar_over_ustar0_eq10_printed : array
+        Eq. 10 as the paper prints it: 0.41 u_t / ln(z_e/z0).
+    """
+
+    s_m: Array
+    x_m: Array
+    z_m: Array
+    length_m: Array
+    z_e_m: Array
+    tau_wall: Array
+    ustar_over_ustar0_eq10: Array
+    ustar_over_ustar0_eq10_printed: Array
+
+    @cached_property
+    def ustar_over_ustar0_wall(self) -> Array:
+        """Friction velocity of the stress on the wall: sign(tau) sqrt(|tau|)."""
+        return np.sign(self.tau_wall) * np.sqrt(np.abs(self.tau_wall))
+
+    @cached_property
+    def tau_eq10(self) -> Array:
+        """Stress of Eq. 10's friction velocity: sign(u*) u*^2."""
+        ustar = self.ustar_over_ustar0_eq10
+        return ustar * np.abs(ustar)
+
+    @cached_property
+    def edges_m(self) -> Array:
+        """Ends of the faces along the bed, m; shape (F + 1,)."""
+        first = self.s_m[0] - self.length_m[0] / 2.0
+        return np.concatenate([[first], first + np.cumsum(self.length_m)])
+
+    def mean_over(self, s_m: ArrayLike, length_m: ArrayLike, measure: Measure = "wall") -> Array:
+        """Mean signed stress over a length of bed centred on each place.
+
+        The integral of the face values is exact: each holds over the whole of its face.
+
+        Parameters
+        ----------
+        s_m : array_like
+            Arc lengths along the bed, m.
+        length_m : array_like
+            Lengths of bed to average over, m; broadcast against `s_m`.
+        measure : {"wall", "eq10"}
+            The stress on the wall, or that of Eq. 10.
+
+        Returns
+        -------
+        array
+            Mean of tau/u*_0^2, of the broadcast shape.
+
+        Raises
+        ------
+        InputError
+            If a length is not positive, or reaches beyond the bed.
+        """
+        centre, length = np.broadcast_arrays(np.asarray(s_m, float), np.asarray(length_m, float))
+        low, high = centre - length / 2.0, centre + length / 2.0
+        self._check_reach(low, high)
+        tau = self.tau_wall if measure == "wall" else self.tau_eq10
+        integral = np.concatenate([[0.0], np.cumsum(tau * self.length_m)])
+        gained = np.interp(high, self.edges_m, integral) - np.interp(low, self.edges_m, integral)
+        return np.asarray(gained / length)
+
+    def _check_reach(self, low: Array, high: Array) -> None:
+        start, end = self.edges_m[0], self.edges_m[-1]
+        if not (np.all(low < high) and np.all(low >= start) and np.all(high <= end)):
+            raise InputError(
+                "a mean of the stress needs a positive length within the bed, "
+                f"which spans s = {start:.4g} ... {end:.4g} m",
+            )
+
+    def to_csv(self, path: Path) -> None:
+        """Write a table with all digits: `from_csv` gives the same numbers back."""
+        names = [field.name for field in fields(self)]
+        columns = [getattr(self, name).tolist() for name in names]
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow([*names, _DERIVED])
+        writer.writerows(zip(*columns, self.ustar_over_ustar0_wall.tolist(), strict=True))
+        write_durably(path, text.getvalue())
+
+    @classmethod
+    def from_csv(cls, path: Path) -> "WallStress":
+        """Read what `to_csv` wrote.
+
+        Raises
+        ------
+        InputError
+            If the file is not such a table.
+        """
+        names = [field.name for field in fields(cls)]
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        if header.split(",") != [*names, _DERIVED] or not rows:
+            raise InputError("not a table of the stress on a bed", where=str(path))
+        table = np.loadtxt(rows, delimiter=",", ndmin=2)
+        return cls(**dict(zip(names, table.T[: len(names)].copy(), strict=True)))
+
+
+def read_openfoam(directory: Path) -> WallStress:
+    """Stress along the bed of a finished OpenFOAM case.
+
+    The numbers have seven digits, which is what VTK hands on.
+
+    Parameters
+    ----------
+    directory : Path
+        A case that `Allrun` has run in; its `parameters` give U_e, the lid and z0.
+
+    Raises
+    ------
+    SolverError
+        If the case holds no results.
+    """
+    numbers = read_numbers(directory / "parameters")
+    z0 = numbers["roughnessLength"]
+    ustar0 = undisturbed_ustar(numbers["freeStream"], numbers["lidHeight"], z0)
+    bed, air = read_last_time(directory, "bed", ["U", "wallShearStress"])
+    faces = _Faces.of(bed)
+    z_e, u_t = _first_cells(air, faces)
+    stress = np.asarray(bed.cell_data["wallShearStress"], dtype=np.float64)[faces.order]
+    return WallStress(
+        s_m=faces.s_m,
+        x_m=faces.centres[:, 0],
+        z_m=faces.centres[:, 2],
+        length_m=faces.lengths,
+        z_e_m=z_e,
+        # OpenFOAM's is the stress of the bed on the flow
+        tau_wall=-_along(stress, faces.tangents) / ustar0**2,
+        ustar_over_ustar0_eq10=KAPPA * u_t / np.log((z_e + z0) / z0) / ustar0,
+        ustar_over_ustar0_eq10_printed=KAPPA * u_t / np.log(z_e / z0) / ustar0,
+    )
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Geometry of the faces of the bed, ordered downstream; vectors of shape (F, 3)."""
+
+    order: NDArray[np.intp]
+    centres: Array
+    tangents: Array
+    lengths: Array
+    s_m: Array
+
+    @classmethod
+    def of(cls, bed: "pyvista.PolyData") -> "_Faces":
+        corners = np.asarray(bed.points, dtype=np.float64)[bed.regular_faces]
+        order = np.argsort(corners[:, :, 0].mean(axis=1))
+        corners = np.take_along_axis(
+            corners[order], np.argsort(corners[order, :, 0], axis=1)[:, :, None], axis=1
+        )
+        starts, ends = corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
+        lengths = np.linalg.norm(ends - starts, axis=1)
+        toe = int(np.argmin(np.abs(starts[:, 0])))
+        s_end = np.cumsum(lengths) - lengths[:toe].sum()
+        return cls(
+            order=order,
+            centres=(starts + ends) / 2.0,
+            tangents=(ends - starts) / lengths[:, None],
+            lengths=lengths,
+            s_m=s_end - lengths / 2.0,
+        )
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals into the flow."""
+        tangents = self.tangents
+        return np.stack([-tangents[:, 2], np.zeros(len(tangents)), tangents[:, 0]], axis=1)
+
+
+def _first_cells(air: "pyvista.UnstructuredGrid", faces: _Faces) -> tuple[Array, Array]:
+    """Distance from the bed, and speed along it, of the centre of the cell on each face."""
+    just_above = faces.centres + 1e-2 * faces.lengths.min() * faces.normals
+    found = np.atleast_1d(air.find_containing_cell(just_above))
+    if (found < 0).any():
+        raise SolverError("a face of the bed has no cell above it", remedy="mesh the case again")
+    hexahedra = air.cell_connectivity.reshape(-1, 8)
+    corners = np.asarray(air.points, dtype=np.float64)[hexahedra[found]]
+    heights = _along(corners.mean(axis=1) - faces.centres, faces.normals)
+    speeds = _along(np.asarray(air.cell_data["U"], dtype=np.float64)[found], faces.tangents)
+    return heights, speeds
+
+
+def _along(vectors: Array, directions: Array) -> Array:
+    return np.asarray(np.einsum("fi,fi->f", vectors, directions))
