@@ -99,7 +99,7 @@ COLUMNS: dict[str, str] = {
 
 
 def make(study: Study, plan: Plan, cases: Path) -> Tables:
-    """All tables of a study, from the cases that are done; rows in the study's order."""
+    """The tables of a study that have rows, from the cases that are done; in the study's order."""
     done = {name for name, one in plan.cases.items() if case.is_done(one, cases)}
     piles = {
         key: pile
@@ -108,7 +108,7 @@ def make(study: Study, plan: Plan, cases: Path) -> Tables:
     }
     cells = [one for one in plan.cells if one.name in done]
     flows = {pile.flow.name: pile for pile in plan.piles.values() if pile.flow.name in done}
-    return {
+    made = {
         "scenes": _frame(_scene_rows(study, plan)),
         "single_grain": _single_grain(study, cells, cases),
         "wall_stress": _concat(_wall_stress(flows.values(), cases)),
@@ -116,6 +116,7 @@ def make(study: Study, plan: Plan, cases: Path) -> Tables:
         "pile_curve": _concat(_pile_curve(pile, cases) for pile in piles.values()),
         "pile_threshold": _frame(row for p in piles.values() for row in _pile_threshold(p, cases)),
     }
+    return {name: table for name, table in made.items() if not table.empty}
 
 
 def timings(plan: Plan, cases: Path) -> pd.DataFrame:
@@ -137,8 +138,10 @@ def timings(plan: Plan, cases: Path) -> pd.DataFrame:
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
-    """Write each table as CSV and as Parquet, and what the columns mean."""
+    """Write each table as CSV and as Parquet, and what the columns mean; nothing else stays."""
     folder.mkdir(exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
     for name, table in tables.items():
         write_durably(folder / f"{name}.csv", table.to_csv(index=False))
         write_durably(folder / f"{name}.parquet", table.to_parquet(index=False))

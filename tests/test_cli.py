@@ -152,8 +152,7 @@ def test_other_versions_of_the_solver(
     program = folder / "liggghts"
     said = f"LIGGGHTS (Version LIGGGHTS-PUBLIC {version}, compiled)"
     program.write_text(
-        f'#!/bin/sh\n[ "$1" = -h ] && echo "{said}" && exit\n'
-        f'exec {shutil.which("liggghts")} "$@"\n'
+        f'#!/bin/sh\n[ "$1" = -h ] && echo "{said}" && exit\nexec {shutil.which("liggghts")} "$@"\n'
     )
     program.chmod(0o755)
     (tmp_path / "grains.toml").write_text(GRAINS)

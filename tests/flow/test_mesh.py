@@ -1,0 +1,110 @@
+"""Meshes of many piles, without a solver."""
+
+import threading
+from dataclasses import replace
+from math import cos, radians, tan
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from orchestrator import assets, case
+from orchestrator.errors import SolverError
+from orchestrator.flow.case import FlowCase, default_first_cell_m
+from orchestrator.flow.mesh import check_mesh, first_cell_heights, smallest_jacobian, write_mesh
+from tests.flow.conftest import PILE
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+@pytest.mark.parametrize("slope", [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0])
+@pytest.mark.parametrize(("height", "z0_over_h"), [(0.002, 1.6e-4), (0.02, 5e-3), (3.0, 1e-2)])
+def test_a_mesh_for_each_pile(
+    slope: float, height: float, z0_over_h: float, tmp_path: Path
+) -> None:
+    first = default_first_cell_m(height, z0_over_h * height)
+    flow = FlowCase(slope, height, z0_over_h * height, 10.0, 1e-6, first, 20)
+    directory = case.prepare(flow, tmp_path)
+    mesh = meshio.read(directory / "pile.msh")
+    crest = height / tan(radians(slope)) if slope else 4.0 * height
+    x, _, z = mesh.points.T
+    assert np.isclose([x.min(), x.max()], [-10.0 * height, 2.0 * crest + 20.0 * height]).all()
+    assert z.max() == pytest.approx(10.0 * height)
+    above_toe = z[np.isclose(x, crest)]
+    assert above_toe.min() == pytest.approx(height if slope else 0.0, abs=1e-12)
+    np.testing.assert_allclose(first_cell_heights(mesh), first / cos(radians(slope)), rtol=0.01)
+
+
+def test_twice_the_cells_keep_the_first_cell(tmp_path: Path) -> None:
+    meshes = [
+        meshio.read(case.prepare(replace(PILE, cells_per_face=n), tmp_path) / "pile.msh")
+        for n in (16, 32)
+    ]
+    coarse, fine = (len(mesh.cells_dict["hexahedron"]) for mesh in meshes)
+    assert 3.0 < fine / coarse < 4.5
+    lowest = [np.median(first_cell_heights(mesh)) for mesh in meshes]
+    assert lowest[0] == pytest.approx(lowest[1], rel=1e-3)
+
+
+def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
+    check_mesh(template)
+    given = meshio.read(template / "pile.msh")
+    write_mesh(template)
+    made = meshio.read(template / "pile.msh")
+    np.testing.assert_allclose(made.points, given.points, atol=1e-9)
+    assert (template / "pile.geo").read_bytes() == (
+        assets.templates() / "openfoam/pile/pile.geo"
+    ).read_bytes()
+
+
+def test_threads_make_their_meshes_one_after_another(tmp_path: Path) -> None:
+    flows = [replace(PILE, slope_deg=float(slope)) for slope in (10, 20, 30)]
+    threads = [threading.Thread(target=case.prepare, args=(flow, tmp_path)) for flow in flows]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for flow in flows:
+        check_mesh(tmp_path / flow.name)
+
+
+def test_an_inverted_cell_is_seen() -> None:
+    cube = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+        dtype=float,
+    )
+    upright = np.arange(8)
+    upside_down = np.roll(upright, 4)
+    dented = np.vstack([cube, [0.7, 0.7, 0.7]])
+    np.testing.assert_allclose(smallest_jacobian(cube, upright[None]), [1.0])
+    assert smallest_jacobian(cube, upside_down[None]) < 0.0
+    assert smallest_jacobian(dented, np.array([[8, 1, 2, 3, 4, 5, 6, 7]])) < 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "cause"),
+    [
+        ("parameters.geo", "first_cell = 0.0006666;", "first_cell = 0.0005;", "first cells 3"),
+        ("pile.msh", '"lid"', '"lib"', r"physical groups \['lid'\]"),
+        ("pile.msh", "$Nodes", "$Knots", "not readable"),
+    ],
+)
+def test_a_mesh_that_is_not_the_one_asked_for(
+    template: Path, name: str, old: str, new: str, cause: str
+) -> None:
+    edit(template / name, old, new)
+    with pytest.raises(SolverError, match=rf"pile\.msh: no usable mesh: .*{cause}"):
+        check_mesh(template)
+
+
+def test_what_gmsh_says_reaches_the_user(template: Path) -> None:
+    edit(template / "parameters.geo", "height = 0.02;", "height = two;")
+    with pytest.raises(SolverError, match="gmsh failed: .*Unknown variable 'two'"):
+        write_mesh(template)
+    edit(template / "parameters.geo", "height = two;", "height = 0.02;")
+    write_mesh(template)
