@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from orchestrator.case import Case
+from orchestrator.errors import InputError
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import PileCase
 from orchestrator.scene import PileBed
@@ -29,8 +30,18 @@ class Plan:
 
 
 def make(study: Study) -> Plan:
-    """The cases that a study needs."""
+    """The cases that a study needs.
+
+    Raises
+    ------
+    InputError
+        If a scene asks for a flow that cannot be solved; with the study and the field.
+    """
     piles = {s.id: PileCase(s) for s in study.scenes if isinstance(s.bed, PileBed)}
     cells = tuple(batches(s for s in study.scenes if not isinstance(s.bed, PileBed)))
-    ordered: list[Case] = [need for pile in piles.values() for need in pile.needs]
+    try:
+        ordered: list[Case] = [need for pile in piles.values() for need in pile.needs]
+    except InputError as error:
+        place = f"{study.name}: {error.where}"
+        raise InputError(error.what, where=place, remedy=error.remedy) from None
     return Plan(piles, cells, {case.name: case for case in (*ordered, *cells, *piles.values())})

@@ -89,7 +89,7 @@ class Flow(Part):
     viscosity: Positive = 1e-5
     """nu of that solve, m2/s: the wall is rough, the fluid's own nu moves only the grain's Re*"""
     first_cell_height: Positive | None = None
-    """of the mesh on the bed, m; default max(h/40, 20 z0)"""
+    """of the mesh on the bed, m; default max(h/40, 20 z0), but no more than h/4"""
     cells_per_face: Annotated[int, Field(ge=10)] = 40
     """of the mesh along each face of the pile"""
     closure: Literal["auto", "low", "high"] = "auto"
@@ -178,7 +178,8 @@ class Scene(Part):
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
-        return self.flow.first_cell_height or max(self.bed.height / 40, 20 * self.bed.roughness)
+        height, roughness = self.bed.height, self.bed.roughness
+        return self.flow.first_cell_height or min(max(height / 40, 20 * roughness), height / 4)
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
@@ -273,13 +274,13 @@ def check_pile(bed: PileBed, diameter: float) -> None:
 
 
 def check_first_cell(roughness: float, first_cell_height: float) -> None:
-    """The rough wall's logarithm turns negative where the cell's centre is inside the roughness."""
-    if roughness >= first_cell_height / 2:
+    """The rough wall's log law fails where the first cell's centre is near the roughness."""
+    if 4 * roughness > first_cell_height:
         raise UnfitError(
             "bed.roughness",
-            f"z0 = {roughness:g} m is not below z_e = {first_cell_height / 2:g} m, the height of"
-            " the first cell's centre",
-            "lower it, or raise flow.first_cell_height; ten times z0 is a sound z_e",
+            f"z0 = {roughness:g} m is above half of z_e = {first_cell_height / 2:g} m, the height"
+            " of the first cell's centre",
+            "lower it, or raise flow.first_cell_height or bed.height; z_e of 10 z0 is sound",
         )
 
 

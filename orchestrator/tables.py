@@ -18,7 +18,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase, undisturbed_ustar
+from orchestrator.grains.pile import PileCase
 from orchestrator.plan import Plan
 from orchestrator.scene import PileBed, Scene
 from orchestrator.study import Study
@@ -335,7 +335,7 @@ def _pile_threshold(pile: PileCase, cases: Path) -> Iterator[Row]:
 
 
 def _lid_speed_ratio(pile: PileCase) -> float:
-    return 1 / undisturbed_ustar(1.0, pile.bed.height, pile.bed.roughness)
+    return pile.flow.speed_m_s / pile.flow.ustar0_m_s
 
 
 def _shields(scene: Scene, tau: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator import closures, packing
+from orchestrator import packing
 from orchestrator.case import Case
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
@@ -25,6 +25,16 @@ grain in flight is gone, diameters."""
 AVERAGE_OVER_HEIGHT = 1 / 40
 """Least bed length, over h, that a grain's stress is averaged on: the crest's own value never
 converges with the mesh."""
+
+FIELD_OF = {
+    "height_m": "bed.height",
+    "roughness_m": "bed.roughness",
+    "speed_m_s": "flow.speed",
+    "viscosity_m2_s": "flow.viscosity",
+    "first_cell_m": "flow.first_cell_height",
+    "cells_per_face": "flow.cells_per_face",
+}
+"""What a study file calls the fields of a flow case."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +73,19 @@ class PileCase(GrainCase):
     @cached_property
     def flow(self) -> FlowCase:
         """The flow that gives the stress; scenes that differ in their grains alone share it."""
-        return FlowCase(
-            slope_deg=self.bed.slope_deg,
-            height_m=self.bed.height,
-            roughness_m=self.bed.roughness,
-            speed_m_s=self.scene.flow.speed,
-            viscosity_m2_s=self.scene.flow.viscosity,
-            first_cell_m=self.scene.first_cell_height,
-            cells_per_face=self.scene.flow.cells_per_face,
-        )
+        try:
+            return FlowCase(
+                slope_deg=self.bed.slope_deg,
+                height_m=self.bed.height,
+                roughness_m=self.bed.roughness,
+                speed_m_s=self.scene.flow.speed,
+                viscosity_m2_s=self.scene.flow.viscosity,
+                first_cell_m=self.scene.first_cell_height,
+                cells_per_face=self.scene.flow.cells_per_face,
+            )
+        except InputError as error:
+            field = FIELD_OF.get(error.where, error.where)
+            raise InputError(error.what, where=field, remedy=error.remedy) from None
 
     @property
     def needs(self) -> tuple[Case, ...]:
@@ -195,7 +209,3 @@ class PileCase(GrainCase):
             density=self.scene.grain.density,
         )
 
-
-def undisturbed_ustar(speed: float, height: float, roughness: float) -> float:
-    """u*_0 under a speed U_e at the lid, 10 h above the flat bed (Eq. 10), m/s."""
-    return float(closures.log_law_ustar(speed, 10 * height, roughness))
