@@ -20,8 +20,8 @@ TIE = 1e-6
 decided by round-off."""
 APRON = 10.0
 """Length of the fixed flat bed beyond each toe, diameters."""
-CORE_LAYERS = 2
-"""Fixed layers that are kept below the mobile ones: a grain touches no deeper one."""
+LEE_DEPTH = 1.5
+"""Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def pile(
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap
     row_height = float(np.sin(beta))
-    body = _body(triangle, beta, surface, pattern, layers=mobile_layers + CORE_LAYERS)
+    body = _body(triangle, beta, surface, pattern, mobile_layers)
     buried = body[:, 1] < surface - TIE
     in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
     windward, lee = (face & ~buried for face in exposed(body, triangle))
@@ -147,15 +147,20 @@ def pile(
 
 
 def _body(
-    triangle: Triangle, beta: float, surface: float, pattern: Pattern, layers: int
+    triangle: Triangle, beta: float, surface: float, pattern: Pattern, mobile_layers: int
 ) -> FloatArray:
-    """Lattice grains near both faces, with one grain on the crest, and some below the ground."""
+    """Lattice grains near both faces, with one grain on the crest, and some below the ground.
+
+    Below the mobile layers one is enough: a grain touches no deeper one.
+    """
     direction = triangle.tangent if pattern == "aligned" else np.array([1.0, 0.0])
     apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
     lattice = _lattice(triangle, apex, direction, beta)
-    depth = np.minimum(triangle.depth(lattice, 0), triangle.depth(lattice, 1)) + surface
-    level = lattice[:, 1] - surface
-    inside = (depth >= -TIE) & (depth < layers * np.sin(beta) + TIE)
+    depths = [triangle.depth(lattice, face) + surface for face in (0, 1)]
+    depth, level = np.minimum(*depths), lattice[:, 1] - surface
+    windward_shell = depths[0] < (mobile_layers + 0.5) * np.sin(beta)
+    lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
+    inside = (depth >= -TIE) & (windward_shell | lee_shell)
     covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))
     return np.asarray(lattice[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
 

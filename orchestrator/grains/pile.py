@@ -62,7 +62,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 1
+    recipe: ClassVar[int] = 2
 
     @property
     def bed(self) -> PileBed:
@@ -102,7 +102,7 @@ class PileCase(GrainCase):
         """Expected wall time, s."""
         rules = self.scene.protocol
         count = self.bed.height / np.sin(np.radians(self.bed.slope_deg)) / self.scene.grain.diameter
-        grains = count * (self.bed.mobile_layers + packing.CORE_LAYERS) * 2
+        grains = count * (self.bed.mobile_layers + 3)
         holds = np.log(3.5) / np.log1p(rules.step)
         return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
 
