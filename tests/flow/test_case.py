@@ -1,0 +1,263 @@
+"""Flow cases run by the real solver on a coarse mesh, and their failures."""
+
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator import case
+from orchestrator.errors import InputError, SolverError
+from orchestrator.flow.case import WALL_STRESS, FlowCase, default_first_cell_m
+from orchestrator.flow.stress import WallStress, read_openfoam
+from orchestrator.solvers import openfoam, process
+from tests.flow.conftest import PILE, SLOW, Solve, allrun
+from tests.flow.test_mesh import edit
+
+FACE = PILE.height_m / np.sin(np.radians(PILE.slope_deg))
+
+
+def windward_mean(directory: Path, flow: FlowCase) -> float:
+    """Mean of u*/u*_0 over the windward face."""
+    stress = WallStress.from_csv(directory / WALL_STRESS)
+    face = flow.height_m / np.sin(np.radians(flow.slope_deg))
+    on_it = (stress.s_m > 0.0) & (stress.s_m < face)
+    ustar, length = stress.ustar_over_ustar0_wall[on_it], stress.length_m[on_it]
+    return float(np.average(ustar, weights=length))
+
+
+def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
+    directory = solve(PILE)
+    assert case.is_done(PILE, directory.parent)
+    kept, read = WallStress.from_csv(directory / WALL_STRESS), read_openfoam(directory)
+    np.testing.assert_array_equal(kept.tau_wall, read.tau_wall)
+    assert (directory / "parameters").read_text().count("//") == 5
+    sums = (directory / "results.sha256").read_text()
+    for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress"):
+        assert f"/{field}\n" in sums
+
+
+def test_the_geometry_of_the_bed(solve: Solve) -> None:
+    stress = WallStress.from_csv(solve(PILE) / WALL_STRESS)
+    crest = FACE * np.cos(np.radians(15.0))
+    bed = np.maximum(0.0, np.tan(np.radians(15.0)) * np.minimum(stress.x_m, 2 * crest - stress.x_m))
+    np.testing.assert_allclose(stress.z_m, bed, atol=1e-7)
+    windward = (stress.x_m > 0.0) & (stress.x_m < crest)
+    assert np.count_nonzero(windward) == PILE.cells_per_face
+    np.testing.assert_allclose(
+        stress.s_m[windward], stress.x_m[windward] / np.cos(np.radians(15.0)), rtol=1e-5
+    )
+    upstream = stress.x_m < 0.0
+    np.testing.assert_allclose(stress.s_m[upstream], stress.x_m[upstream], rtol=1e-5)
+    np.testing.assert_allclose(stress.edges_m[:-1], stress.s_m - stress.length_m / 2, atol=1e-8)
+    np.testing.assert_allclose(stress.z_e_m[windward], PILE.first_cell_m / 2.0, rtol=2e-3)
+
+
+def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -> None:
+    stress = WallStress.from_csv(solve(PILE) / WALL_STRESS)
+    toe, mid, crest, lee = stress.mean_over(
+        np.array([0.05, 0.5, 0.98, 1.5]) * FACE, np.array([0.1, 0.1, 0.04, 0.2]) * FACE
+    )
+    assert 0.0 < toe < mid < crest
+    assert crest > 2.0
+    assert lee < 0.0
+    start, end = stress.edges_m[[0, -1]]
+    assert stress.mean_over(start + 0.02, 0.02) == pytest.approx(1.0, abs=0.1)
+    assert 0.0 < stress.mean_over(end - 0.02, 0.02) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("roughness", "first_cell"), [(3.3e-6, 5e-4), (3.3e-5, 1e-3), (1e-4, 2e-3)]
+)
+def test_a_flat_bed_keeps_the_friction_velocity(
+    solve: Solve, roughness: float, first_cell: float
+) -> None:
+    """Of the approaching flow, and of the log law at the first cell, which the wall uses too."""
+    flow = replace(PILE, slope_deg=0.0, roughness_m=roughness, first_cell_m=first_cell)
+    stress = WallStress.from_csv(solve(flow) / WALL_STRESS)
+    middle = np.abs(stress.x_m) < 0.1
+    np.testing.assert_allclose(stress.ustar_over_ustar0_wall[middle], 1.0, atol=0.015)
+    np.testing.assert_allclose(
+        stress.ustar_over_ustar0_wall[middle], stress.ustar_over_ustar0_eq10[middle], rtol=0.01
+    )
+    printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
+    z_over_z0 = first_cell / 2.0 / roughness
+    np.testing.assert_allclose(printed, np.log(z_over_z0 + 1.0) / np.log(z_over_z0), rtol=1e-4)
+
+
+@pytest.mark.parametrize("slope", [15.0, 30.0])
+def test_a_finer_mesh_gives_the_same_mean(solve: Solve, slope: float) -> None:
+    coarse = replace(PILE, slope_deg=slope)
+    fine = replace(coarse, cells_per_face=32)
+    means = [windward_mean(solve(flow), flow) for flow in (coarse, fine)]
+    assert means[0] == pytest.approx(means[1], rel=0.01)
+
+
+@pytest.mark.parametrize(("speed", "tolerance"), [(5.0, 0.01), (20.0, 0.005)])
+def test_the_stress_scales_with_the_speed(solve: Solve, speed: float, tolerance: float) -> None:
+    other = replace(PILE, speed_m_s=speed)
+    expected = windward_mean(solve(PILE), PILE)
+    assert windward_mean(solve(other), other) == pytest.approx(expected, rel=tolerance)
+
+
+def test_the_stress_scales_with_the_size(solve: Solve) -> None:
+    larger = replace(
+        PILE,
+        height_m=10 * PILE.height_m,
+        roughness_m=10 * PILE.roughness_m,
+        first_cell_m=10 * PILE.first_cell_m,
+        viscosity_m2_s=10 * PILE.viscosity_m2_s,
+    )
+    expected = windward_mean(solve(PILE), PILE)
+    assert windward_mean(solve(larger), larger) == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_copy_run_by_hand_gives_the_same_bytes(solve: Solve, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(solve(PILE), tmp_path / '-a "b" c\'é'))
+    shutil.rmtree(next(copy.glob("[1-9]*")))
+    environment = {"PATH": os.environ["PATH"]}
+    ended = subprocess.run([copy / "Allrun"], env=environment, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.count(": OK\n") == 7
+    edit(copy / "parameters", "freeStream       10.0;", "freeStream       10.1;")
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode != 0
+    assert "U: FAILED" in ended.stdout
+
+
+def test_the_template_runs_as_it_lies(template: Path) -> None:
+    assert allrun(template).returncode == 0
+    assert openfoam.check_log(template) > 10
+    assert read_openfoam(template).tau_wall.max() > 2.0
+    left = {path.name for path in template.iterdir()}
+    subprocess.run([template / "Allclean"], check=True)
+    gone = left - {path.name for path in template.iterdir()}
+    assert {"log.simpleFoam", "log.gmshToFoam", "postProcessing"} < gone
+    assert not (template / "constant" / "polyMesh").exists()
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def solver_pid(directory: Path) -> int:
+    """Of the simpleFoam that has begun to iterate in a case."""
+    log = directory / "log.simpleFoam"
+    wait_for(lambda: log.exists() and "Time = 3\n" in log.read_text())
+    line = next(line for line in log.read_text().splitlines() if line.startswith("PID"))
+    return int(line.split(":")[1])
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_a_killed_solver_is_a_failed_case(tmp_path: Path) -> None:
+    directory = case.prepare(SLOW, tmp_path)
+    ended: list[process.Ended] = []
+    thread = threading.Thread(target=lambda: ended.append(allrun(directory)))
+    thread.start()
+    os.kill(solver_pid(directory), signal.SIGKILL)
+    thread.join()
+    assert ended[0].returncode == 128 + signal.SIGKILL
+    assert "simpleFoam failed" in (directory / "log.Allrun").read_text()
+    with pytest.raises(SolverError, match=r"simpleFoam was stopped before its end; .* iteration"):
+        SLOW.collect(directory)
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="needs setpriv of util-linux")
+def test_a_killed_script_takes_the_solver_with_it(tmp_path: Path) -> None:
+    directory = case.prepare(SLOW, tmp_path)
+    script = subprocess.Popen(["./Allrun"], cwd=directory)
+    pid = solver_pid(directory)
+    script.kill()
+    script.wait()
+    wait_for(lambda: not is_alive(pid))
+
+
+def test_a_time_limit_ends_the_solver(tmp_path: Path) -> None:
+    directory = case.prepare(SLOW, tmp_path)
+    ended = allrun(directory, limit_s=1.5)
+    assert ended.timed_out
+    pid = solver_pid(directory)
+    wait_for(lambda: not is_alive(pid))
+    with pytest.raises(SolverError, match="stopped before its end"):
+        SLOW.collect(directory)
+
+
+@pytest.mark.parametrize(
+    ("trap", "cause"),
+    [("true", "floating point exception after iteration"), ("false", "residuals are not numbers")],
+)
+def test_a_diverged_run(tmp_path: Path, trap: str, cause: str) -> None:
+    directory = case.prepare(PILE, tmp_path)
+    edit(directory / "system" / "fvSolution", "consistent      yes;", "consistent      no;")
+    assert allrun(directory, FOAM_SIGFPE=trap).returncode != 0
+    with pytest.raises(SolverError, match=f"simpleFoam diverged: .*{cause}"):
+        PILE.collect(directory)
+
+
+def test_a_run_that_needs_more_iterations(tmp_path: Path) -> None:
+    directory = case.prepare(PILE, tmp_path)
+    edit(directory / "system" / "controlDict", "2000;", "30;")
+    assert allrun(directory).returncode == 1
+    with pytest.raises(SolverError, match=r"did not converge: .* after iteration 30"):
+        PILE.collect(directory)
+
+
+def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
+    with pytest.raises(SolverError, match=r"z_e goes from .* with first cells of 0.002 m"):
+        replace(PILE, first_cell_m=2e-3).collect(solve(PILE))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("slope_deg", 3.0),
+        ("slope_deg", -15.0),
+        ("slope_deg", 50.0),
+        ("slope_deg", float("nan")),
+        ("height_m", 0.0),
+        ("roughness_m", -1e-5),
+        ("speed_m_s", float("inf")),
+        ("viscosity_m2_s", 0.0),
+        ("viscosity_m2_s", 1e-3),
+        ("first_cell_m", 1e-4),
+        ("first_cell_m", 1e-2),
+        ("cells_per_face", 2),
+    ],
+)
+def test_an_unusable_field_is_named(field: str, value: Any) -> None:
+    with pytest.raises(InputError) as raised:
+        replace(PILE, **{field: value})
+    assert raised.value.where == field
+
+
+def test_who_a_case_is() -> None:
+    assert replace(PILE, slope_deg=15, speed_m_s=10).id == PILE.id
+    assert replace(PILE, roughness_m=3.4e-5).id != PILE.id
+    assert PILE.name.startswith("flow-")
+    assert set(PILE.versions()) == {"gmsh", "openfoam"}
+
+
+def test_finer_and_steeper_cases_cost_more() -> None:
+    assert PILE.cost_s < replace(PILE, slope_deg=35.0).cost_s < SLOW.cost_s
+
+
+def test_the_default_first_cell() -> None:
+    assert default_first_cell_m(0.02, 1e-6) == pytest.approx(5e-4)
+    assert default_first_cell_m(0.02, 1e-4) == pytest.approx(2e-3)

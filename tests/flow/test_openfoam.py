@@ -1,0 +1,139 @@
+"""What OpenFOAM's programs say of themselves, and how a run's end is read from the logs."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import SolverError
+from orchestrator.solvers import openfoam
+from tests.flow.conftest import PILE, Solve
+
+HEADER = "trapFpe: Floating point exception trapping enabled (FOAM_SIGFPE).\nCreate time\n"
+STEP = """
+Time = {time}
+
+smoothSolver:  Solving for Ux, Initial residual = {residual}, Final residual = 1e-9, No Iterations 4
+ExecutionTime = 0.1 s  ClockTime = 0 s
+"""
+FATAL = """
+--> FOAM FATAL IO ERROR:
+Unknown patchField type nosuch for patch type wall
+
+file: /proc/self/cwd/0/U.boundaryField.bed from line 27 to line 28.
+"""
+
+
+def steps(*residuals: float) -> str:
+    return "".join(STEP.format(time=i + 1, residual=r) for i, r in enumerate(residuals))
+
+
+def leave_logs(directory: Path, text: str) -> Path:
+    for program in openfoam.PROGRAMS[:-1]:
+        (directory / f"log.{program}").write_text(f"{HEADER}\nEnd\n")
+    (directory / "log.simpleFoam").write_text(HEADER + text)
+    return directory
+
+
+def test_a_run_that_converged(tmp_path: Path) -> None:
+    text = steps(1.0, 1e-3, 1e-6) + "\nSIMPLE solution converged in 3 iterations\n\nEnd\n\n"
+    assert openfoam.check_log(leave_logs(tmp_path, text)) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("", "was stopped before its end; its log breaks off after its header"),
+        (steps(1.0, 0.5), "was stopped before its end; its log breaks off after iteration 2"),
+        (FATAL, "simpleFoam stopped: Unknown patchField type nosuch for patch type wall"),
+        (
+            steps(1.0) + "#1  Foam::sigFpe::sigHandler(int) at ??:?",
+            "simpleFoam diverged: floating point exception after iteration 1",
+        ),
+        (
+            steps(1.0) + steps(float("nan")) + FATAL,
+            "diverged: the residuals are not numbers: .*nan",
+        ),
+        (steps(1.0) + "#1  Foam::sigSegv::sigHandler(int) at ??:?", "segmentation fault"),
+        (
+            steps(*(0.9**i for i in range(100))) + "\nEnd\n",
+            r"did not converge: the residual of Ux still falls \(2.2e-04\) after iteration 100",
+        ),
+        (
+            steps(*(1e-3 * (1 + i % 3) for i in range(100))) + "\nEnd\n",
+            r"did not converge: the residual of Ux cycles, it no longer falls \(3.0e-03\)",
+        ),
+        ("\nEnd\n", "did not converge"),
+    ],
+)
+def test_a_run_that_did_not_end_well(tmp_path: Path, text: str, cause: str) -> None:
+    with pytest.raises(SolverError, match=cause) as raised:
+        openfoam.check_log(leave_logs(tmp_path, text))
+    assert raised.value.where == str(tmp_path)
+    assert raised.value.remedy
+
+
+@pytest.mark.parametrize("program", openfoam.PROGRAMS)
+def test_the_first_program_that_failed_is_named(tmp_path: Path, program: str) -> None:
+    leave_logs(tmp_path, "\nEnd\n")
+    (tmp_path / f"log.{program}").unlink()
+    with pytest.raises(SolverError, match=f"{program} has not run"):
+        openfoam.check_log(tmp_path)
+
+
+def test_a_log_cut_anywhere_is_not_a_converged_run(solve: Solve, tmp_path: Path) -> None:
+    log = (solve(PILE) / "log.simpleFoam").read_text()
+    whole = log.rstrip()
+    for kept in [*range(0, len(whole), 997), len(whole) - 1, len(whole) - 4]:
+        leave_logs(tmp_path, "")
+        (tmp_path / "log.simpleFoam").write_text(log[:kept])
+        with pytest.raises(SolverError):
+            openfoam.check_log(tmp_path)
+
+
+def pretend(directory: Path, stated: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for program in openfoam.PROGRAMS:
+        (directory / program).write_text(f"#!/bin/sh\necho '{stated}'\n")
+        (directory / program).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{directory}:/usr/bin:/bin")
+
+
+def test_the_version_that_is_here() -> None:
+    assert openfoam.version() in openfoam.TRIED
+
+
+@pytest.mark.parametrize(
+    ("stated", "cause"),
+    [
+        ("Using: OpenFOAM-v1812 (see www.OpenFOAM.com)", "OpenFOAM 1812 is older than 1912"),
+        ("Using: OpenFOAM-10 (see https://openfoam.org)", "not of the openfoam.com line: .*-10"),
+        ("foo", "not of the openfoam.com line: it states no version"),
+    ],
+)
+def test_versions_that_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stated: str, cause: str
+) -> None:
+    pretend(tmp_path, stated, monkeypatch)
+    with pytest.raises(SolverError, match=cause) as raised:
+        openfoam.version.__wrapped__()
+    assert "`openfoam`" in raised.value.remedy
+
+
+def test_a_later_version_is_not_known_to_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pretend(tmp_path, "Using: OpenFOAM-v2312 (2312) - visit www.openfoam.com", monkeypatch)
+    with pytest.warns(UserWarning, match="2312 has not been tried, 1912 has"):
+        assert openfoam.version.__wrapped__() == "2312"
+
+
+def test_a_missing_program_names_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(SolverError, match="install the Debian package `openfoam`"):
+        openfoam.version.__wrapped__()
+
+
+def test_numbers_of_a_dictionary(tmp_path: Path) -> None:
+    (tmp_path / "parameters").write_text("// a 1;\nspeed 10.5;  // m/s\n\nz0   1e-05;\n")
+    assert openfoam.read_numbers(tmp_path / "parameters") == {"speed": 10.5, "z0": 1e-5}
