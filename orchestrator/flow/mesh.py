@@ -76,9 +76,7 @@ def check_mesh(directory: Path) -> None:
     SolverError
         If it is not.
     """
-    import meshio
-
-    mesh = meshio.read(directory / "pile.msh", file_format="gmsh")
+    mesh = _read(directory)
     missing = GROUPS - mesh.field_data.keys()
     if missing:
         raise _unusable(f"without the physical groups {sorted(missing)}", directory)
@@ -90,6 +88,16 @@ def check_mesh(directory: Path) -> None:
     if inverted:
         raise _unusable(f"with {inverted} inverted cells", directory)
     _check_first_cells(first_cell_heights(mesh), directory)
+
+
+def _read(directory: Path) -> Any:
+    import meshio
+
+    try:
+        # not meshio.read, which ends the program where it cannot read
+        return meshio.gmsh.read(directory / "pile.msh")
+    except (meshio.ReadError, OSError, ValueError, LookupError) as error:
+        raise _unusable(f"not readable: {error}", directory) from error
 
 
 def smallest_jacobian(points: Points, cells: Cells) -> NDArray[np.float64]:

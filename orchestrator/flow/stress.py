@@ -142,10 +142,10 @@ class WallStress:
             If the file is not such a table.
         """
         names = [field.name for field in fields(cls)]
-        header, *rows = path.read_text(encoding="utf-8").splitlines()
-        if header.split(",") != [*names, _DERIVED] or not rows:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        if len(lines) < 2 or lines[0].split(",") != [*names, _DERIVED]:
             raise InputError("not a table of the stress on a bed", where=str(path))
-        table = np.loadtxt(rows, delimiter=",", ndmin=2)
+        table = np.loadtxt(lines[1:], delimiter=",", ndmin=2)
         return cls(**dict(zip(names, table.T[: len(names)].copy(), strict=True)))
 
 

@@ -23,7 +23,7 @@ PACKAGE = "openfoam"
 """The Debian package that holds the programs."""
 
 _HOME = "/usr/share/openfoam"
-_STATED = re.compile(r"Using: OpenFOAM-\S* \((\d{4})\)")
+_STATED = re.compile(r"Using: OpenFOAM-(?:v(?P<named>\d{4})|\S* \((?P<api>\d{4})\))")
 _FATAL = re.compile(r"--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\Z)", re.DOTALL)
 _CONVERGED = re.compile(r"^SIMPLE solution converged in (\d+) iterations$", re.MULTILINE)
 _ITERATION = re.compile(r"^Time = (\d+)$", re.MULTILINE)
@@ -49,8 +49,9 @@ def version() -> str:
             + (_line_with("Using:", stated) or "it states no version"),
             remedy=f"put the one of Debian's package `{PACKAGE}` first in PATH",
         )
-    _judge(match[1])
-    return match[1]
+    found = str(match["named"] or match["api"])
+    _judge(found)
+    return found
 
 
 def _require(program: str) -> None:
@@ -104,9 +105,9 @@ def read_last_time(
     """
     import pyvista
 
-    reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
-    if reader.number_time_points < 2:
+    if not any(directory.glob(f"[1-9]*/{arrays[0]}")):
         raise SolverError("no results", where=str(directory), remedy="run ./Allrun there")
+    reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
     # the reader starts at the first time, not at the last
     reader.set_active_time_value(reader.time_values[-1])
     reader.cell_to_point_creation = False
@@ -173,7 +174,11 @@ def _check_crash(program: str, text: str, directory: Path) -> None:
     if "sigFpe::sigHandler" in text:
         raise _diverged(f"floating point exception after {_last_time(text)}", directory)
     if "sigSegv::sigHandler" in text:
-        raise SolverError(f"{program} crashed: segmentation fault", where=str(directory))
+        raise SolverError(
+            f"{program} crashed: segmentation fault after {_last_time(text)}",
+            where=str(directory),
+            remedy=f"run the case again; if it stays, install the package `{PACKAGE}` anew",
+        )
 
 
 def _diverged(how: str, directory: Path) -> SolverError:
