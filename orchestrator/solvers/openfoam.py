@@ -101,7 +101,7 @@ def read_last_time(
     Raises
     ------
     SolverError
-        If the case holds no time but 0.
+        If the case holds no time but 0, or a file of it is broken.
     """
     import pyvista
 
@@ -118,7 +118,17 @@ def read_last_time(
     for array in arrays:
         reader.enable_cell_array(array)
     blocks: Any = reader.read()
-    return blocks["boundary"][patch], blocks["internalMesh"]
+    try:
+        surface, cells = blocks["boundary"][patch], blocks["internalMesh"]
+        for array in arrays:
+            surface.cell_data[array], cells.cell_data[array]
+    except KeyError as missing:
+        raise SolverError(
+            f"the results are not whole: {missing}",
+            where=str(directory),
+            remedy="is the disk full? Run the case again",
+        ) from missing
+    return surface, cells
 
 
 def check_log(directory: Path) -> int:

@@ -219,6 +219,15 @@ def test_a_run_that_needs_more_iterations(tmp_path: Path) -> None:
         PILE.collect(directory)
 
 
+@pytest.mark.parametrize("name", ["wallShearStress", "U", "../constant/polyMesh/points"])
+def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) -> None:
+    copy = Path(shutil.copytree(solve(PILE), tmp_path / "copy"))
+    file = next(copy.glob("[1-9]*")) / name
+    os.truncate(file, file.stat().st_size * 9 // 10)
+    with pytest.raises(SolverError, match="the results are not whole"):
+        PILE.collect(copy)
+
+
 def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
     with pytest.raises(SolverError, match=r"z_e goes from .* with first cells of 0.002 m"):
         replace(PILE, first_cell_m=2e-3).collect(solve(PILE))
