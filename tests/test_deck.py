@@ -1,5 +1,7 @@
 """What the decks are given: forces of the grains, files that LIGGGHTS reads."""
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator import closures
+from orchestrator import assets, closures
 from orchestrator.closures import Closure
 from orchestrator.grains import deck
 
@@ -60,7 +62,7 @@ def test_files_hold_every_digit(tmp_path: Path) -> None:
     assert force[0] == "3"
     assert [float(line.split()[1]) for line in force[1:]] == grains.force[2, :, 1].tolist()
     parameters = (tmp_path / "parameters.liggghts").read_text()
-    assert [line.split() for line in parameters.splitlines()] == [
+    assert [line.split()[:4] for line in parameters.splitlines()] == [
         ["variable", "diameter", "equal", "0.001"],
         ["variable", "levels", "equal", "7"],
     ]
@@ -77,6 +79,14 @@ def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
     for axis, (low, high) in enumerate(bounds):
         assert low == pytest.approx(grains.position[:, axis].min() - 0.1)
         assert high == pytest.approx(grains.position[:, axis].max() + 0.1)
+
+
+def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
+    copy = tmp_path / "bed"
+    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert (copy / "levels.csv").read_text().splitlines()[-1].split(",")[3] == "0"
 
 
 def test_ids_of_the_counted_grains() -> None:

@@ -16,6 +16,29 @@ FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
 POWERS = (1.0, 1.5, 1.687, 2.0, 3.0)
 """Exponents of the friction velocity in Eqs. 2 and 4; the deck has a pair of tables for each."""
 
+MEANING = {
+    "diameter": "m",
+    "density": "kg/m3",
+    "gravity": "of the submerged grain, m/s2",
+    "friction": "tan(phi)",
+    "stiffness": "K d/W, normal and tangential",
+    "damping": "ratio of a collision",
+    "timestep": "sqrt(m/K)",
+    "first": "flow of the first hold",
+    "rise": "flow of a hold over that of the one before",
+    "levels": "most holds",
+    "quiet": "a hold ends when nothing has passed for this long, sqrt(d/g')",
+    "look": "time between two looks at the grains, sqrt(d/g')",
+    "settle": "time before the first hold, sqrt(d/g')",
+    "settle_flow": "flow meanwhile, over that of the first hold",
+    "marker": "displacement along the bed that counts as motion, d",
+    "enough": "the end: no more counted grains than this still lie",
+    "slope": "of both faces, degrees",
+    "ceiling_x": "ridge of the roof above which a grain in flight is gone, m",
+    "ceiling_z": "its height, m",
+}
+"""Parameters of the deck, with their units."""
+
 
 @dataclass(frozen=True)
 class GrainTable:
@@ -90,7 +113,10 @@ def write(
     (directory / "grains.data").write_text(_data_file(grains, margin))
     # float() because a numpy number's repr is not one that the deck could read
     numbers = {k: v if isinstance(v, int) else float(v) for k, v in parameters.items()}
-    lines = (f"variable        {name} equal {value!r}\n" for name, value in numbers.items())
+    lines = (
+        f"variable        {name} equal {value!r}  # {MEANING[name]}\n"
+        for name, value in numbers.items()
+    )
     (directory / "parameters.liggghts").write_text("".join(lines))
     for power, vectors in zip(POWERS, grains.force, strict=True):
         _write_vectors(directory / "force", f"{power}.", vectors)

@@ -208,4 +208,3 @@ class PileCase(GrainCase):
             diameter=d,
             density=self.scene.grain.density,
         )
-
