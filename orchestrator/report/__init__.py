@@ -1,0 +1,54 @@
+"""Figures and page of a study."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from orchestrator.plan import Plan
+    from orchestrator.study import Study
+    from orchestrator.tables import Tables
+
+PAGE = "report.html"
+FIGURES = "figures"
+
+
+def write(
+    study: "Study",
+    plan: "Plan",
+    tables: "Tables",
+    timings: "pd.DataFrame",
+    failures: Mapping[str, str],
+    out: Path,
+) -> Path:
+    """Draw the figures of a study and write its page.
+
+    Parameters
+    ----------
+    study, plan, tables
+        As the pipeline made them.
+    timings : DataFrame
+        Wall times of the finished cases.
+    failures : mapping of str to str
+        The cases that failed, with why.
+    out : Path
+        The study's directory: it holds ``cases`` and gets ``figures`` and the page.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    # the drawing libraries take half a second to import: only who draws waits for them
+    from orchestrator.files import write_durably
+    from orchestrator.report import gallery, page
+    from orchestrator.report.results import Results
+
+    results = Results(study, plan, tables, out / "cases")
+    folder = out / FIGURES
+    folder.mkdir(exist_ok=True)
+    figures = list(gallery.draw(results, folder))
+    write_durably(out / PAGE, page.render(results, figures, timings, failures))
+    return out / PAGE

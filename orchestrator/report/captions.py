@@ -1,0 +1,189 @@
+"""What must be said under each figure."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from orchestrator import curves
+from orchestrator.grains.pile import PileCase
+from orchestrator.report import labels, reference, theory
+from orchestrator.report.results import Results, valid
+from orchestrator.report.snapshot import Snapshot
+
+DRAG_LAW = (
+    "Right of the line “drag law ends” V_f d/ν exceeds 1000, up to which the drag law of Eq. 4 "
+    "(Schiller and Naumann) holds."
+)
+HOLLOW = (
+    "Hollow markers: the forces are those of a closure that does not hold at the scene’s own "
+    "single-grain threshold (transition)."
+)
+
+
+def listed(values: Iterable[float], scale: float = 1) -> str:
+    """Numbers for a sentence."""
+    return ", ".join(f"{value * scale:.6g}" for value in sorted(set(values)))
+
+
+def closed_form(scenes: pd.DataFrame, by: str, number: int) -> str:
+    """Of the closed form by entrainment angle or by slope."""
+    what = "entrainment angle β" if by == "beta_deg" else "slope α (the flow goes up it)"
+    low, high = (edge * 1e3 for edge in theory.SWEEP_M)
+    return (
+        f"After Fig. {number} of the paper. Threshold stress of one grain against the friction "
+        f"Reynolds number, by {what}: Eq. 3 for Re* < 3 and Eq. 5 for Re* ≥ 30, with δ = z₀, "
+        f"swept over d = {low:g} … {high:g} mm at ν = {listed(scenes['nu_m2_s'])} m²/s (in this "
+        "diagram ν and the densities only say which part of a line a grain is on). Solid where the "
+        "equation holds, dotted where for the same grain neither does; such a grain’s Re* can lie "
+        f"outside the shaded range by one of the two. {DRAG_LAW} {_references(scenes, by)}"
+    )
+
+
+def _references(scenes: pd.DataFrame, by: str) -> str:
+    air = reference.air_lines(scenes)
+    if by == "alpha_deg":
+        sloped = (
+            f"Dashed: the curve of {reference.SLOPED} for horizontal beds in air, times "
+            "√(cos α + sin α/tan φ) on u*. "
+        )
+        return (sloped if air else "") + "Curves for water are for horizontal beds: none is drawn."
+    water = (
+        "Blue: the spread of published curves for water, between the lowest and the highest "
+        "wherever at least two were published for that Re*; thin lines are the curves themselves "
+        f"({'; '.join(curve.name for curve in curves.WATER)}). They are fits, not measured points."
+    )
+    brown = (
+        " Brown: curves for grains in air, of this study’s grains and gas over the same diameters "
+        f"({', '.join(air)}; the latter two include cohesion, Bagnold’s holds for Re* > "
+        f"{reference.BAGNOLD_FROM:g})."
+    )
+    return water + (brown if air else "")
+
+
+def hold_protocol(rows: pd.DataFrame) -> str:
+    """How thresholds were measured."""
+    return (
+        f"Hold protocol: u* is raised in steps of {listed(rows['step'], 100)} %, each flow is kept "
+        f"until for {listed(rows['quiet'])} √(d/g′) no grain has passed {listed(rows['marker'])} d "
+        "along the bed; such a grain has moved."
+    )
+
+
+def grain_dem(points: pd.DataFrame, number: int) -> str:
+    """Of the single grains by DEM on the lines of the closed form."""
+    return (
+        f"After Fig. {number} of the paper. Markers: thresholds of one mobile sphere on its two "
+        "fixed neighbours, by LIGGGHTS; lines, band and curves as in the figure before. "
+        f"{hold_protocol(points)} Bars run from the last hold without to the first with motion; "
+        f"most are smaller than the markers. {HOLLOW if not valid(points).all() else ''}"
+    )
+
+
+def accuracy(dem: pd.DataFrame) -> str:
+    """Of the ratio of DEM and closed form."""
+    ratio = dem["ustar_m_s"] / dem["ustar_closed_form_m_s"] - 1
+    holds = valid(dem)
+    parts = []
+    for chosen, name in ((holds, "where its closure holds"), (~holds, "where it does not")):
+        if ratio[chosen].notna().any():
+            parts.append(f"{ratio[chosen].abs().max():.2%} {name}")
+    return (
+        "Friction velocity at the threshold by DEM over that of Eq. 3 or 5 with the same forces. "
+        "Bars: between the holds without and with motion, so a threshold met exactly lies within "
+        f"its bar. Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
+        + (HOLLOW if not holds.all() else "")
+    )
+
+
+def stress(results: Results, piles: list[PileCase]) -> str:
+    """Of the friction velocity along the bed."""
+    mean, crest = eq10_over_wall(results, [pile.flow.name for pile in piles])
+    return (
+        "Signed friction velocity along the bed over the undisturbed u*₀ = 0.41 U_e/ln((10 h + "
+        "z₀)/z₀). Black: from the wall shear stress of the OpenFOAM solution; blue: Eq. 10 at the "
+        "centre of the first cell, with the logarithm of the rough wall and as printed. Eq. 10 is "
+        f"{mean:+.0%} from the wall stress’s u* on the mean of the windward face and {crest:+.0%} "
+        "at the crest: a model uncertainty of every threshold of a pile. The crest is a spike of "
+        "one cell that does not converge with the mesh; therefore a grain feels the stress "
+        "averaged over max(d, h/40) of bed (orange). Shaded: flow that runs back. Below: the bed, "
+        "heights exaggerated."
+    )
+
+
+def eq10_over_wall(results: Results, flow_cases: Iterable[str]) -> tuple[float, float]:
+    """Relative difference of u* by Eq. 10: mean of the windward faces, largest at their crests."""
+    table = results.tables["wall_stress"]
+    means, crests = [], []
+    for name in flow_cases:
+        rows = table[table["flow_case"] == name]
+        bed = results.flows[name].bed
+        face = rows[
+            (rows["s_m"] > 0) & (rows["s_m"] < bed.height / np.sin(np.radians(bed.slope_deg)))
+        ]
+        wall, eq10 = face["ustar_over_ustar0_wall"], face["ustar_over_ustar0_eq10"]
+        means.append(eq10.mean() / wall.mean() - 1)
+        crests.append(eq10.max() / wall.max() - 1)
+    return float(np.mean(means)), float(np.max(crests))
+
+
+def fractions(rows: pd.DataFrame) -> str:
+    """Of n/N against the flow."""
+    return (
+        "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
+        "had moved by the end of each hold (one marker), against Re* (left) and τ (right) of the "
+        "mean signed wall stress over the grains that had moved, as in the paper: the mean falls "
+        "where the next grains to move feel less. Circles, dashed: forces of Eq. 2; squares: of "
+        "Eq. 4. "
+        f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
+    )
+
+
+def extended(rows: pd.DataFrame) -> str:
+    """Of the extended Shields diagram."""
+    return (
+        "After Figs. 15 and 16 of the paper. Mean signed wall stress over the grains that had "
+        "moved when their fraction first reached n/N; thin lines join the piles of one fraction. "
+        "Bars hold the step between two flows and the count’s resolution of half a grain; Re* is "
+        "that of the marker’s stress. A fraction that was not reached has no marker. Black: the "
+        "closed form of one grain at the same slope, entrainment angle and z₀/d, solid where it "
+        "holds. "
+        f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
+        f"{DRAG_LAW} {_references(rows, 'alpha_deg')}"
+    )
+
+
+def low_regime(rows: pd.DataFrame) -> str:
+    """The assumption behind piles in a fluid made viscous."""
+    if rows["nu_m2_s"].nunique() < 2:
+        return ""
+    return (
+        "Points at a raised ν use the stress field of the rough turbulent flow at the flow’s own "
+        "ν: there ν moves the grain’s Re* only, an assumption. "
+    )
+
+
+def flow(piles: list[PileCase]) -> str:
+    """Of the picture of the flow."""
+    speeds = listed(pile.scene.flow.speed for pile in piles)
+    return (
+        "Steady turbulent flow by OpenFOAM (k-ε, rough wall), at the last iteration, for U_e = "
+        f"{speeds} m/s; the fields of other speeds are taken to be similar. White: streamlines, "
+        "the closed ones around the flow that runs back, at arbitrary spacing. Only the part near "
+        "the pile is shown: the lid is at 10 h. To scale."
+    )
+
+
+def grains(pile: PileCase, found: Snapshot) -> str:
+    """Of the picture of the grains."""
+    ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
+    return (
+        f"After Fig. 13 of the paper. The instant when {found.fraction:.0%} of the N = "
+        f"{int(pile.packing.count)} exposed windward grains had moved: hold {found.hold}, u*₀ = "
+        f"{found.ustar0:.3g} m/s, z₀ = {ratio}, {pile.bed.packing} packing, forces of "
+        f"{'Eq. 2' if pile.scene.closure == 'low' else 'Eq. 4'}. Colour: distance from the grain’s "
+        f"place in the packing; a grain counts as moved from {pile.scene.protocol.marker:g} d "
+        "downstream along the bed. Hollow: grains that had left the box, where they lay. Exposed "
+        "windward grains are drawn at that instant, other mobile ones (which hardly move) at the "
+        "end of the hold. The pile’s inside, which cannot move, is not part of the case."
+    )

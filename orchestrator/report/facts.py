@@ -1,0 +1,235 @@
+"""What the page says in words and numbers beside its figures."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from platform import python_version
+
+import pandas as pd
+
+from orchestrator import __version__
+from orchestrator.case import IDENTITY
+from orchestrator.files import read_json
+from orchestrator.report import labels
+from orchestrator.report.results import Results, split, valid, varying
+from orchestrator.tables import COLUMNS
+
+PACKAGES = (
+    "gmsh",
+    "jinja2",
+    "matplotlib",
+    "meshio",
+    "numpy",
+    "pandas",
+    "pyarrow",
+    "pydantic",
+    "pyvista",
+    "vtk",
+)
+PARAMETERS = (
+    "alpha_deg",
+    "beta_deg",
+    "phi_deg",
+    "d_m",
+    "rho_sol_kg_m3",
+    "rho_f_kg_m3",
+    "nu_m2_s",
+    "g_m_s2",
+    "z0_over_d",
+    "h_m",
+    "packing",
+    "mobile_layers",
+    "closure",
+    "stress",
+    "alpha_s",
+    "stiffness",
+    "damping",
+    "step",
+    "quiet",
+    "marker",
+)
+"""Columns of the table of scenes that the page lists."""
+MANY = 12
+"""Values of a parameter beyond which only their range is listed."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table of the page: its columns' heads, and its rows."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def piles(results: Results) -> Sheet | None:
+    """The thresholds of the piles, a row for each, with the name of its case last."""
+    found = results.joined("pile_threshold")
+    if found.empty:
+        return None
+    extra = varying(found)
+    fractions = sorted(set(found["fraction"]))
+    heads = (f"τ_c at n/N = {fraction:.0%}" for fraction in fractions)
+    choices = ("choices",) if extra else ()
+    head = ("pile: α, d, z₀", "forces, ν in m²/s", *choices, "N", *heads, "case")
+    rows = []
+    for _, own in split(found, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
+        first = own.iloc[0]
+        cells = {row["fraction"]: _threshold(row) for _, row in own.iterrows()}
+        reached = (cells.get(fraction, "—") for fraction in fractions)
+        rows.append((*_pile(first, extra), str(first["count"]), *reached, str(first["case"])))
+    return Sheet(head, tuple(rows))
+
+
+def _pile(row: pd.Series, extra: tuple[str, ...]) -> tuple[str, ...]:
+    forces = "Eq. 2" if row["closure"] == "low" else "Eq. 4"
+    holds = row["closure"] == row["regime"]
+    cells = (
+        f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
+        f"{labels.ratio_of_d(row['z0_over_d'])}",
+        f"{forces}, {row['nu_m2_s']:g}" + ("" if holds else "\n(does not hold)"),
+    )
+    chosen = "\n".join(f"{column} {row[column]}" for column in extra)
+    return (*cells, chosen) if extra else cells
+
+
+def _threshold(row: pd.Series) -> str:
+    if pd.isna(row["shields"]):
+        return f"not reached\n(highest n/N {row['highest_fraction']:.0%})"
+    low, high = sorted((row["shields_low"], row["shields_high"]))
+    return f"{row['shields']:.4f}\n({low:.4f} … {high:.4f})\nu*₀ {row['ustar0_m_s']:.3f} m/s"
+
+
+def single_grains(results: Results) -> Sheet | None:
+    """How far DEM is from the closed form, by closure and whether it holds."""
+    found = results.joined("single_grain")
+    if found.empty:
+        return None
+    ratio = found["ustar_m_s"] / found["ustar_closed_form_m_s"]
+    width = (found["ustar_high_m_s"] - found["ustar_low_m_s"]) / found["ustar_closed_form_m_s"] / 2
+    table = found.assign(holds=valid(found), ratio=ratio, width=width)
+    rows = []
+    for (closure, holds), own in split(table, "closure", "holds"):
+        equation = "Eqs. 2, 3" if closure == "low" else "Eqs. 4, 5"
+        far = (own["ratio"] - 1).abs()
+        rows.append(
+            (
+                equation,
+                "yes" if holds else "no (transition)",
+                str(len(own)),
+                str(int(own["ratio"].isna().sum())),
+                f"{own['ratio'].mean() - 1:+.3%}",
+                f"{far.max():.3%}",
+                f"±{own['width'].median():.3%}",
+            )
+        )
+    head = (
+        "forces",
+        "closure holds",
+        "grains",
+        "never moved",
+        "mean of u*/u*(closed form) − 1",
+        "largest |u*/u*(closed form) − 1|",
+        "median half width of the interval",
+    )
+    return Sheet(head, tuple(sorted(rows, key=lambda row: row[:2], reverse=True)))
+
+
+def parameters(results: Results) -> Sheet:
+    """The values that each parameter of the scenes takes."""
+    rows = []
+    for column in PARAMETERS:
+        values = list(results.scenes[column].dropna().unique())
+        if values:
+            rows.append((column, COLUMNS[column], _values(values)))
+    return Sheet(("column", "meaning", "values"), tuple(rows))
+
+
+def _values(values: list[object]) -> str:
+    if all(isinstance(value, str) for value in values):
+        return ", ".join(sorted(map(str, values)))
+    numbers = sorted(float(str(value)) for value in values)
+    if len(numbers) > MANY:
+        return f"{len(numbers)} from {numbers[0]:.6g} to {numbers[-1]:.6g}"
+    return ", ".join(f"{number:.6g}" for number in numbers)
+
+
+def programs(results: Results) -> Sheet:
+    """The solvers by what the cases say of them, and the libraries."""
+    used: dict[str, set[str]] = {}
+    for name in results.plan.cases:
+        identity = read_json(results.cases / name / IDENTITY)
+        found = identity.get("programs", {}) if isinstance(identity, dict) else {}
+        for program, version in found.items():
+            used.setdefault(str(program), set()).add(str(version))
+    rows = [(program, ", ".join(sorted(versions))) for program, versions in sorted(used.items())]
+    rows += [("orchestrator", __version__), ("Python", python_version())]
+    return Sheet(("program", "version"), (*rows, *_installed(PACKAGES)))
+
+
+def _installed(packages: Iterable[str]) -> Iterable[tuple[str, str]]:
+    for package in packages:
+        try:
+            yield package, metadata.version(package)
+        except metadata.PackageNotFoundError:
+            yield package, "not installed"
+
+
+def times(timings: pd.DataFrame) -> Sheet | None:
+    """Wall time of the finished cases by their kind: in the solver, and outside it."""
+    if timings.empty:
+        return None
+    rows = []
+    for (kind,), own in split(timings, "kind"):
+        rows.append(_spent(str(kind), own))
+    head = ("kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s")
+    return Sheet(head, (*rows, _spent("all", timings)))
+
+
+def _spent(name: str, rows: pd.DataFrame) -> tuple[str, ...]:
+    wall = rows["solver_s"] + rows["outside_s"]
+    seconds = (rows["solver_s"].sum(), rows["outside_s"].sum(), wall.max())
+    return (name, str(len(rows)), *(f"{value:.1f}" for value in seconds))
+
+
+def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
+    """What a reader must know of this study's results before using them."""
+    found = []
+    if failures:
+        found.append(f"Cases that failed: {len(failures)}. The figures lack them; see below.")
+    transition = results.scenes["regime"] == "transition"
+    if transition.any():
+        found.append(
+            f"Scenes in the transition, where neither closure holds: {int(transition.sum())} of "
+            f"{len(transition)}. Both closures were run unless the study names one; their markers "
+            "are hollow."
+        )
+    thresholds = results.joined("pile_threshold")
+    if len(thresholds) and thresholds["shields"].isna().any():
+        missing = int(thresholds["shields"].isna().sum())
+        found.append(f"Thresholds of piles that were not reached: {missing} of {len(thresholds)}.")
+    curve = results.joined("pile_curve")
+    if len(curve) and (curve["fallen_upstream"] > 0).any():
+        most = curve.groupby("scene_id")["fallen_upstream"].max()
+        found.append(
+            f"Piles in which grains fell upstream: {int((most > 0).sum())}, up to "
+            f"{int(most.max())} grains of one; unless such a grain also passed the marker it has "
+            "not moved."
+        )
+    return [*found, *_stray_grains(results)]
+
+
+def _stray_grains(results: Results) -> list[str]:
+    grains = results.joined("single_grain")
+    if grains.empty:
+        return []
+    far = (grains["ustar_m_s"] / grains["ustar_closed_form_m_s"] - 1).abs() > 0.01
+    silent = grains["ustar_m_s"].isna()
+    found = []
+    if far.any():
+        found.append(
+            f"Single grains more than 1 % from the closed form: {int(far.sum())}, of which "
+            f"{int((far & valid(grains)).sum())} where their closure holds."
+        )
+    if silent.any():
+        found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
+    return found

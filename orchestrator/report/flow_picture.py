@@ -1,0 +1,112 @@
+"""The flow over a pile: speed, streamlines, the region that runs back."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
+
+from orchestrator.grains.pile import PileCase
+from orchestrator.report import captions, stress, style
+from orchestrator.report.figure import Figure
+from orchestrator.report.picture import Picture
+from orchestrator.report.results import Results
+
+FloatArray = NDArray[np.float64]
+
+BEFORE, BEHIND, ABOVE = 2.0, 8.0, 3.0
+"""Flow shown before the windward toe, behind the lee toe, and above the flat bed, h."""
+COLUMNS = 1400
+Window = tuple[float, float, float, float]
+
+
+def plan(results: Results, folder: Path) -> Iterator[Picture]:
+    """One figure with a panel for each slope and height, at its least z0."""
+    chosen: dict[tuple[float, float], PileCase] = {}
+    for pile in stress.choose(results):
+        chosen.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
+    if not chosen:
+        return
+    piles = list(chosen.values())
+    window = _window(piles)
+    names = tuple(pile.flow.name for pile in piles)
+    yield Picture(
+        Figure("flow", "Flow over the pile", captions.flow(piles), names, None),
+        tuple(_job(results.cases, pile, window, folder) for pile in piles),
+        lambda: _frame(piles, window, folder),
+    )
+
+
+def _window(piles: list[PileCase]) -> Window:
+    """Left, right, bottom, top, h; the same for all panels."""
+    toe = max(2 / float(np.tan(np.radians(pile.bed.slope_deg))) for pile in piles)
+    return -BEFORE, toe + BEHIND, 0.0, ABOVE
+
+
+def _job(cases: Path, pile: PileCase, window: Window, folder: Path) -> dict[str, object]:
+    left, right, bottom, top = window
+    rows = round(COLUMNS * (top - bottom) / (right - left))
+    return {
+        "kind": "flow",
+        "case": str((cases / pile.flow.name).resolve()),
+        "window": [edge * pile.bed.height for edge in window],
+        "shape": [rows, COLUMNS],
+        "out": str(_file(folder, pile)),
+    }
+
+
+def _file(folder: Path, pile: PileCase) -> Path:
+    return folder / f"{pile.flow.name}.npy"
+
+
+def _frame(piles: list[PileCase], window: Window, folder: Path) -> Canvas:
+    figure = style.canvas(1.5 * len(piles) + 0.8)
+    axes = list(figure.subplots(len(piles), 1, sharex=True, squeeze=False)[:, 0])
+    for ax, pile in zip(axes, piles, strict=True):
+        image = _panel(ax, pile, window, np.load(_file(folder, pile)))
+    axes[-1].set_xlabel("$x/h$ from the windward toe")
+    bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
+    bar.set_label(r"speed over that at the lid, $|\mathbf{u}|/U_e$")
+    return figure
+
+
+def _panel(ax: Axes, pile: PileCase, window: Window, velocity: FloatArray) -> AxesImage:
+    relative = velocity / pile.scene.flow.speed
+    speed = np.linalg.norm(relative, axis=-1)
+    image = ax.imshow(speed, origin="lower", extent=window, cmap="viridis", vmin=0, vmax=1.1)
+    _streamlines(ax, window, relative)
+    half = 1 / np.tan(np.radians(pile.bed.slope_deg))
+    ax.fill([0, half, 2 * half], [0, 1, 0], color=style.BED, lw=0)
+    x = [window[0], 0, half, 2 * half, window[1]]
+    ax.plot(x, [0, 0, 1, 0, 0], color="0.2", lw=0.8, gid="bed")
+    ax.set(ylabel="$z/h$", aspect="equal", xlim=window[:2], ylim=window[2:], yticks=[0, 1, 2, 3])
+    ax.set_title(stress.title(pile), loc="left")
+    return image
+
+
+def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
+    """Contours of the stream function.
+
+    Outside the region that runs back it is integrated from above, inside it from the bed: each
+    where the flow is smooth and the function small.
+    """
+    rows, columns, _ = velocity.shape
+    x, z = np.linspace(*window[:2], columns), np.linspace(*window[2:], rows)
+    u, w = velocity[..., 0], velocity[-1, :, 2]
+    above_bed = _integral(np.nan_to_num(u), z[1] - z[0])
+    through_top = above_bed[-1, 0] - _integral(w, x[1] - x[0])
+    from_above = through_top - (above_bed[-1] - above_bed)
+    forward = np.linspace(0, above_bed[-1, 0], 12)[1:]
+    back = np.nanmin(above_bed) * np.array([0.9, 0.6, 0.3])
+    for psi, levels in ((from_above, forward), (above_bed, back[back < 0])):
+        inside = np.where(np.isnan(u), np.nan, psi)
+        ax.contour(x, z, inside, levels, colors="white", linewidths=0.45, linestyles="solid")
+
+
+def _integral(values: FloatArray, step: float) -> FloatArray:
+    """Cumulative, by the trapezoidal rule, along the first axis."""
+    pieces = (values[1:] + values[:-1]) * step / 2
+    return np.concatenate([0 * values[:1], np.cumsum(pieces, axis=0)])

@@ -1,0 +1,105 @@
+"""The page of a study: one file that needs no other and no network."""
+
+import base64
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
+
+from orchestrator.report import captions, facts
+from orchestrator.report.figure import Figure
+from orchestrator.report.results import Results
+
+FOLDER = Path(__file__).parent
+
+
+def render(
+    results: Results,
+    figures: Sequence[tuple[Figure, bytes]],
+    timings: pd.DataFrame,
+    failures: Mapping[str, str],
+) -> str:
+    """The page's HTML.
+
+    Parameters
+    ----------
+    results : Results
+        What the study gave.
+    figures : sequence of (Figure, bytes)
+        The figures with their PNG; no bytes where one is missing.
+    timings : DataFrame
+        Wall times of the finished cases.
+    failures : mapping of str to str
+        Causes by name of case.
+    """
+    return _template().render(
+        study=results.study,
+        css=(FOLDER / "page.css").read_text(encoding="utf-8"),
+        scene_count=len(results.scenes),
+        case_count=len(results.plan.cases),
+        piles=facts.piles(results),
+        single_grains=facts.single_grains(results),
+        remarks=facts.remarks(results, failures),
+        figures=[_entry(figure, png) for figure, png in figures],
+        failures=failures,
+        links=links(results),
+        tables=list(results.tables),
+        parameters=facts.parameters(results),
+        programs=facts.programs(results),
+        times=facts.times(timings),
+        **_flow_facts(results),
+        **_examples(results),
+    )
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=FileSystemLoader(FOLDER),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.filters["typeset"] = typeset
+    return environment.get_template("page.html.j2")
+
+
+def typeset(text: str) -> Markup:
+    """HTML of a text in which ``V_f`` has an index; for the package's own texts."""
+    return Markup(re.sub(r"(?<=\w)_([A-Za-z]+)", r"<sub>\1</sub>", str(escape(text))))
+
+
+def _entry(figure: Figure, png: bytes) -> dict[str, Any]:
+    data = base64.b64encode(png).decode("ascii")
+    kept = ("name", "title", "caption", "cases", "missing")
+    return {"data": data, **{name: getattr(figure, name) for name in kept}}
+
+
+def links(results: Results) -> dict[str, str]:
+    """A link to the directory of each case that has one, relative to the page."""
+    root = results.cases.name
+    names = (name for name in results.plan.cases if (results.cases / name).is_dir())
+    return {name: quote(f"{root}/{name}/") for name in names}
+
+
+def _flow_facts(results: Results) -> dict[str, Any]:
+    if not results.flows:
+        return {"wall_stress": False}
+    mean, crest = captions.eq10_over_wall(results, results.flows)
+    return {"wall_stress": True, "eq10_mean": mean, "eq10_crest": crest}
+
+
+def _examples(results: Results) -> dict[str, str]:
+    names = list(links(results))
+    foams = (path for name in names for path in sorted((results.cases / name).glob("*.foam")))
+    foam = next(foams, None)
+    return {
+        "example_case": names[-1] if names else "NAME",
+        "example_foam": f"{foam.parent.name}/{foam.name}" if foam else "",
+    }

@@ -1,0 +1,70 @@
+"""Published thresholds to compare with: a band for water, lines for air."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from orchestrator import curves
+from orchestrator.curves import Air
+from orchestrator.report.theory import SWEEP_M
+
+FloatArray = NDArray[np.float64]
+
+LEAST_CURVES = 2
+"""The band is drawn only where at least this many curves were published for."""
+BAGNOLD_FROM = 3.5
+"""Bagnold's A is 0.1 above this Re* only; it rises below."""
+SLOPED = "Shao & Lu 2000"
+"""The curve for air that is drawn for sloping beds."""
+GAS_RATIO = 100.0
+"""Least rho_sol/rho_f of a fluid that curves for air may be compared with."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """The spread of the curves for water; arrays of one shape, NaN outside their common ranges."""
+
+    reynolds: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def water_band(reynolds: FloatArray) -> Band:
+    """Lowest and highest of the published curves at each Re* that at least two of them cover."""
+    logs = np.log(reynolds)
+    rows = []
+    for curve in curves.WATER:
+        x, theta = curve.points()
+        rows.append(np.exp(np.interp(logs, np.log(x), np.log(theta), left=np.nan, right=np.nan)))
+    table = np.array(rows)
+    enough = np.isfinite(table).sum(axis=0) >= LEAST_CURVES
+    inside = np.where(np.isfinite(table), table, [[np.inf]])
+    low = np.where(enough, inside.min(axis=0), np.nan)
+    high = np.where(enough, np.where(np.isfinite(table), table, -np.inf).max(axis=0), np.nan)
+    return Band(reynolds, low, high)
+
+
+def water_names() -> str:
+    """The curves behind the band, for a caption."""
+    return "; ".join(curve.name for curve in curves.WATER)
+
+
+def air_lines(
+    scenes: pd.DataFrame, slope_deg: float = 0.0
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
+
+    The slope's factor of physics is on u*. Empty where the fluid is no gas.
+    """
+    one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
+    if one["rho_sol_kg_m3"] < GAS_RATIO * one["rho_f_kg_m3"]:
+        return {}
+    air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
+    d = np.geomspace(*SWEEP_M, 200)
+    factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])
+    lines = {name: air.shields_diagram(d, factor * f(d, air)) for name, f in curves.AIR.items()}
+    x, y = lines["Bagnold 1941"]
+    lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]
+    return lines

@@ -1,0 +1,82 @@
+"""What a report draws from: the study, its cases and its tables."""
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.grains.pile import PileCase
+from orchestrator.plan import Plan
+from orchestrator.study import Study
+from orchestrator.tables import Tables
+
+PHYSICS = ("phi_deg", "alpha_s", "h_m", "packing", "stress")
+"""Columns that part the panels of a figure wherever a study varies them."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """A study with all that came of it.
+
+    Attributes
+    ----------
+    study, plan, tables
+        As the pipeline made them.
+    cases : Path
+        The directory of the study's cases.
+    """
+
+    study: Study
+    plan: Plan
+    tables: Tables
+    cases: Path
+
+    @cached_property
+    def scenes(self) -> pd.DataFrame:
+        """Every scene once, whichever groups asked for it."""
+        return self.tables["scenes"].drop_duplicates("scene_id").reset_index(drop=True)
+
+    def beds(self, kind: str) -> pd.DataFrame:
+        """The scenes with one kind of bed."""
+        return self.scenes[self.scenes["bed"] == kind]
+
+    def joined(self, name: str) -> pd.DataFrame:
+        """A table with the columns of its rows' scenes beside its own, or an empty one."""
+        table = self.tables.get(name, pd.DataFrame())
+        if table.empty:
+            return pd.DataFrame()
+        extra = [column for column in self.scenes if column not in table or column == "scene_id"]
+        return table.merge(self.scenes[extra], on="scene_id", how="left", validate="many_to_one")
+
+    def values(self, column: str) -> list[float]:
+        """The values that the study's scenes have in a column, rising."""
+        return sorted({float(value) for value in self.scenes[column].dropna()})
+
+    @cached_property
+    def flows(self) -> dict[str, PileCase]:
+        """A pile for each flow case whose stress is in the tables, by the flow case's name."""
+        stress = self.tables.get("wall_stress", pd.DataFrame())
+        done = set() if stress.empty else set(stress["flow_case"])
+        piles = self.plan.piles.values()
+        return {pile.flow.name: pile for pile in piles if pile.flow.name in done}
+
+
+def split(
+    table: pd.DataFrame, *columns: str
+) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
+    """The parts of a table that agree in some columns, with what they agree in, in rising order."""
+    if len(table):
+        yield from table.groupby(list(columns), sort=True, dropna=False)
+
+
+def varying(table: pd.DataFrame) -> tuple[str, ...]:
+    """Which of the columns that part panels differ within a table."""
+    return tuple(c for c in PHYSICS if c in table and table[c].nunique(dropna=False) > 1)
+
+
+def valid(table: pd.DataFrame) -> pd.Series:
+    """Whether the closure of each row holds at its scene's own single-grain threshold."""
+    return pd.Series(np.asarray(table["closure"] == table["regime"]), index=table.index)

@@ -1,0 +1,169 @@
+"""The Shields diagram: axes, what is known of them, closed-form lines and points with intervals."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from orchestrator import curves
+from orchestrator.closures import HIGH_FROM, LOW_BELOW
+from orchestrator.report import labels, reference, style
+from orchestrator.report.results import valid
+from orchestrator.report.theory import Branch, drag_law_limit
+
+FloatArray = NDArray[np.float64]
+
+AIR_STYLES = ("-.", "--", (0, (1, 1)))
+RESULT = ("closed form", "points", "points, closure not valid")
+"""Marks of the artists that the limits of the axes must hold."""
+WATER = "water curve"
+
+
+def prepare(
+    axes: Sequence[Axes],
+    z0_over_d: Sequence[float],
+    marks: tuple[str, ...] = RESULT,
+    margin: float = 1.6,
+) -> None:
+    """Logarithmic axes, the transition, and the drag law's limit at each z0/d.
+
+    Call it when all else is drawn; the axes share their limits, which reach from the artists of
+    some marks outwards by a factor.
+    """
+    reynolds = _extent(axes, 0, marks, (0, np.inf))
+    xlim = reynolds[0] / margin, reynolds[1] * 2
+    shields = _extent(axes, 1, (*RESULT, WATER), xlim)
+    for ax, ratio in zip(axes, z0_over_d, strict=True):
+        ax.set(xscale="log", yscale="log", ylabel=labels.TAU_AXIS)
+        ax.set(xlim=xlim, ylim=(shields[0] / 1.6, shields[1] * 2.2))
+        style.plain_ticks(ax.xaxis)
+        style.plain_ticks(ax.yaxis)
+        shade_transition(ax)
+        mark_drag_law(ax, drag_law_limit(ratio))
+    label_lowest(axes, labels.RE_AXIS)
+
+
+def _extent(
+    axes: Sequence[Axes], column: int, marks: tuple[str, ...], xlim: tuple[float, float]
+) -> tuple[float, float]:
+    lines = [line.get_xydata() for ax in axes for line in ax.lines if line.get_gid() in marks]
+    xy = np.concatenate([np.asarray(line, float) for line in lines])
+    inside = xy[(xy[:, 0] >= xlim[0]) & (xy[:, 0] <= xlim[1]), column]
+    return float(np.nanmin(inside)), float(np.nanmax(inside))
+
+
+def label_lowest(axes: Sequence[Axes], label: str) -> None:
+    """Name the x axis of the panels that have none below them."""
+    for ax in axes:
+        place = ax.get_subplotspec()
+        if place is None or place.is_last_row():
+            ax.set_xlabel(label)
+
+
+def shade_transition(ax: Axes) -> None:
+    """Shade where neither closure holds, as far as the axes show it."""
+    left, right = ax.get_xlim()
+    left, right = max(left, LOW_BELOW), min(right, HIGH_FROM)
+    if left < right:
+        ax.axvspan(left, right, color="0.93", zorder=0, gid="transition")
+        if right > 1.5 * left:
+            style.note(ax, float(np.sqrt(left * right)), "transition")
+
+
+def mark_drag_law(ax: Axes, limit: float) -> None:
+    """A line where the drag law of Eq. 4 ends, if the axes reach it."""
+    if ax.get_xlim()[1] > limit:
+        ax.axvline(limit, color="0.4", lw=0.7, ls=(0, (4, 2)), zorder=0.5, gid="drag law limit")
+        style.upright_note(ax, limit / 1.04, "drag law ends", at="bottom")
+
+
+def draw_branches(ax: Axes, branches: Sequence[Branch], colour: str) -> None:
+    """Closed-form lines: solid where the closure holds, dotted where neither does."""
+    for branch in branches:
+        for chosen, look, width in ((branch.valid, "-", 1.1), (branch.transition, ":", 0.9)):
+            if chosen.any():
+                x, y = (np.where(chosen, a, np.nan) for a in (branch.reynolds, branch.shields))
+                ax.plot(x, y, ls=look, color=colour, lw=width, gid=RESULT[0])
+
+
+def draw_points(
+    ax: Axes, rows: pd.DataFrame, colour: str, columns: tuple[str, str, str, str]
+) -> None:
+    """Markers with their intervals, by the columns of x, y and its ends.
+
+    Hollow where the closure does not hold.
+    """
+    rows = rows[rows[columns[1]].notna()]
+    x, y, low, high = (rows[column].to_numpy(float) for column in columns)
+    draw_intervals(ax, x, low, high, colour)
+    solid, closure = valid(rows).to_numpy(), rows["closure"].to_numpy(str)
+    for name, marker in style.MARKERS.items():
+        for filled, gid in ((True, RESULT[1]), (False, RESULT[2])):
+            some = (solid == filled) & (closure == name)
+            if some.any():
+                face = colour if filled else "white"
+                ax.plot(x[some], y[some], marker, mfc=face, mec=colour, mew=0.8, zorder=3, gid=gid)
+
+
+def draw_intervals(ax: Axes, x: FloatArray, a: FloatArray, b: FloatArray, colour: str) -> None:
+    """Vertical bars with caps from one end to the other."""
+    ax.vlines(x, a, b, color=colour, lw=0.8, zorder=2.5, gid="intervals")
+    for end in (a, b):
+        ax.plot(x, end, "_", color=colour, ms=5, mew=0.7, zorder=2.5)
+
+
+def draw_water(ax: Axes) -> list[Artist]:
+    """The published curves for water and their band; returns its entry for a legend."""
+    for curve in curves.WATER:
+        ax.plot(*curve.points(), color=style.WATER, lw=0.4, zorder=1, gid=WATER)
+    band = reference.water_band(np.geomspace(0.01, 1000, 400))
+    look: style.Look = {"color": style.WATER, "alpha": 0.45, "lw": 0}
+    ax.fill_between(band.reynolds, band.low, band.high, zorder=1, gid="water band", **look)
+    return [Patch(label="water: spread of published curves", **look)]
+
+
+def draw_air(ax: Axes, scenes: pd.DataFrame) -> list[Artist]:
+    """The curves for air over a horizontal bed; returns their entries for a legend."""
+    entries: list[Artist] = []
+    lines = reference.air_lines(scenes)
+    for (name, (x, y)), look in zip(lines.items(), AIR_STYLES, strict=False):
+        ax.plot(x, y, color=style.AIR, ls=look, lw=0.9, zorder=1.5, gid=f"air: {name}")
+        entries.append(Line2D([], [], color=style.AIR, ls=look, lw=0.9, label=f"air: {name}"))
+    return entries
+
+
+def draw_sloped_air(ax: Axes, scenes: pd.DataFrame, colour: str) -> list[Artist]:
+    """One curve for air times the slope factor; three for each slope would hide the rest."""
+    name = reference.SLOPED
+    lines = reference.air_lines(scenes, float(scenes["alpha_deg"].iloc[0]))
+    if name not in lines:
+        return []
+    ax.plot(*lines[name], color=colour, ls="--", lw=0.7, zorder=1.5, gid=f"air: {name}")
+    label = f"air: {name} × slope factor"
+    return [Line2D([], [], color="0.2", ls="--", lw=0.7, label=label)]
+
+
+def line_entries() -> list[Artist]:
+    """Legend of the closed form's line styles."""
+    return [
+        Line2D([], [], color="0.2", lw=1.1, label="Eqs. 3, 5 where they hold"),
+        Line2D([], [], color="0.2", lw=0.9, ls=":", label="continued where neither holds"),
+    ]
+
+
+def point_entries(rows: pd.DataFrame) -> list[Artist]:
+    """Legend of the markers that some rows need."""
+    names = {"low": "DEM, forces of Eq. 2", "high": "DEM, forces of Eq. 4"}
+    used = [c for c in style.MARKERS if (rows["closure"] == c).any()]
+    markers = [(names[c], style.MARKERS[c], "0.2") for c in used]
+    if not valid(rows).all():
+        markers += [("hollow: closure does not hold", style.MARKERS[used[-1]], "white")]
+    return [
+        Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
+        for label, m, face in markers
+    ]

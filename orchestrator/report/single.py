@@ -1,0 +1,123 @@
+"""Figures of single grains: closed form and DEM by entrainment angle and by slope, accuracy."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+from orchestrator.report import captions, labels, shields, style, theory
+from orchestrator.report.figure import Figure
+from orchestrator.report.results import Results, split, varying
+
+DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """The figures that the study's single grains give, one at a time."""
+    grains = results.beds("grain")
+    dem = results.joined("single_grain")
+    flat = grains[grains["alpha_deg"] == 0]
+    if len(flat):
+        yield from _pair(results, flat, dem, "beta_deg", "horizontal bed")
+    for (beta,), scenes in split(grains, "beta_deg"):
+        if (scenes["alpha_deg"] > 0).any():
+            yield from _pair(results, scenes, dem, "alpha_deg", f"slope, β = {beta:g}°")
+    if len(dem) and dem["ustar_m_s"].notna().any():
+        yield _accuracy(results, dem)
+
+
+def _pair(
+    results: Results, scenes: pd.DataFrame, dem: pd.DataFrame, by: str, bed: str
+) -> Iterator[Figure]:
+    """The closed form alone and, where there are results, with DEM on it."""
+    stem = "horizontal" if by == "beta_deg" else f"slope-beta{scenes['beta_deg'].iloc[0]:g}"
+    number = 5 if by == "beta_deg" else 7
+    yield Figure(
+        f"closed-form-{stem}",
+        f"Closed form: one grain on a {bed}",
+        captions.closed_form(scenes, by, number),
+        (),
+        _diagram(results, scenes, pd.DataFrame(), by),
+    )
+    points = dem[dem["scene_id"].isin(scenes["scene_id"])] if len(dem) else dem
+    if len(points):
+        yield Figure(
+            f"dem-{stem}",
+            f"DEM: one grain on a {bed}",
+            captions.grain_dem(points, number + 1),
+            tuple(sorted(set(points["case"]))),
+            _diagram(results, scenes, points, by),
+        )
+
+
+def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: str) -> Canvas:
+    """A panel for each z0/d; lines and points coloured by entrainment angle or slope."""
+    keys = ("z0_over_d", *varying(scenes))
+    panels = [part for _, part in split(scenes, *keys)][::-1]
+    figure = style.canvas(2.4 * len(panels) + 1.1)
+    axes = list(figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
+    colours = style.palette(by, results.values(by))
+    for ax, part in zip(axes, panels, strict=True):
+        references = _panel(ax, part, points, by, colours)
+        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+    shields.prepare(axes, [float(part["z0_over_d"].iloc[0]) for part in panels])
+    looks = references + shields.line_entries()
+    style.legends(
+        figure,
+        _colour_entries(scenes, by, colours),
+        looks + shields.point_entries(points) if len(points) else looks,
+    )
+    return figure
+
+
+def _colour_entries(scenes: pd.DataFrame, by: str, colours: dict[float, str]) -> list[Artist]:
+    used = set(scenes[by])
+    return [style.entry(labels.written(by, v), c) for v, c in colours.items() if v in used]
+
+
+def _panel(
+    ax: Axes, scenes: pd.DataFrame, points: pd.DataFrame, by: str, colours: dict[float, str]
+) -> list[Artist]:
+    """One z0/d; returns the legend's entries of the references."""
+    references: list[Artist] = []
+    for (value,), series in split(scenes, by):
+        colour = colours[float(str(value))]
+        shields.draw_branches(ax, theory.branches(series), colour)
+        if len(points):
+            own = points[points["scene_id"].isin(series["scene_id"])]
+            shields.draw_points(ax, own, colour, DEM)
+        if by == "alpha_deg":
+            references = shields.draw_sloped_air(ax, series, colour)
+    if by == "beta_deg":
+        references = shields.draw_water(ax) + shields.draw_air(ax, scenes)
+    return references
+
+
+def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
+    """u* of DEM over that of the closed form."""
+    figure = style.canvas(3.1)
+    ax = figure.subplots()
+    ratio = dem["ustar_closed_form_m_s"]
+    rows = dem.assign(
+        value=dem["ustar_m_s"] / ratio,
+        low=dem["ustar_low_m_s"] / ratio,
+        high=dem["ustar_high_m_s"] / ratio,
+    )
+    colours = style.palette("alpha_deg", results.values("alpha_deg"))
+    ax.axhline(1, color="0.3", lw=0.8, zorder=1)
+    for alpha, colour in colours.items():
+        own = rows[rows["alpha_deg"] == alpha]
+        shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
+    reach = 1.6 * float(np.nanmax(np.abs(rows[["value", "low", "high"]] - 1)))
+    ax.set(xscale="log", ylim=(1 - reach, 1 + reach), xlabel=labels.RE_AXIS)
+    ax.set_xlim(ax.get_xlim())
+    style.plain_ticks(ax.xaxis)
+    ax.set_ylabel(r"$u^\star_{DEM}/u^\star_{Eqs.\,3,\,5}$")
+    shields.shade_transition(ax)
+    entries = _colour_entries(rows, "alpha_deg", colours)
+    style.legends(figure, entries, shields.point_entries(rows))
+    cases = tuple(sorted(set(dem["case"])))
+    return Figure("accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure)

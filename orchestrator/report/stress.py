@@ -1,0 +1,137 @@
+"""The friction velocity along the bed of a pile, over the undisturbed one."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from orchestrator.grains.pile import PileCase
+from orchestrator.report import captions, labels, style
+from orchestrator.report.figure import Figure
+from orchestrator.report.results import Results
+from orchestrator.report.style import Look
+
+FloatArray = NDArray[np.float64]
+
+ESTIMATES: dict[str, tuple[str, Look]] = {
+    "ustar_over_ustar0_wall": ("wall stress", {"color": "black", "lw": 1.3}),
+    "ustar_over_ustar0_eq10": ("Eq. 10, $\\ln((z_e+z_0)/z_0)$", {"color": "#0072b2", "lw": 1.0}),
+    "ustar_over_ustar0_eq10_printed": (
+        "Eq. 10 as printed, $\\ln(z_e/z_0)$",
+        {"color": "#56b4e9", "lw": 1.0, "ls": "--"},
+    ),
+}
+GRAINS: Look = {"color": "#f0a35e", "lw": 3.0}
+REVERSED: Look = {"color": "0.85", "lw": 0}
+BEFORE, BEHIND = 4.0, 10.0
+"""Bed shown before the windward and behind the lee toe, h."""
+NOTABLE_RATIO = 1.5
+"""Roughness lengths of one slope that differ by less share their panel's story."""
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """One figure with a panel for each slope, at its least and largest z0."""
+    chosen = choose(results)
+    if not chosen:
+        return
+    rows = -(-len(chosen) // 2) if len(chosen) > 1 else 1
+    figure = style.canvas(3.0 * rows + 0.4)
+    panels = figure.subfigures(rows, 2 if len(chosen) > 1 else 1, squeeze=False).ravel()
+    for panel, pile in zip(panels, chosen, strict=False):
+        _panel(panel, results, pile)
+    _legend(figure, felt=len(results.tables["pile_grain"]) > 0)
+    names = tuple(pile.flow.name for pile in chosen)
+    caption = captions.stress(results, chosen)
+    yield Figure("wall-stress", "Friction velocity over the pile", caption, names, figure)
+
+
+def choose(results: Results) -> list[PileCase]:
+    """Piles whose flows stand for all.
+
+    Of each slope and height that with the least z0, and that with the largest if it differs much.
+    """
+    found: dict[tuple[float, float], list[PileCase]] = {}
+    for pile in results.flows.values():
+        found.setdefault((pile.bed.slope_deg, pile.bed.height), []).append(pile)
+    chosen = []
+    for _, piles in sorted(found.items(), key=lambda item: item[0]):
+        piles.sort(key=lambda pile: pile.bed.roughness)
+        chosen.append(piles[0])
+        if piles[-1].bed.roughness > NOTABLE_RATIO * piles[0].bed.roughness:
+            chosen.append(piles[-1])
+    return chosen
+
+
+def _panel(panel: SubFigure, results: Results, pile: PileCase) -> None:
+    top, below = panel.subplots(2, 1, sharex=True, height_ratios=[4, 1])
+    table = results.tables["wall_stress"]
+    rows = table[table["flow_case"] == pile.flow.name]
+    h = pile.bed.height
+    x = rows["x_m"].to_numpy(float) / h
+    for column, (_, look) in ESTIMATES.items():
+        values = rows[column].to_numpy(float)
+        top.plot(x, np.where(np.isfinite(values), values, np.nan), gid=column, **look)
+    _shade_reversed(top, x, rows["ustar_over_ustar0_wall"].to_numpy(float))
+    top.set_ylim(top=1.25 * top.get_ylim()[1])
+    _draw_grains(top, results, pile)
+    _profile(below, x, rows["z_m"].to_numpy(float) / h)
+    _mark_corners((top, below), pile)
+    toe = 2 / np.tan(np.radians(pile.bed.slope_deg))
+    top.set(xlim=(-BEFORE, toe + BEHIND), ylabel=r"$u^\star/u^\star_0$")
+    top.set_title(title(pile), loc="left")
+
+
+def title(pile: PileCase) -> str:
+    """Heading of a panel with one flow."""
+    alpha = labels.written("alpha_deg", pile.bed.slope_deg)
+    h, z0 = pile.bed.height, pile.bed.roughness
+    return f"{alpha}, $h$ = {labels.millimetres(h)}, $z_0$ = h/{h / z0:.0f}"
+
+
+def _shade_reversed(ax: Axes, x: FloatArray, ustar: FloatArray) -> None:
+    ax.axhline(0, color="0.4", lw=0.6)
+    ax.fill_between(x, ustar, 0, where=(ustar < 0).tolist(), gid="reversed flow", **REVERSED)
+
+
+def _draw_grains(ax: Axes, results: Results, pile: PileCase) -> None:
+    """What the grains feel: the stress averaged over a length of the bed."""
+    grains = results.joined("pile_grain")
+    if grains.empty:
+        return
+    own = grains[grains["flow_case"] == pile.flow.name].sort_values(["stress", "scene_id", "s_m"])
+    one = own[own["scene_id"].isin(own["scene_id"].tail(1))]
+    x = one["s_m"] * np.cos(np.radians(pile.bed.slope_deg)) / pile.bed.height
+    ax.plot(x, one["ustar_over_ustar0"], gid="grains", zorder=1.5, **GRAINS)
+
+
+def _profile(ax: Axes, x: FloatArray, z: FloatArray) -> None:
+    ax.fill_between(x, z, -0.3, color=style.BED, lw=0)
+    ax.plot(x, z, color="0.3", lw=0.8, gid="bed")
+    ax.text(0.015, 0.6, "flow →", transform=ax.transAxes, fontsize=6.5, color="0.35")
+    ax.set(xlabel="$x/h$ from the windward toe", ylabel="$z/h$", ylim=(-0.3, 1.4))
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+
+
+def _mark_corners(axes: tuple[Axes, Axes], pile: PileCase) -> None:
+    half = 1 / np.tan(np.radians(pile.bed.slope_deg))
+    for x, name in ((0.0, "toe"), (half, "crest"), (2 * half, "lee toe")):
+        for ax in axes:
+            ax.axvline(x, color="0.6", lw=0.6, ls=(0, (4, 2)), zorder=0, gid=name)
+        style.upright_note(axes[0], x - 0.1, name, at="top")
+
+
+def _legend(figure: Canvas, felt: bool) -> None:
+    entries: list[Artist] = [
+        Line2D([], [], label=text, **look) for text, look in ESTIMATES.values()
+    ]
+    if felt:
+        entries.append(Line2D([], [], label="as the grains feel it (averaged)", **GRAINS))
+    entries.append(Patch(label="reversed flow", **REVERSED))
+    style.legends(figure, [], entries)

@@ -1,0 +1,113 @@
+"""How all figures look: sizes, colours by meaning, markers, files."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
+
+WIDTH = 7.0
+"""Of a figure across two columns of a paper, inches."""
+PIXELS_PER_INCH = 200
+RC: dict[Any, Any] = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.2,
+    "mathtext.fontset": "dejavusans",
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "svg.hashsalt": "orchestrator",
+    "savefig.dpi": PIXELS_PER_INCH,
+}
+
+SHADES = {
+    "beta_deg": ("viridis", 0.0, 0.85),
+    "alpha_deg": ("plasma", 0.0, 0.82),
+    "fraction": ("YlGnBu", 0.35, 1.0),
+}
+"""Colour maps of what rises in steps; diameters have colours that are told apart more easily."""
+DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
+WATER = "#74aed6"
+AIR = "#8c6d46"
+BED = "#d9c9a3"
+Look = dict[str, Any]
+"""Properties of an artist."""
+
+NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
+MARKERS = {"low": "o", "high": "s"}
+"""By closure."""
+
+
+def palette(column: str, values: Sequence[float]) -> dict[float, str]:
+    """A colour for each value of a column, the same in every figure of a study."""
+    if column == "d_m":
+        return {v: DIAMETERS[i % len(DIAMETERS)] for i, v in enumerate(values)}
+    name, first, last = SHADES[column]
+    steps = max(len(values) - 1, 1)
+    shades = (first + (last - first) * i / steps for i in range(len(values)))
+    return {v: to_hex(colormaps[name](x)) for v, x in zip(values, shades, strict=True)}
+
+
+def canvas(height: float) -> Canvas:
+    """An empty figure of full width; height in inches."""
+    return Canvas(figsize=(WIDTH, height), layout="compressed")
+
+
+def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
+    """What the colours mean above the panels, all else below them: no data are there."""
+    if colours:
+        figure.legend(handles=colours, loc="outside upper center", ncols=8)
+    if looks:
+        figure.legend(handles=looks, loc="outside lower center", ncols=3)
+
+
+def entry(label: str, colour: str) -> Line2D:
+    """A legend's sample of a colour."""
+    return Line2D([], [], color=colour, lw=2.5, label=label)
+
+
+def note(ax: Axes, x: float, text: str) -> None:
+    """A small text at the upper end of a place on the x axis."""
+    ax.text(x, 0.97, text, ha="center", va="top", transform=ax.get_xaxis_transform(), **NOTE)
+
+
+def upright_note(ax: Axes, x: float, text: str, at: Literal["top", "bottom"]) -> None:
+    """A small text along the left side of a vertical line."""
+    y = 0.97 if at == "top" else 0.03
+    place = ax.get_xaxis_transform()
+    ax.text(x, y, text, ha="right", va=at, rotation=90, transform=place, **NOTE)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set."""
+    low, high = axis.get_view_interval()
+    digits = "2345678" if high < 5 * low else "25" if high < 50 * low else ""
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(FuncFormatter(lambda x, _: _leading(x, digits)))
+
+
+def _leading(x: float, digits: str) -> str:
+    """The number where its first digit is one of some."""
+    text = f"{x:.6g}"
+    return text if text.strip("0.")[0] in digits else ""
+
+
+def save(figure: Canvas, folder: Path, name: str) -> bytes:
+    """Write a figure as PNG and SVG, without dates in them, and return the PNG."""
+    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+    figure.set_layout_engine("none")  # it is laid out now
+    figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
+    return (folder / f"{name}.png").read_bytes()
