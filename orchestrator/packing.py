@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.disorder import rows as disorder_rows
 from orchestrator.scene import Packing as Pattern
 
 FloatArray = NDArray[np.float64]
@@ -20,6 +21,9 @@ TIE = 1e-6
 decided by round-off."""
 APRON = 10.0
 """Length of the fixed flat bed beyond each toe, diameters."""
+STRAY = 0.1
+"""Rows of a disordered bed are straight within this, diameters: no neighbour of a row covers
+another, and none stands out too far."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
 
@@ -108,6 +112,8 @@ def pile(
     gap: float,
     pattern: Pattern,
     mobile_layers: int,
+    disorder: float = 0.0,
+    seed: int = 0,
 ) -> Packing:
     """Pack a triangular pile.
 
@@ -119,18 +125,24 @@ def pile(
         beta of the lattice.
     gap : float
         Height of the exposed grains' lowest points over the bed line, z0/d.
-    pattern : {"aligned", "horizontal"}
-        Direction of the rows: along the windward face, or level.
+    pattern : {"aligned", "horizontal", "disordered"}
+        Rows along the windward face, or level; or along it with random gaps.
     mobile_layers : int
         Layers of the windward face that may move.
+    disorder : float
+        Of a disordered packing: largest gap in the row below the mobile ones, diameters.
+    seed : int
+        Of a disordered packing: which of the many.
     """
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap
     row_height = float(np.sin(beta))
-    body = _body(triangle, beta, surface, pattern, mobile_layers)
+    points = _points(triangle, pattern, beta, surface, mobile_layers, disorder, seed)
+    stray = STRAY if pattern == "disordered" else TIE
+    body = _shell(points, triangle, beta, surface, mobile_layers, stray)
     buried = body[:, 1] < surface - TIE
     in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
-    windward, lee = (face & ~buried for face in exposed(body, triangle))
+    windward, lee = (face & ~buried for face in exposed(body, triangle, disorder))
     mobile = (in_layers & ~buried) | windward
     idle = buried & ~_touching(body, mobile)
     body = body[~idle]
@@ -146,23 +158,48 @@ def pile(
     )
 
 
-def _body(
-    triangle: Triangle, beta: float, surface: float, pattern: Pattern, mobile_layers: int
+def _points(
+    triangle: Triangle,
+    pattern: Pattern,
+    beta: float,
+    surface: float,
+    mobile_layers: int,
+    disorder: float,
+    seed: int,
 ) -> FloatArray:
-    """Lattice grains near both faces, with one grain on the crest, and some below the ground.
+    """Where grains of the pattern may lie, one of them on the crest."""
+    direction = np.array([1.0, 0.0]) if pattern == "horizontal" else triangle.tangent
+    apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
+    lattice = _lattice(triangle, apex, direction, beta)
+    if pattern != "disordered":
+        return lattice
+    columns = int(np.ceil(np.linalg.norm(triangle.crest) / np.cos(beta) / 2)) + mobile_layers + 4
+    rows = disorder_rows(columns, mobile_layers, beta=beta, size=disorder, seed=seed)
+    normal = triangle.normals[0]
+    upper = apex + np.vstack(rows) @ np.vstack([direction, normal])
+    below = (apex - lattice) @ normal > (mobile_layers + 0.5) * np.sin(beta)
+    return np.vstack([upper, lattice[below]])
+
+
+def _shell(
+    points: FloatArray,
+    triangle: Triangle,
+    beta: float,
+    surface: float,
+    mobile_layers: int,
+    stray: float,
+) -> FloatArray:
+    """Grains near both faces, and some below the ground.
 
     Below the mobile layers one is enough: a grain touches no deeper one.
     """
-    direction = triangle.tangent if pattern == "aligned" else np.array([1.0, 0.0])
-    apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
-    lattice = _lattice(triangle, apex, direction, beta)
-    depths = [triangle.depth(lattice, face) + surface for face in (0, 1)]
-    depth, level = np.minimum(*depths), lattice[:, 1] - surface
+    depths = [triangle.depth(points, face) + surface for face in (0, 1)]
+    depth, level = np.minimum(*depths), points[:, 1] - surface
     windward_shell = depths[0] < (mobile_layers + 0.5) * np.sin(beta)
     lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
-    inside = (depth >= -TIE) & (windward_shell | lee_shell)
+    inside = (depth >= -stray) & (windward_shell | lee_shell)
     covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))
-    return np.asarray(lattice[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
+    return np.asarray(points[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
 
 
 def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
@@ -181,30 +218,34 @@ def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
     )
 
 
-def exposed(centres: FloatArray, triangle: Triangle) -> tuple[BoolArray, BoolArray]:
+def exposed(
+    centres: FloatArray, triangle: Triangle, slack: float = 0.0
+) -> tuple[BoolArray, BoolArray]:
     """Which grains are exposed on the windward and on the lee face.
 
     A grain is exposed when no other centre lies higher along the normal of its face within d/2 of
-    the line along that normal through its own centre.
+    the line along that normal through its own centre. A slit narrower than `slack` (diameters)
+    between two grains does not expose the one under it.
     """
     side = triangle.is_windward(centres)
     found = []
     for face, own in enumerate((side, ~side)):
         normal = triangle.normals[face]
         along = centres @ np.array([normal[1], -normal[0]])
-        free = _unshadowed(along, centres @ normal)
+        height = centres @ normal
+        free = _unshadowed(along, height, 0.5 + slack + TIE, STRAY if slack else TIE)
         found.append(free & own)
     return found[0], found[1]
 
 
-def _unshadowed(along: FloatArray, height: FloatArray) -> BoolArray:
+def _unshadowed(along: FloatArray, height: FloatArray, reach: float, stray: float) -> BoolArray:
     order = np.argsort(along)
     sorted_along, sorted_height = along[order], height[order]
-    start = np.searchsorted(sorted_along, sorted_along - 0.5 - TIE)
-    stop = np.searchsorted(sorted_along, sorted_along + 0.5 + TIE)
+    start = np.searchsorted(sorted_along, sorted_along - reach)
+    stop = np.searchsorted(sorted_along, sorted_along + reach)
     free = np.empty(len(along), bool)
     for place, (low, high) in enumerate(zip(start, stop, strict=True)):
-        free[order[place]] = sorted_height[low:high].max() <= sorted_height[place] + TIE
+        free[order[place]] = sorted_height[low:high].max() <= sorted_height[place] + stray
     return free
 
 

@@ -16,7 +16,7 @@ from orchestrator.closures import Closure, Regime, Threshold
 from orchestrator.files import canonical_json, digest_text
 
 Positive = Annotated[float, Field(gt=0)]
-Packing = Literal["aligned", "horizontal"]
+Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
 
 
@@ -76,7 +76,11 @@ class PileBed(Bed):
     height: Positive = 0.02
     """h of the flow's bed line, m"""
     packing: Packing = "aligned"
-    """rows along the windward slope, or horizontal"""
+    """rows along the windward slope, level rows, or rows along the slope with random gaps"""
+    disorder: Annotated[float, Field(gt=0, le=0.2)] = 0.02
+    """largest gap between two grains of the row under the mobile ones, d; if disordered"""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """which of the many disordered packings"""
     mobile_layers: Annotated[int, Field(ge=1)] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
 

@@ -116,3 +116,41 @@ def test_arc_length_runs_over_the_crest() -> None:
     line = Triangle(30.0, 10.0)
     points = np.array([[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0]])
     np.testing.assert_allclose(line.arc_length(points), [0.0, 20.0, 40.0], atol=1e-12)
+
+
+def _disordered(slope: float, seed: int, size: float = 0.05) -> packing.Packing:
+    return packing.pile(
+        Triangle(slope, 15.0),
+        entrainment_angle_deg=60.0,
+        gap=1 / 30,
+        pattern="disordered",
+        mobile_layers=2,
+        disorder=size,
+        seed=seed,
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(slope=slopes, seed=st.integers(0, 10**6), size=st.floats(1e-4, 0.2))
+def test_disordered_mobile_grains_rest_on_two_and_overlap_with_none(
+    slope: float, seed: int, size: float
+) -> None:
+    bed = _disordered(slope, seed, size)
+    gaps = _distances(bed.centres)
+    assert gaps[bed.mobile].min() > 1 - 1e-9
+    assert np.all((gaps < 1 + 1e-6).sum(axis=1)[bed.mobile] >= 2)
+
+
+@settings(max_examples=20, deadline=None)
+@given(slope=slopes, seed=st.integers(0, 10**6))
+def test_disorder_hardly_changes_how_many_are_exposed(slope: float, seed: int) -> None:
+    bed = _disordered(slope, seed)
+    assert bed.count == pytest.approx(_pile(slope, 15.0).count, abs=3)
+    top = int(bed.centres[:, 1].argmax())
+    assert bed.windward[top]
+
+
+def test_a_seed_is_one_packing() -> None:
+    same = _disordered(20.0, 3).centres
+    np.testing.assert_array_equal(same, _disordered(20.0, 3).centres)
+    assert not np.array_equal(same, _disordered(20.0, 4).centres)

@@ -120,6 +120,8 @@ class PileCase(GrainCase):
             gap=self.bed.roughness / self.scene.grain.diameter,
             pattern=self.bed.packing,
             mobile_layers=self.bed.mobile_layers,
+            disorder=self.bed.disorder if self.bed.packing == "disordered" else 0.0,
+            seed=self.bed.seed,
         )
 
     def write(self, directory: Path, cases: Path) -> None:
