@@ -36,7 +36,7 @@ def water_band(reynolds: FloatArray) -> Band:
     logs = np.log(reynolds)
     rows = []
     for curve in curves.WATER:
-        x, theta = curve.points()
+        x, theta = curve.points(2000)
         rows.append(np.exp(np.interp(logs, np.log(x), np.log(theta), left=np.nan, right=np.nan)))
     table = np.array(rows)
     enough = np.isfinite(table).sum(axis=0) >= LEAST_CURVES

@@ -1,0 +1,220 @@
+"""The figures hold what the tables say: the axes' data, not their pixels."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
+
+from orchestrator.report import piles, shields, single, stress, style
+from orchestrator.report.figure import Figure
+from orchestrator.report.results import Results
+from tests.report.conftest import only
+
+LINE, SOLID, HOLLOW = shields.RESULT
+Points = set[tuple[float, float]]
+
+
+def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
+    found = {}
+    for figure in figures:
+        assert figure.canvas is not None
+        figure.canvas.draw_without_rendering()
+        found[figure.name] = figure.canvas.axes
+    return found
+
+
+def marked(ax: Axes, *marks: str) -> list[Line2D]:
+    return [line for line in ax.lines if line.get_gid() in marks]
+
+
+def points(lines: Iterable[Line2D]) -> Points:
+    xy = [np.asarray(line.get_xydata(), float) for line in lines]
+    return {(float(x), float(y)) for x, y in np.concatenate([np.empty((0, 2)), *xy])}
+
+
+def rows(table: pd.DataFrame, x: str, y: str) -> Points:
+    return set(zip(table[x].tolist(), table[y].tolist(), strict=True))
+
+
+@pytest.fixture(scope="module")
+def grains(results: Results) -> dict[str, list[Axes]]:
+    return drawn(single.draw(results))
+
+
+@pytest.fixture(scope="module")
+def heaps(results: Results) -> dict[str, list[Axes]]:
+    return drawn(piles.draw(results))
+
+
+def test_study_has_the_figures_of_its_beds(results: Results) -> None:
+    names = {
+        "closed-form-horizontal", "dem-horizontal", "closed-form-slope-beta60",
+        "dem-slope-beta60", "accuracy",
+    }  # fmt: skip
+    one = only(results, "grain")
+    assert {figure.name for figure in single.draw(one)} == names
+    assert list(piles.draw(one)) == list(stress.draw(one)) == []
+    heap = only(results, "pile")
+    assert list(single.draw(heap)) == []
+    assert [figure.name for figure in piles.draw(heap)] == [
+        "fractions-alpha15", "extended-shields-d30",
+    ]  # fmt: skip
+
+
+def test_points_of_single_grains_are_those_of_the_table(
+    results: Results, grains: dict[str, list[Axes]]
+) -> None:
+    table = results.tables["single_grain"]
+    flat = table[table["alpha_deg"] == 0]
+    panels = dict(zip((0.1, 0.033333333), grains["dem-horizontal"], strict=True))
+    for ratio, ax in panels.items():
+        own = flat[flat["z0_over_d"] == ratio]
+        assert len(own) > 10
+        found = points(marked(ax, SOLID, HOLLOW))
+        assert found == rows(own, "reynolds", "shields_dem")
+
+
+def test_markers_are_hollow_exactly_where_the_closure_does_not_hold(
+    results: Results, grains: dict[str, list[Axes]]
+) -> None:
+    table = results.tables["single_grain"]
+    table = table[(table["alpha_deg"] == 0) & (table["z0_over_d"] == 0.1)]
+    transition = table[table["regime"] == "transition"]
+    assert 0 < len(transition) < len(table)
+    ax = grains["dem-horizontal"][0]
+    assert points(marked(ax, HOLLOW)) == rows(transition, "reynolds", "shields_dem")
+    for line in marked(ax, SOLID, HOLLOW):
+        is_white = to_hex(line.get_markerfacecolor()) == "#ffffff"
+        assert is_white == (line.get_gid() == HOLLOW)
+
+
+def test_bars_are_the_intervals_of_the_table(
+    results: Results, grains: dict[str, list[Axes]]
+) -> None:
+    ax = grains["dem-slope-beta60"][-1]
+    bars = [c for c in ax.collections if c.get_gid() == "intervals"]
+    found = {
+        (float(x), float(low), float(high))
+        for bar in bars
+        if isinstance(bar, LineCollection)
+        for (x, low), (_, high) in bar.get_segments()
+    }
+    table = results.tables["single_grain"]
+    own = table[(table["beta_deg"] == 60) & (table["z0_over_d"] == 0.033333333)]
+    columns = ["reynolds", "shields_dem_low", "shields_dem_high"]
+    assert found == {tuple(row) for row in own[columns].to_numpy().tolist()}
+    assert (own["shields_dem_low"] < own["shields_dem_high"]).all()
+
+
+def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Axes]]) -> None:
+    lines = [line for ax in grains["closed-form-horizontal"] for line in marked(ax, LINE)]
+    solid = np.concatenate([line.get_xdata() for line in lines if line.get_linestyle() == "-"])
+    solid = solid[np.isfinite(solid)]
+    assert ((solid < 3) | (solid >= 30)).all()
+    assert solid.min() < 0.1
+    assert solid.max() > 100
+    assert {line.get_linestyle() for line in lines} == {"-", ":"}
+
+
+def test_diagram_shows_transition_and_end_of_the_drag_law(grains: dict[str, list[Axes]]) -> None:
+    for ax, limit in zip(grains["dem-horizontal"], (245, 155), strict=True):
+        (span,) = [patch for patch in ax.patches if patch.get_gid() == "transition"]
+        assert span.get_extents().transformed(ax.transData.inverted()).intervalx.tolist() == (
+            pytest.approx([3, 30])
+        )
+        assert "transition" in [text.get_text() for text in ax.texts]
+        (end,) = marked(ax, "drag law limit")
+        assert end.get_xdata()[0] == pytest.approx(limit, rel=0.02)  # type: ignore[index]
+        assert ax.get_xscale() == ax.get_yscale() == "log"
+
+
+def test_references_are_those_of_the_bed(grains: dict[str, list[Axes]]) -> None:
+    flat, slope = grains["dem-horizontal"][0], grains["dem-slope-beta60"][0]
+    assert [c for c in flat.collections if c.get_gid() == "water band"]
+    assert not [c for c in slope.collections if c.get_gid() == "water band"]
+    assert len(marked(flat, "air: Bagnold 1941", "air: Shao & Lu 2000")) == 2
+    assert len(marked(slope, "air: Shao & Lu 2000")) == len(marked(slope, "air: Bagnold 1941")) + 1
+
+
+def test_a_colour_means_the_same_in_every_figure(results: Results) -> None:
+    values = results.values("beta_deg")
+    assert values == [45, 60]
+    assert style.palette("beta_deg", values) == style.palette("beta_deg", values)
+    for column in ("beta_deg", "alpha_deg", "d_m", "fraction"):
+        assert len(set(style.palette(column, [1.0, 2.0, 3.0, 4.0]).values())) == 4
+
+
+def test_accuracy_is_the_ratio_of_the_friction_velocities(
+    results: Results, grains: dict[str, list[Axes]]
+) -> None:
+    (ax,) = grains["accuracy"]
+    table = results.tables["single_grain"]
+    ratio = table["ustar_m_s"] / table["ustar_closed_form_m_s"]
+    assert {y for _, y in points(marked(ax, SOLID, HOLLOW))} == set(ratio)
+    low, high = ax.get_ylim()
+    assert low < min(ratio.min(), 1) <= max(ratio.max(), 1) < high
+
+
+def test_fractions_are_those_of_the_holds(results: Results, heaps: dict[str, list[Axes]]) -> None:
+    table = results.joined("pile_curve")
+    moved = table[table["moved"] > 0]
+    for ax, column in zip(heaps["fractions-alpha15"], ("reynolds", "shields"), strict=True):
+        assert points(marked(ax, *moved["scene_id"])) == rows(moved, column, "fraction_moved")
+        assert ax.get_ylim() == (0, 1)
+
+
+def test_extended_diagram_shows_each_fraction_that_was_reached(
+    results: Results, heaps: dict[str, list[Axes]]
+) -> None:
+    table = results.tables["pile_threshold"]
+    assert len(table) == 4
+    (ax,) = heaps["extended-shields-d30"]
+    assert points(marked(ax, SOLID)) == rows(table, "reynolds", "shields")
+    assert marked(ax, LINE)
+    lost = table.assign(shields=table["shields"].where(table["fraction"] < 0.5))
+    (_, figure) = piles.draw(replace(results, tables={**results.tables, "pile_threshold": lost}))
+    (ax,) = drawn([figure])["extended-shields-d30"]
+    assert points(marked(ax, SOLID)) == rows(lost.dropna(), "reynolds", "shields")
+
+
+def test_piles_in_the_transition_are_hollow(results: Results) -> None:
+    table = results.tables["pile_threshold"].assign(regime="transition")
+    scenes = results.scenes.assign(regime="transition")
+    changed = {**results.tables, "pile_threshold": table, "scenes": scenes}
+    found = drawn(piles.draw(replace(results, tables=changed)))
+    (ax,) = found["extended-shields-d30"]
+    assert not marked(ax, SOLID)
+    assert points(marked(ax, HOLLOW)) == rows(table, "reynolds", "shields")
+    (line,) = marked(found["fractions-alpha15"][0], *table["scene_id"])
+    assert line.get_markerfacecolor() == "white"
+
+
+def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
+    table = results.tables["wall_stress"]
+    top, profile = drawn(stress.draw(results))["wall-stress"]
+    for column in stress.ESTIMATES:
+        (line,) = marked(top, column)
+        assert np.asarray(line.get_ydata()).tolist() == table[column].tolist()
+        assert line.get_xdata() == pytest.approx(table["x_m"] / 0.01)
+    half = 1 / np.tan(np.radians(15))
+    for name, place in (("toe", 0), ("crest", half), ("lee toe", 2 * half)):
+        (line,) = marked(top, name)
+        assert line.get_xdata()[0] == pytest.approx(place)  # type: ignore[index]
+    (bed,) = marked(profile, "bed")
+    assert np.max(bed.get_ydata()) == pytest.approx(1, abs=0.05)
+    assert [c for c in top.collections if c.get_gid() == "reversed flow"]
+
+
+def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None:
+    none = {name: pd.DataFrame() for name in results.tables}
+    empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
+    assert {figure.name for figure in single.draw(empty)} == {
+        "closed-form-horizontal", "closed-form-slope-beta60",
+    }  # fmt: skip
+    assert list(piles.draw(empty)) == list(stress.draw(empty)) == []

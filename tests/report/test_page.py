@@ -1,0 +1,165 @@
+"""The page: well formed, in need of nothing else, with links that lead somewhere."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urljoin, urlparse
+
+import pandas as pd
+import pytest
+
+from orchestrator.report.results import Results
+from tests.report.conftest import TITLE, only, write
+
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, texts by tag, and a check of nesting."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.text = ""
+        self.texts: dict[str, str] = {}
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, {name: value or "" for name, value in attrs}))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text += data
+        for tag in self.open[-1:]:
+            self.texts[tag] = self.texts.get(tag, "") + data
+
+    def all(self, tag: str, attribute: str) -> list[str]:
+        return [values[attribute] for name, values in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def html(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def parsed(html: str) -> Page:
+    return Page(html)
+
+
+def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
+    assert all(src.startswith("data:image/png;base64,") for src in parsed.all("img", "src"))
+    assert len(parsed.all("img", "src")) == 10
+    assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
+    style = parsed.texts["style"]
+    assert "url(" not in style
+    assert "@import" not in style
+    assert not any("://" in href for href in parsed.all("a", "href"))
+    assert "default-src 'none'" in html
+
+
+def test_what_a_user_wrote_is_text(html: str, parsed: Page) -> None:
+    assert "<script" not in html
+    assert parsed.texts["title"] == parsed.texts["h1"] == TITLE
+    assert "# </pre><b>" in parsed.texts["pre"]
+    assert "it <b>died</b>" in parsed.text
+    assert "b" not in {tag for tag, _ in parsed.tags}
+
+
+def test_links_lead_to_what_is_there(page: Path, parsed: Page, results: Results) -> None:
+    (page.parent / "tables").mkdir(exist_ok=True)
+    targets = set()
+    for href in parsed.all("a", "href"):
+        address = urlparse(urljoin(page.as_uri(), href))
+        assert address.scheme == "file"
+        targets.add(Path(unquote(address.path)))
+    folders = {results.cases / name for name in results.plan.cases}
+    assert folders <= targets
+    assert all(path.is_dir() for path in targets if path.suffix not in {".csv", ".parquet"})
+    tables = {path.stem for path in targets if path.suffix == ".parquet"}
+    assert tables == set(results.tables)
+
+
+def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
+    for row in results.tables["pile_threshold"].itertuples():
+        assert f"{row.shields:.4f}" in parsed.text
+    assert "in the transition" in parsed.text
+    assert "What this does not say" in parsed.text
+    for said in ("liggghts", "openfoam", "matplotlib", "pile.foam", "./Allrun", "columns.csv"):
+        assert said in parsed.text
+    for kind in ("cells", "flow", "pile"):
+        assert kind in parsed.texts["td"]
+
+
+def test_figures_are_beside_the_page(page: Path) -> None:
+    files = sorted(path.name for path in (page.parent / "figures").iterdir())
+    assert len(files) == 20
+    assert {Path(name).suffix for name in files} == {".png", ".svg"}
+    assert not list(page.parent.glob(".*.tmp"))
+
+
+def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> None:
+    heap = only(results, "pile")
+    pages = []
+    for name in ("one", "two"):
+        out = tmp_path / name
+        out.mkdir()
+        (out / "cases").symlink_to(results.cases)
+        pages.append(write(heap, out, {}).parent)
+    for path in (pages[0] / "figures").iterdir():
+        assert path.read_bytes() == (pages[1] / "figures" / path.name).read_bytes(), path.name
+    first, second = ((folder / "report.html").read_bytes() for folder in pages)
+    assert first == second
+
+
+def test_page_says_why_a_picture_is_missing(
+    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crash = tmp_path / "python"
+    crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
+    crash.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(crash))
+    (tmp_path / "cases").symlink_to(results.cases)
+    parsed = Page(write(only(results, "pile"), tmp_path, {}).read_text(encoding="utf-8"))
+    assert parsed.text.count("This picture could not be made") == 2
+    assert "SIGSEGV" in parsed.text
+    assert "apt-get install --no-install-recommends libosmesa6" in parsed.text
+    assert len(parsed.all("img", "src")) == 3
+
+
+def test_page_without_results(results: Results, tmp_path: Path) -> None:
+    none = {name: pd.DataFrame() for name in results.tables}
+    empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
+    (tmp_path / "cases").mkdir()
+    failures = dict.fromkeys(results.plan.cases, "no solver")
+    parsed = Page(
+        write(replace(empty, cases=tmp_path / "cases"), tmp_path, failures).read_text("utf-8")
+    )
+    assert "No case has given a result yet" in parsed.text
+    assert parsed.text.count("no solver") == len(failures)
+    assert not [href for href in parsed.all("a", "href") if href.startswith("cases/c")]
+
+
+def test_a_page_is_replaced_whole(results: Results, page: Path, tmp_path: Path) -> None:
+    shutil.copy(page, tmp_path / "report.html")
+    (tmp_path / "cases").mkdir()
+    old = (tmp_path / "report.html").stat().st_ino
+    write(only(results, "grain"), tmp_path, {})
+    assert (tmp_path / "report.html").stat().st_ino != old
+
+
+def test_importing_the_report_loads_no_drawing_library() -> None:
+    heavy = "{'matplotlib', 'pyvista', 'vtkmodules', 'jinja2', 'pandas'}"
+    code = f"import sys, orchestrator.report; sys.exit(bool({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0

@@ -1,0 +1,89 @@
+"""The band for water, the lines for air, and the closed form as lines."""
+
+import numpy as np
+import pytest
+
+from orchestrator import closures, curves
+from orchestrator.report import reference, theory
+from orchestrator.report.results import Results
+
+
+def test_band_holds_every_curve_within_its_range() -> None:
+    for curve in curves.WATER:
+        reynolds, theta = curve.points(2000)
+        band = reference.water_band(reynolds)
+        common = np.isfinite(band.low)
+        assert common.sum() > 1500
+        inside = (theta > 0.998 * band.low) & (theta < 1.002 * band.high)
+        # curves made of pieces jump where these meet
+        assert inside[common].mean() > 0.995
+
+
+def test_band_is_the_envelope_of_the_curves_that_cover_a_place() -> None:
+    place = np.array([0.02, 0.1, 5.0, 50.0])
+    found = []
+    for curve in curves.WATER:
+        reynolds, theta = curve.points(4000)
+        found.append(np.interp(place, reynolds, theta, left=np.nan, right=np.nan))
+    band = reference.water_band(place)
+    assert band.low == pytest.approx(np.nanmin(found, axis=0), rel=2e-3)
+    assert band.high == pytest.approx(np.nanmax(found, axis=0), rel=2e-3)
+
+
+def test_no_band_where_one_curve_is_alone() -> None:
+    band = reference.water_band(np.array([0.011, 0.02]))
+    assert np.isnan(band.low).tolist() == np.isnan(band.high).tolist() == [True, False]
+
+
+def test_air_needs_a_gas(results: Results) -> None:
+    grains = results.beds("grain")
+    assert set(reference.air_lines(grains)) == set(curves.AIR)
+    assert reference.air_lines(grains.assign(rho_f_kg_m3=1000.0)) == {}
+
+
+def test_slope_raises_the_friction_velocity_in_air(results: Results) -> None:
+    grains = results.beds("grain")
+    flat, up = (reference.air_lines(grains, slope)[reference.SLOPED] for slope in (0.0, 20.0))
+    factor = float(curves.slope_factor_on_ustar(np.array(20.0), 35.0))
+    assert up[0] == pytest.approx(factor * flat[0])
+    assert up[1] == pytest.approx(factor**2 * flat[1])
+
+
+def test_bagnold_ends_where_his_constant_changes(results: Results) -> None:
+    reynolds, theta = reference.air_lines(results.beds("grain"))["Bagnold 1941"]
+    assert reynolds.min() >= reference.BAGNOLD_FROM
+    assert theta == pytest.approx(0.01)
+
+
+def test_closed_form_lines_are_solid_where_their_equation_holds(results: Results) -> None:
+    grains = results.beds("grain")
+    flat = grains[(grains["alpha_deg"] == 0) & (grains["beta_deg"] == 60)]
+    low, high = theory.branches(flat[flat["z0_over_d"] == 0.1])
+    assert (low.valid == (low.reynolds < closures.LOW_BELOW)).all()
+    assert (high.valid == (high.reynolds >= closures.HIGH_FROM)).all()
+    assert not (low.valid & low.transition).any()
+    assert low.valid.any()
+    assert low.transition.any()
+
+
+def test_viscosity_does_not_move_a_line(results: Results) -> None:
+    one = results.beds("grain").query("alpha_deg == 0 and beta_deg == 60 and z0_over_d == 0.1")
+    both = theory.branches(one)[0]
+    thin, thick = (theory.branches(one[one["nu_m2_s"] == nu])[0] for nu in (1e-5, 1e-3))
+    assert len(both.reynolds) == len(thin.reynolds) + len(thick.reynolds)
+    water = theory.branches(one[one["nu_m2_s"] == 1e-3].assign(rho_f_kg_m3=1000.0))[0]
+    shared = (water.reynolds > thick.reynolds[0]) & (water.reynolds < thick.reynolds[-1])
+    expected = np.interp(water.reynolds[shared], thick.reynolds, thick.shields)
+    assert water.shields[shared] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(("ratio", "limit"), [(1 / 30, 155.0), (1 / 10, 245.0)])
+def test_drag_law_ends(ratio: float, limit: float) -> None:
+    assert theory.drag_law_limit(ratio) == pytest.approx(limit, rel=0.02)
+
+
+def test_an_own_lift_coefficient_has_a_line_of_its_own(results: Results) -> None:
+    one = results.beds("grain").query("alpha_deg == 0 and beta_deg == 60 and z0_over_d == 0.1")
+    assert len(theory.branches(one)) == 2
+    varied = one.assign(alpha_s=np.linspace(0, 1, len(one)))
+    assert len(theory.branches(varied)) == 2 * len(one)
