@@ -195,7 +195,8 @@ def _diverged(how: str, directory: Path) -> SolverError:
     return SolverError(
         f"simpleFoam diverged: {how}",
         where=str(directory),
-        remedy="lower U and k|epsilon in system/fvSolution, or take more cells per face",
+        remedy="another first cell or number of cells per face may do; "
+        "relaxation and correctors are in system/fvSolution",
     )
 
 
