@@ -8,7 +8,6 @@ import re
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from orchestrator import closures
@@ -295,4 +294,5 @@ def roughness_length(value: Any, diameter: float) -> Any:
     match = re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", value)
     if not match or float(match[1]) == 0:
         raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
-    return float(np.float64(diameter) / float(match[1]))
+    # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
+    return float(f"{diameter / float(match[1]):.12g}")

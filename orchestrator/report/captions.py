@@ -29,7 +29,7 @@ def listed(values: Iterable[float], scale: float = 1) -> str:
 def closed_form(scenes: pd.DataFrame, by: str, number: int) -> str:
     """Of the closed form by entrainment angle or by slope."""
     what = "entrainment angle β" if by == "beta_deg" else "slope α (the flow goes up it)"
-    low, high = (edge * 1e3 for edge in theory.SWEEP_M)
+    low, high = theory.sweep(scenes)[[0, -1]] * 1e3
     return (
         f"After Fig. {number} of the paper. Threshold stress of one grain against the friction "
         f"Reynolds number, by {what}: Eq. 3 for Re* < 3 and Eq. 5 for Re* ≥ 30, with δ = z₀, "

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator import curves
 from orchestrator.curves import Air
-from orchestrator.report.theory import SWEEP_M
+from orchestrator.report.theory import sweep
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def air_lines(
     if one["rho_sol_kg_m3"] < GAS_RATIO * one["rho_f_kg_m3"]:
         return {}
     air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
-    d = np.geomspace(*SWEEP_M, 200)
+    d = sweep(scenes)
     factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])
     lines = {name: air.shields_diagram(d, factor * f(d, air)) for name, f in curves.AIR.items()}
     x, y = lines["Bagnold 1941"]

@@ -69,7 +69,7 @@ def canvas(height: float) -> Canvas:
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
     """What the colours mean above the panels, all else below them: no data are there."""
     if colours:
-        figure.legend(handles=colours, loc="outside upper center", ncols=8)
+        figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
         figure.legend(handles=looks, loc="outside lower center", ncols=3)
 

@@ -53,11 +53,15 @@ def branches(scenes: pd.DataFrame) -> list[Branch]:
     return found
 
 
+def sweep(scenes: pd.DataFrame) -> FloatArray:
+    """Diameters of the paper's range, or of the scenes' where that is wider, m."""
+    d = scenes["d_m"]
+    return np.geomspace(min(SWEEP_M[0], d.min()), max(SWEEP_M[1], d.max()), POINTS)
+
+
 def _swept(closure: Closure, scenes: pd.DataFrame) -> Threshold:
-    d = np.geomspace(
-        min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max()), POINTS
-    )
-    d, nu = (grid.ravel() for grid in np.meshgrid(d, np.unique(scenes["nu_m2_s"])))
+    viscosities = np.unique(scenes["nu_m2_s"])
+    d, nu = (grid.ravel() for grid in np.meshgrid(sweep(scenes), viscosities))
     one = scenes.iloc[0]
     return closures.threshold(
         closure,
