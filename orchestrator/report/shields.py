@@ -68,6 +68,7 @@ def label_lowest(axes: Sequence[Axes], label: str) -> None:
 def shade_transition(ax: Axes) -> None:
     """Shade where neither closure holds, as far as the axes show it."""
     left, right = ax.get_xlim()
+    ax.set_xlim(left, right)
     left, right = max(left, LOW_BELOW), min(right, HIGH_FROM)
     if left < right:
         ax.axvspan(left, right, color="0.93", zorder=0, gid="transition")

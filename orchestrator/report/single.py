@@ -113,7 +113,6 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
         shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
     reach = 1.6 * float(np.nanmax(np.abs(rows[["value", "low", "high"]] - 1)))
     ax.set(xscale="log", ylim=(1 - reach, 1 + reach), xlabel=labels.RE_AXIS)
-    ax.set_xlim(ax.get_xlim())
     style.plain_ticks(ax.xaxis)
     ax.set_ylabel(r"$u^\star_{DEM}/u^\star_{Eqs.\,3,\,5}$")
     shields.shade_transition(ax)
