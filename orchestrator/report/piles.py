@@ -121,7 +121,9 @@ def _panel(
     for (fraction,), points in split(rows, "fraction"):
         colour = colours[float(str(fraction))]
         for _, series in split(points, "nu_m2_s", "closure", "regime"):
-            ordered = series.sort_values("reynolds")
-            ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
+            # piles that differ in more than d are a scatter, not a line
+            if series["d_m"].is_unique:
+                ordered = series.sort_values("reynolds")
+                ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
         shields.draw_points(ax, points, colour, TAU)
     return shields.draw_sloped_air(ax, piles, style.AIR)
