@@ -145,9 +145,9 @@ def extended(rows: pd.DataFrame) -> str:
         "After Figs. 15 and 16 of the paper. Mean signed wall stress over the grains that had "
         "moved when their fraction first reached n/N; thin lines join piles that differ in d "
         "alone. Bars hold the step between two flows and the count’s resolution of half a grain; "
-        "Re* is that of the marker’s stress. A fraction that was not reached has no marker. Black: the "
-        "closed form of one grain at the same slope, entrainment angle and z₀/d, solid where it "
-        "holds. "
+        "Re* is that of the marker’s stress. A fraction that was not reached has no marker. Black: "
+        "the closed form of one grain at the same slope, entrainment angle and z₀/d, solid where "
+        "it holds. "
         f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
         f"{DRAG_LAW} {_references(rows, 'alpha_deg')}"
     )
