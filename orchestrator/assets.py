@@ -1,5 +1,7 @@
 """Where the templates and presets lie: beside the package in a checkout, inside it in a wheel."""
 
+import shutil
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -19,9 +21,23 @@ def presets() -> Path:
     return PACKAGE / "presets"
 
 
+GENERATED = (
+    *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
+    *("log.*", "postProcessing", "polyMesh", "levels.csv", "*.dump"),
+)
+"""What a run by hand in the template's own folder leaves there; it is no part of the template."""
+
+
+def copy_template(name: str, folder: Path) -> None:
+    """Make a folder as a fresh copy of a template."""
+    shutil.copytree(templates() / name, folder, ignore=shutil.ignore_patterns(*GENERATED))
+
+
 @cache
 def template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
-    folder = templates() / name
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    return digest_text(canonical_json(digest_files(files, root=folder)))
+    with tempfile.TemporaryDirectory(prefix="orchestrator-") as scratch:
+        folder = Path(scratch) / "template"
+        copy_template(name, folder)
+        files = [path for path in folder.rglob("*") if path.is_file()]
+        return digest_text(canonical_json(digest_files(files, root=folder)))

@@ -102,7 +102,7 @@ def prepare(case: Case, cases: Path) -> Path:
     """
     directory = cases / case.name
     shutil.rmtree(directory, ignore_errors=True)
-    shutil.copytree(assets.templates() / case.template, directory)
+    assets.copy_template(case.template, directory)
     case.write(directory, cases)
     inputs = [path for path in directory.rglob("*") if path.is_file()]
     identity = {

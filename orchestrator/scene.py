@@ -92,7 +92,7 @@ class Flow(Part):
     viscosity: Positive = 1e-5
     """nu of that solve, m2/s: the wall is rough, the fluid's own nu moves only the grain's Re*"""
     first_cell_height: Positive | None = None
-    """of the mesh on the bed, m; default max(h/40, 20 z0), but no more than h/4"""
+    """of the mesh on the bed, m; default: `default_first_cell_height`"""
     cells_per_face: Annotated[int, Field(ge=10)] = 40
     """of the mesh along each face of the pile"""
     closure: Literal["auto", "low", "high"] = "auto"
@@ -181,8 +181,9 @@ class Scene(Part):
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
-        height, roughness = self.bed.height, self.bed.roughness
-        return self.flow.first_cell_height or min(max(height / 40, 20 * roughness), height / 4)
+        if self.flow.first_cell_height:
+            return self.flow.first_cell_height
+        return default_first_cell_height(self.bed.height, self.bed.roughness)
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
@@ -274,6 +275,17 @@ def check_pile(bed: PileBed, diameter: float) -> None:
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
         )
+
+
+def default_first_cell_height(height: float, roughness: float) -> float:
+    """Height of the first cell on the bed of a pile, m.
+
+    Its centre z_e must be 10 z0 from the bed, or the log law fails; at 15 z0 the friction velocity
+    of a flat bed comes out within 1.5 %, at 10 z0 within 1.9 %. It must resolve the pile as well:
+    from h/20 on the former has to do, and h/4 is the end.
+    """
+    rough = min(30 * roughness, max(height / 20, 20 * roughness))
+    return min(max(height / 40, rough), height / 4)
 
 
 def check_first_cell(roughness: float, first_cell_height: float) -> None:

@@ -10,18 +10,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.case import Case
+from orchestrator.closures import KARMAN
 from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.mesh import write_mesh
-from orchestrator.flow.stress import KAPPA, WallStress, read_openfoam, undisturbed_ustar
+from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
+from orchestrator.scene import default_first_cell_height
 from orchestrator.solvers import openfoam
 
 WALL_STRESS = "wall_stress.csv"
 LID_OVER_HEIGHT = 10.0
-
-
-def default_first_cell_m(height_m: float, roughness_m: float) -> float:
-    """Height of the first cell that resolves the pile and keeps its centre at z_e >= 10 z0, m."""
-    return max(height_m / 40.0, 20.0 * roughness_m)
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class FlowCase(Case):
         Kinematic viscosity, m2/s.
     first_cell_m : float
         Height of the cells on the bed, normal to the faces of the pile, m; z_e is half of it.
-        The stress depends on it: `default_first_cell_m` is the choice of the studies.
+        The stress depends on it: `default_first_cell_height` is the choice of the studies.
     cells_per_face : int
         Cells along each face of the pile; the others follow.
 
@@ -88,16 +85,16 @@ class FlowCase(Case):
             )
 
     def _check_scales(self) -> None:
+        default = default_first_cell_height(self.height_m, self.roughness_m)
         if not 4.0 * self.roughness_m <= self.first_cell_m <= self.height_m / 4.0:
             raise InputError(
                 f"{self.first_cell_m:g} m is not between 4 z0 = {4 * self.roughness_m:g} m, below "
                 f"which the log law fails, and h/4 = {self.height_m / 4:g} m",
                 where="first_cell_m",
-                remedy=f"{default_first_cell_m(self.height_m, self.roughness_m):g} is the default; "
-                "if it is too high, z0 is too large for this pile",
+                remedy=f"{default:g} is the default; if it is too high, z0 is too large for this pile",
             )
         eddy_over_molecular = (
-            KAPPA * self.ustar0_m_s * self.first_cell_m / 2.0 / self.viscosity_m2_s
+            KARMAN * self.ustar0_m_s * self.first_cell_m / 2.0 / self.viscosity_m2_s
         )
         if eddy_over_molecular < 1.0:
             raise InputError(

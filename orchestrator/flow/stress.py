@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from orchestrator.closures import KARMAN
 from orchestrator.errors import InputError, SolverError
 from orchestrator.files import write_durably
 from orchestrator.solvers.openfoam import read_last_time, read_numbers
@@ -19,16 +20,13 @@ if TYPE_CHECKING:
 
 _DERIVED = "ustar_over_ustar0_wall"
 
-KAPPA = 0.41
-"""Von Karman's constant of the approaching flow, the wall function and Eq. 10."""
-
 Array = NDArray[np.float64]
 Measure = Literal["wall", "eq10"]
 
 
 def undisturbed_ustar(speed_m_s: float, lid_height_m: float, roughness_m: float) -> float:
     """Friction velocity of the approaching flow, m/s: u*_0 = 0.41 U_e / ln((z_lid + z0)/z0)."""
-    return float(KAPPA * speed_m_s / np.log((lid_height_m + roughness_m) / roughness_m))
+    return float(KARMAN * speed_m_s / np.log((lid_height_m + roughness_m) / roughness_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +177,8 @@ def read_openfoam(directory: Path) -> WallStress:
         z_e_m=z_e,
         # OpenFOAM's is the stress of the bed on the flow
         tau_wall=-_along(stress, faces.tangents) / ustar0**2,
-        ustar_over_ustar0_eq10=KAPPA * u_t / np.log((z_e + z0) / z0) / ustar0,
-        ustar_over_ustar0_eq10_printed=KAPPA * u_t / np.log(z_e / z0) / ustar0,
+        ustar_over_ustar0_eq10=KARMAN * u_t / np.log((z_e + z0) / z0) / ustar0,
+        ustar_over_ustar0_eq10_printed=KARMAN * u_t / np.log(z_e / z0) / ustar0,
     )
 
 

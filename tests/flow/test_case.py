@@ -16,8 +16,9 @@ import pytest
 
 from orchestrator import case
 from orchestrator.errors import InputError, SolverError
-from orchestrator.flow.case import WALL_STRESS, FlowCase, default_first_cell_m
+from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, read_openfoam
+from orchestrator.scene import default_first_cell_height
 from orchestrator.solvers import openfoam, process
 from tests.flow.conftest import PILE, SLOW, Solve, allrun
 from tests.flow.test_mesh import edit
@@ -268,5 +269,5 @@ def test_finer_and_steeper_cases_cost_more() -> None:
 
 
 def test_the_default_first_cell() -> None:
-    assert default_first_cell_m(0.02, 1e-6) == pytest.approx(5e-4)
-    assert default_first_cell_m(0.02, 1e-4) == pytest.approx(2e-3)
+    assert default_first_cell_height(0.02, 1e-6) == pytest.approx(5e-4)
+    assert default_first_cell_height(0.02, 1e-4) == pytest.approx(2e-3)

@@ -11,8 +11,9 @@ import pytest
 
 from orchestrator import assets, case
 from orchestrator.errors import SolverError
-from orchestrator.flow.case import FlowCase, default_first_cell_m
+from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import check_mesh, first_cell_heights, smallest_jacobian, write_mesh
+from orchestrator.scene import default_first_cell_height
 from tests.flow.conftest import PILE
 
 
@@ -27,7 +28,7 @@ def edit(path: Path, old: str, new: str) -> None:
 def test_a_mesh_for_each_pile(
     slope: float, height: float, z0_over_h: float, tmp_path: Path
 ) -> None:
-    first = default_first_cell_m(height, z0_over_h * height)
+    first = default_first_cell_height(height, z0_over_h * height)
     flow = FlowCase(slope, height, z0_over_h * height, 10.0, 1e-6, first, 20)
     directory = case.prepare(flow, tmp_path)
     mesh = meshio.read(directory / "pile.msh")
