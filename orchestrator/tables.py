@@ -17,7 +17,7 @@ from orchestrator.files import write_durably
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase
-from orchestrator.grains.motion import Motion
+from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import PileCase
 from orchestrator.plan import Plan
 from orchestrator.scene import PileBed, Scene
@@ -44,6 +44,8 @@ COLUMNS: dict[str, str] = {
     "z0_over_d": "roughness length over diameter",
     "h_m": "height of the pile's bed line",
     "packing": "pattern of the pile's grains",
+    "disorder": "largest gap in the row under the mobile ones, d; of disordered packings",
+    "seed": "which of the many disordered packings",
     "mobile_layers": "layers of the windward face that may move",
     "closure": "low: Eqs. 2, 3; high: Eqs. 4, 5",
     "regime": "closure that is valid at the scene's single-grain threshold, or transition",
@@ -78,6 +80,8 @@ COLUMNS: dict[str, str] = {
     "ustar_over_ustar0": "signed friction velocity at the grain over ustar0",
     "grain_id": "id of the grain in the deck",
     "hold": "number of the hold; 0 is the settling",
+    "mode": "how it moved: rolled, slid, lifted (rose by more than 0.3 d) or none",
+    "fell_upstream": "whether the grain fell back before or instead of moving downstream",
     "moved_in_hold": "hold in which the grain first passed the marker; 0: never",
     "fallen_in_hold": "hold in which it was first a marker's length upstream; 0: never",
     "u_e_m_s": "speed at the lid, 10 h above the flat bed",
@@ -206,6 +210,8 @@ def _choices(scene: Scene) -> Row:
         "z0_m": scene.bed.roughness,
         "h_m": pile.height if pile else None,
         "packing": pile.packing if pile else None,
+        "disorder": pile.disorder if pile and pile.packing == "disordered" else None,
+        "seed": pile.seed if pile and pile.packing == "disordered" else None,
         "mobile_layers": pile.mobile_layers if pile else None,
         "stress": scene.flow.stress if pile else None,
         "alpha_s": scene.flow.lift_coefficient,
@@ -220,10 +226,12 @@ def _choices(scene: Scene) -> Row:
 def _single_grain(study: Study, cells: Iterable[CellsCase], cases: Path) -> pd.DataFrame:
     rows: dict[str, Row] = {}
     for one in cells:
-        found = threshold.of_grains(Motion.from_csv(cases / one.name))
+        motion = Motion.from_csv(cases / one.name)
+        found = threshold.of_grains(motion)
         brackets = zip(found.value, found.low, found.high, strict=True)
-        for scene, bracket in zip(one.scenes, brackets, strict=True):
-            rows[scene.id] = {**_single_row(scene, bracket), "case": one.name}
+        for scene, bracket, fallen in zip(one.scenes, brackets, motion.fallen > 0, strict=True):
+            row = {**_single_row(scene, bracket), "fell_upstream": bool(fallen)}
+            rows[scene.id] = {**row, "case": one.name}
     return _frame(rows[scene.id] for scene in study.scenes if scene.id in rows)
 
 
@@ -279,6 +287,7 @@ def _pile_grain(pile: PileCase, cases: Path) -> pd.DataFrame:
             "ustar_over_ustar0": face.speed,
             "moved_in_hold": motion.level,
             "fallen_in_hold": motion.fallen,
+            "mode": [MODES[mode] for mode in motion.mode],
             "ustar0_m_s": found.value,
         }
     )

@@ -15,7 +15,7 @@ from orchestrator import case, engine, study
 from orchestrator.errors import SolverError
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase, batches
-from orchestrator.grains.motion import Motion
+from orchestrator.grains.motion import MODES, Motion
 
 BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
 
@@ -160,3 +160,40 @@ def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
     os.truncate(path, path.stat().st_size * 2 // 3)
     with pytest.raises(SolverError, match=name):
         one.collect(tmp_path / one.name)
+
+
+def test_a_grain_that_falls_back_and_leaves_has_not_moved(tmp_path: Path) -> None:
+    # at the limiting slope the low closure's lift carries a large grain before its drag holds it
+    text = """
+    grain = { diameter = 3e-4 }
+    bed = { slope_deg = 30.0 }
+    flow = { closure = "low" }
+    protocol = { step = 0.02 }
+    """
+    one = _cells(text)
+    motion = _run(one, tmp_path)
+    assert motion.level.tolist() == [0]
+    assert motion.fallen[0] > 0
+    assert motion.fraction[-1] == 0
+    assert np.isnan(threshold.of_grains(motion).value[0])
+
+
+def test_how_grains_move(tmp_path: Path) -> None:
+    # 8 % above the threshold: without lift a grain rolls over its neighbour; with little else it
+    # leaves its bed
+    text = """
+    grain = { diameter = 1e-3 }
+    protocol = { step = 0.2 }
+    [[group]]
+    flow = { closure = "high", lift_coefficient = 0.0 }
+    [[group]]
+    flow = { closure = "high", lift_coefficient = 200.0 }
+    bed = { entrainment_angle_deg = 20.0 }
+    """
+    one = _cells(text)
+    motion = _run(one, tmp_path)
+    found = {
+        scene.flow.lift_coefficient: MODES[mode]
+        for scene, mode in zip(one.scenes, motion.mode, strict=True)
+    }
+    assert found == {0.0: "rolled", 200.0: "lifted"}

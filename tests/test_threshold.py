@@ -14,7 +14,8 @@ from orchestrator.grains.motion import Motion
 FLOW = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
 LEVEL = np.array([1, 1, 2, 2, 2, 4, 4, 4, 4, 0])
 SPEED = np.array([2.0, 2.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, -0.5])
-MOTION = Motion(FLOW, LEVEL, np.zeros(10, int))
+NONE = np.zeros(10, int)
+MOTION = Motion(FLOW, LEVEL, NONE, NONE)
 DENSITY = 1.2
 
 
@@ -23,7 +24,7 @@ def test_fraction_counts_each_grain_once_from_its_hold_on() -> None:
 
 
 def test_a_grain_that_fell_upstream_has_not_moved() -> None:
-    fallen = Motion(FLOW, np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0))
+    fallen = Motion(FLOW, np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0), NONE)
     assert fallen.fraction[-1] == pytest.approx(0.5)
 
 
@@ -70,7 +71,7 @@ def test_a_fraction_that_was_not_reached_is_empty() -> None:
 def test_intervals_enclose_their_value_where_the_stress_is_uniform(
     level: list[int], fraction: float
 ) -> None:
-    motion = Motion(FLOW, np.array(level), np.zeros(len(level), int))
+    motion = Motion(FLOW, np.array(level), *(np.zeros(len(level), int),) * 2)
     found = threshold.of_pile(motion, np.ones(len(level)), fraction, 1.0)
     if math.isnan(found.tau):
         assert motion.fraction[-1] < fraction

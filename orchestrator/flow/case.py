@@ -91,7 +91,7 @@ class FlowCase(Case):
                 f"{self.first_cell_m:g} m is not between 4 z0 = {4 * self.roughness_m:g} m, below "
                 f"which the log law fails, and h/4 = {self.height_m / 4:g} m",
                 where="first_cell_m",
-                remedy=f"{default:g} is the default; if it is too high, z0 is too large for this pile",
+                remedy=f"the default is {default:g}; if that is too high, z0 is too large",
             )
         eddy_over_molecular = (
             KARMAN * self.ustar0_m_s * self.first_cell_m / 2.0 / self.viscosity_m2_s

@@ -39,7 +39,7 @@ class CellsCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 1
+    recipe: ClassVar[int] = 3
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -78,7 +78,8 @@ class CellsCase(GrainCase):
         """Check the run and write what each grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains()
-        found = motion.read(directory, grains, self.scenes[0].protocol.marker)
+        marker = self.scenes[0].protocol.marker
+        found = motion.read(directory, grains, marker, all_rest=False)
         found.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:

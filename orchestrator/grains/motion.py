@@ -1,7 +1,6 @@
-"""What the counted grains of a deck did: who passed the marker, and at which flow."""
+"""What the counted grains of a deck did: who passed the marker, at which flow, and how."""
 
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +9,25 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
 from orchestrator.grains.deck import GrainTable
+from orchestrator.grains.dump import PASSAGE, Track, read_track
 from orchestrator.grains.protocol import SETTLE_FLOW
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 LEVELS = "levels.csv"
-PASSAGE = "passage.dump"
-BED = "bed.dump"
 HOLDS = "holds.csv"
 MOTION = "motion.csv"
+MODES = ("none", "rolled", "slid", "lifted")
+"""How a grain moved."""
+LIFTED = 0.3
+"""A grain has lifted when it rises by this over its bed, d: to roll over a neighbour takes 0.13 at
+an entrainment angle of 60 degrees."""
+ROLLED = 0.5
+"""A grain rolls when its spin makes at least this part of its speed, else it slides."""
+WINDOW = 5
+"""Looks from the passage of the marker on in which a grain may lift: 2 sqrt(d/g')."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +42,17 @@ class Motion:
         Hold (index into `flow`) in which a grain first passed the marker or left the box; 0 where
         it never did. Latched: a grain that comes back has moved.
     fallen : ndarray of int, shape (N,)
-        Hold in which a grain was first a marker's length upstream of its place; 0 for never. Such
-        a grain has not moved unless it passes the marker as well.
+        Hold in which a grain was first a marker's length upstream of its place, the first hold for
+        one that did not even stay while the bed settled; 0 for never. Such a grain has not moved,
+        unless it had passed the marker before.
+    mode : ndarray of int, shape (N,)
+        How it moved: index into `MODES`.
     """
 
     flow: FloatArray
     level: IntArray
     fallen: IntArray
+    mode: IntArray
 
     def moved_by(self, level: int) -> NDArray[np.bool_]:
         """Which grains have moved by the end of a hold."""
@@ -70,7 +82,12 @@ class Motion:
             moved=moved, not_moved=self.count - moved, fallen_upstream=self._counts(self.fallen)
         )
         holds.to_csv(directory / HOLDS, index=False)
-        columns = {"id": grains.counted_ids, "moved_in": self.level, "fallen_in": self.fallen}
+        columns = {
+            "id": grains.counted_ids,
+            "moved_in": self.level,
+            "fallen_in": self.fallen,
+            "mode": [MODES[mode] for mode in self.mode],
+        }
         pd.DataFrame(columns).to_csv(directory / MOTION, index=False)
 
     @classmethod
@@ -82,10 +99,11 @@ class Motion:
             flow=holds["flow"].to_numpy(float),
             level=grains["moved_in"].to_numpy(np.int64),
             fallen=grains["fallen_in"].to_numpy(np.int64),
+            mode=np.array([MODES.index(mode) for mode in grains["mode"]], np.int64),
         )
 
 
-def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
+def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) -> Motion:
     """Read the deck's tables of a finished run.
 
     Parameters
@@ -96,29 +114,55 @@ def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
         As the deck was given them.
     marker : float
         Displacement that counts as motion, diameters.
+    all_rest : bool
+        Whether every grain must come to rest before the flow rises: those of a pile must, cells
+        are each a bed of their own and may be one that holds no grain.
 
     Raises
     ------
     SolverError
-        If a table is cut short, grains are lost where none may be, or the counts do not reconcile.
+        If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
     """
     looks = _looks(directory)
-    travel = _travel(directory, grains, looks) / grains.diameter
-    present = ~np.isnan(travel)
-    passed = ~present | (travel >= marker)
-    fallen = present & (travel <= -marker)
-    _reconcile(directory, looks, passed, fallen)
+    track = read_track(directory / PASSAGE, grains, looks["step"].to_numpy(np.int64))
+    if all_rest and not track.stayed.all():
+        raise SolverError(
+            f"{int((~track.stayed).sum())} of {len(track.stayed)} grains were lost before the flow"
+            " rose",
+            where=str(directory / PASSAGE),
+            remedy="a smaller protocol.timestep, or look for grains that overlap",
+        )
+    present = ~np.isnan(track.travel)
+    _reconcile(directory, looks, track, present, marker)
+    fallen = ~track.stayed | (present & (track.travel <= -marker))
+    has_fallen = np.logical_or.accumulate(fallen, axis=0)
+    passed = (present & (track.travel >= marker)) | (~present & ~has_fallen)
     hold = looks["level"].to_numpy(np.int64)
     flow = looks.groupby("level")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
         level=_first(passed, hold),
         fallen=_first(fallen, hold),
+        mode=_mode(track, passed),
     )
 
 
-def _first(happened: NDArray[np.bool_], hold: IntArray) -> IntArray:
+def _first(happened: BoolArray, hold: IntArray) -> IntArray:
     return np.where(happened.any(axis=0), hold[happened.argmax(axis=0)], 0)
+
+
+def _mode(track: Track, passed: BoolArray) -> IntArray:
+    """How each grain moved, from its track around the look at which it had passed the marker."""
+    looks = np.arange(len(passed))[:, None]
+    first = np.where(passed.any(axis=0), passed.argmax(axis=0), -1)
+    present = ~np.isnan(track.travel)
+    # one that was gone by then is judged by its last look
+    last_seen = np.max(np.where(present & (looks <= first), looks, 0), axis=0)
+    window = (looks >= last_seen) & (looks < first + WINDOW) & present
+    rise = np.max(np.where(window, track.rise, -np.inf), axis=0)
+    roll = np.take_along_axis(track.roll, last_seen[None], axis=0)[0]
+    none, rolled, slid, lifted = range(len(MODES))
+    return np.select([first < 0, rise > LIFTED, roll >= ROLLED], [none, lifted, rolled], slid)
 
 
 def _looks(directory: Path) -> pd.DataFrame:
@@ -136,82 +180,16 @@ def _looks(directory: Path) -> pd.DataFrame:
         ) from None
 
 
-def _travel(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> FloatArray:
-    """Displacement along the bed at each look, m, shape (looks, N); NaN for a grain that is gone.
-
-    The dump begins with the grains' places after settling.
-    """
-    path = directory / PASSAGE
-    frames = read_dump(path, ("id", "x", "z"))
-    ids = grains.counted_ids
-    steps = np.concatenate([[frames["step"].min()], looks["step"]])
-    started = frames.loc[frames["step"] == steps[0], "id"]
-    if not np.array_equal(started, ids):
-        raise SolverError(
-            f"{len(ids) - len(started)} of {len(ids)} grains were lost before the flow rose",
-            where=str(path),
-            remedy="a smaller protocol.timestep, or look for grains that overlap",
-        )
-    row, column = np.searchsorted(steps, frames["step"]), np.searchsorted(ids, frames["id"])
-    known = np.isin(frames["step"], steps) & np.isin(frames["id"], ids)
-    if not known.all():
-        raise SolverError("it is not of these grains and holds", where=str(path))
-    place = np.full((len(steps), len(ids), 2), np.nan)
-    place[row, column] = frames[["x", "z"]]
-    along = grains.along[ids - 1]
-    return np.asarray(np.einsum("tnk,nk->tn", place[1:] - place[0], along))
-
-
 def _reconcile(
-    directory: Path,
-    looks: pd.DataFrame,
-    passed: NDArray[np.bool_],
-    fallen: NDArray[np.bool_],
+    directory: Path, looks: pd.DataFrame, track: Track, present: BoolArray, marker: float
 ) -> None:
-    """Moved + not moved = N at each look, by the deck's own count and by the grains' places."""
-    lying = looks["lying"].to_numpy(float) == (~passed).sum(axis=1)
-    back = looks["fallen"].to_numpy(float) == fallen.sum(axis=1)
-    if not (lying & back).all():
-        number = int(np.argmin(lying & back))
+    """Lying, fallen and gone make N at each look, by the deck's own count and by the places."""
+    lying = (present & (track.travel < marker)).sum(axis=1)
+    fallen = (present & (track.travel <= -marker)).sum(axis=1)
+    agree = (looks["lying"] == lying) & (looks["fallen"] == fallen)
+    if not agree.all():
         raise SolverError(
-            f"the counts do not reconcile at look {number + 1}",
+            f"the counts do not reconcile at look {int(agree.argmin()) + 1}",
             where=str(directory / LEVELS),
             remedy="grains were lost, or the tables are of different runs",
         )
-
-
-def read_dump(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
-    """Read a LIGGGHTS text dump.
-
-    Parameters
-    ----------
-    path : Path
-        The dump.
-    columns : tuple of str
-        Its columns, in order.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row for each grain and frame, with the frame's time step in the column ``step``.
-
-    Raises
-    ------
-    SolverError
-        If it is missing, cut short or not a dump of these columns.
-    """
-    try:
-        text = path.read_text(encoding="ascii")
-        frames = text.split("ITEM: TIMESTEP\n")[1:]
-        heads = [frame.split("\n", 8) for frame in frames]
-        steps = np.array([int(head[0]) for head in heads])
-        counts = np.array([int(head[2]) for head in heads])
-        body = "".join(head[8] for head in heads)
-        table = pd.read_csv(StringIO(body), sep=r"\s+", names=list(columns), header=None)
-        if len(table) != counts.sum() or table.isna().any(axis=None):
-            raise ValueError("it is cut short or holds NaN")
-    except (OSError, ValueError, IndexError) as error:
-        raise SolverError(
-            f"the dump cannot be read: {error}", where=str(path), remedy="run the case again"
-        ) from None
-    return table.assign(step=np.repeat(steps, counts))

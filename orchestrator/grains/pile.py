@@ -62,7 +62,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 2
+    recipe: ClassVar[int] = 3
 
     @property
     def bed(self) -> PileBed:
@@ -155,7 +155,8 @@ class PileCase(GrainCase):
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains(self._speed(directory.parent))
-        motion.read(directory, grains, self.scene.protocol.marker).to_csv(directory, grains)
+        found = motion.read(directory, grains, self.scene.protocol.marker, all_rest=True)
+        found.to_csv(directory, grains)
 
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.grains import motion
+from orchestrator.grains import dump, motion
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import PileCase
 
@@ -62,10 +62,10 @@ def take(pile: PileCase, cases: Path, fraction: float) -> Snapshot | None:
     if enough.empty:
         return None
     look = enough.iloc[0]
-    counted = _frame(directory / motion.PASSAGE, ("id", "x", "z"), int(look["step"]))
+    counted = _frame(directory / dump.PASSAGE, dump.PASSAGE_COLUMNS, int(look["step"]))
     last = looks.loc[looks["level"] == look["level"], "step"].iloc[-1]
     columns = ("id", "type", "x", "z", "vx", "vz", "omegay")
-    bed = _frame(directory / motion.BED, columns, int(last))
+    bed = _frame(directory / dump.BED, columns, int(last))
     packing = pile.packing
     place = packing.centres.copy()
     gone = packing.mobile.copy()
@@ -87,5 +87,5 @@ def take(pile: PileCase, cases: Path, fraction: float) -> Snapshot | None:
 
 
 def _frame(path: Path, columns: tuple[str, ...], step: int) -> pd.DataFrame:
-    dump = motion.read_dump(path, columns)
-    return dump[dump["step"] == step]
+    frames = dump.read_dump(path, columns).rows
+    return frames[frames["step"] == step]

@@ -1,0 +1,134 @@
+"""What LIGGGHTS wrote of the grains: its text dumps, and the track of the counted grains."""
+
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from orchestrator.errors import SolverError
+from orchestrator.grains.deck import GrainTable
+
+FloatArray = NDArray[np.float64]
+
+PASSAGE = "passage.dump"
+BED = "bed.dump"
+PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay")
+
+
+@dataclass(frozen=True)
+class Track:
+    """The counted grains at each look; arrays of shape (T, N), NaN for a grain that is gone.
+
+    Attributes
+    ----------
+    stayed : ndarray of bool, shape (N,)
+        Whether a grain was still there when the bed had settled.
+    travel, rise : ndarray
+        Displacement since the settling, along the bed downstream and normal to it, diameters.
+    roll : ndarray
+        Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
+    """
+
+    stayed: NDArray[np.bool_]
+    travel: FloatArray
+    rise: FloatArray
+    roll: FloatArray
+
+
+def read_track(path: Path, grains: GrainTable, steps: NDArray[np.int64]) -> Track:
+    """Read ``passage.dump``, which begins with the places after settling.
+
+    Parameters
+    ----------
+    path : Path
+        The dump.
+    grains : GrainTable
+        As the deck was given them.
+    steps : ndarray, shape (T,)
+        Time step of each look.
+
+    Raises
+    ------
+    SolverError
+        If the dump is not one of these grains and looks, or holds none of them.
+    """
+    dump = read_dump(path, PASSAGE_COLUMNS)
+    ids, rows = grains.counted_ids, dump.rows
+    if not np.array_equal(dump.steps[1:], steps):
+        raise SolverError("it is not of these holds", where=str(path), remedy="run the case again")
+    if rows.empty or not rows["id"].isin(ids).all():
+        raise SolverError(
+            "every counted grain was lost" if rows.empty else "it is not of these grains",
+            where=str(path),
+            remedy="a smaller protocol.timestep, or look for grains that overlap",
+        )
+    state = np.full((len(dump.steps), len(ids), len(PASSAGE_COLUMNS) - 1), np.nan)
+    row, column = np.searchsorted(dump.steps, rows["step"]), np.searchsorted(ids, rows["id"])
+    state[row, column] = rows[list(PASSAGE_COLUMNS[1:])]
+    return _track(state, grains.along[ids - 1], grains.diameter)
+
+
+def _track(state: FloatArray, along: FloatArray, diameter: float) -> Track:
+    shift = (state[1:, :, :2] - state[0, :, :2]) / diameter
+    outward = np.column_stack([-along[:, 1], along[:, 0]])
+    speed = np.hypot(state[1:, :, 2], state[1:, :, 3])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        roll = np.abs(state[1:, :, 4]) * diameter / 2 / speed
+    return Track(
+        stayed=~np.isnan(state[0, :, 0]),
+        travel=np.einsum("tnk,nk->tn", shift, along),
+        rise=np.einsum("tnk,nk->tn", shift, outward),
+        roll=roll,
+    )
+
+
+@dataclass(frozen=True)
+class Dump:
+    """A text dump.
+
+    Attributes
+    ----------
+    steps : ndarray of int
+        Time step of each frame, also of those without a grain.
+    rows : pandas.DataFrame
+        A row for each grain and frame, with the frame's time step in the column ``step``.
+    """
+
+    steps: NDArray[np.int64]
+    rows: pd.DataFrame
+
+
+def read_dump(path: Path, columns: tuple[str, ...]) -> Dump:
+    """Read a LIGGGHTS text dump.
+
+    Parameters
+    ----------
+    path : Path
+        The dump.
+    columns : tuple of str
+        Its columns, in order.
+
+    Raises
+    ------
+    SolverError
+        If it is missing, cut short or not a dump of these columns.
+    """
+    try:
+        text = path.read_text(encoding="ascii")
+        frames = text.split("ITEM: TIMESTEP\n")[1:]
+        heads = [frame.split("\n", 8) for frame in frames]
+        steps = np.array([int(head[0]) for head in heads])
+        counts = np.array([int(head[2]) for head in heads])
+        body = "".join(head[8] for head in heads)
+        table = pd.read_csv(StringIO(body), sep=r"\s+", names=list(columns), header=None)
+        whole = text.endswith("\n") and len(table) == counts.sum()
+        if not whole or table.isna().any(axis=None):
+            raise ValueError("it is cut short or holds NaN")
+    except (OSError, ValueError, IndexError) as error:
+        raise SolverError(
+            f"the dump cannot be read: {error}", where=str(path), remedy="run the case again"
+        ) from None
+    return Dump(steps, table.assign(step=np.repeat(steps, counts)))
