@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator import assets
-from orchestrator.solvers import process
+from orchestrator.solvers import liggghts, process
 
 Deck = Callable[..., str]
 
@@ -26,7 +26,7 @@ def run_check(tmp_path: Path) -> Deck:
         for name, value in variables.items():
             command += ["-var", name, repr(value)]
         log = folder / "log.check"
-        ended = process.run(command, cwd=folder, log=log, limit_s=60)
+        ended = process.run(command, cwd=folder, log=log, limit_s=60, env=liggghts.ENVIRONMENT)
         said = log.read_text()
         assert ended.returncode == 0, said
         assert "the check has ended" in said

@@ -89,7 +89,7 @@ def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> Non
     with (copy / "grains.data").open("a") as stream:
         stream.write("\n# the same grains\n")
     (copy / "parameters.liggghts").write_text(
-        (copy / "parameters.liggghts").read_text().replace("rise equal 1.02", "rise equal 1.03")
+        (copy / "parameters.liggghts").read_text().replace("rise equal 1.005", "rise equal 1.006")
     )
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode != 0

@@ -1,5 +1,6 @@
 """LIGGGHTS: which version is here, and what the end of a run means."""
 
+import os
 import re
 import shutil
 import subprocess
@@ -11,6 +12,9 @@ from orchestrator.errors import SolverError
 
 PROGRAM = "liggghts"
 TRIED = (3, 8)
+ENVIRONMENT = {"OMPI_MCA_ess_singleton_isolated": "1"}
+"""One process needs no MPI daemon: without this a run starts one, and waits 5 s for the name of a
+machine that resolves nowhere."""
 LAST_WORDS = "the protocol has ended"
 
 
@@ -30,7 +34,13 @@ def version() -> str:
             remedy="install it: apt-get install --no-install-recommends liggghts",
         )
     try:
-        said = subprocess.run([path, "-h"], capture_output=True, text=True, timeout=30).stdout
+        said = subprocess.run(
+            [path, "-h"],
+            capture_output=True,
+            text=True,
+            timeout=30,
+            env={**os.environ, **ENVIRONMENT},
+        ).stdout
     except (OSError, subprocess.TimeoutExpired) as error:
         raise SolverError(f"{path} does not run: {error}", remedy="reinstall liggghts") from None
     found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said)
