@@ -1,0 +1,94 @@
+"""The tables of a study: what was asked, what was measured, with units in the columns' names.
+
+Tables of results hold no time and no path of a machine: the same study gives the same bytes
+wherever and whenever it runs. What the runs took is in `timings`.
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from orchestrator import case
+from orchestrator.errors import OrchestratorError
+from orchestrator.files import write_durably
+from orchestrator.plan import Plan
+from orchestrator.study import Study
+from orchestrator.tables import piles, scenes, single
+from orchestrator.tables.columns import COLUMNS
+from orchestrator.tables.scatter import with_scatter
+
+Tables = dict[str, pd.DataFrame]
+
+__all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
+
+
+def make(study: Study, plan: Plan, cases: Path) -> Tables:
+    """The tables of a study that have rows, from the cases that are done; in the study's order."""
+    done = {name for name, one in plan.cases.items() if case.is_done(one, cases)}
+    flows = {p.flow.name: p for p in plan.piles.values() if p.flow.name in done}
+    ready = [p for p in plan.piles.values() if p.name in done and p.flow.name in done]
+    cells = [one for one in plan.cells if one.name in done]
+    asked = pd.DataFrame(scenes.rows(study, plan))
+    thresholds = pd.DataFrame(row for pile in ready for row in piles.threshold_rows(pile, cases))
+    made = {
+        "scenes": asked,
+        "single_grain": pd.DataFrame(single.rows(study, cells, cases)),
+        "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
+        "pile_grain": _concat(piles.grains(pile, cases) for pile in ready),
+        "pile_curve": _concat(piles.curve(pile, cases) for pile in ready),
+        "pile_threshold": with_scatter(thresholds, asked),
+    }
+    return {name: table for name, table in made.items() if not table.empty}
+
+
+def _concat(frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    listed = list(frames)
+    return pd.concat(listed, ignore_index=True) if listed else pd.DataFrame()
+
+
+def timings(plan: Plan, cases: Path) -> pd.DataFrame:
+    """Wall times of the finished cases."""
+    rows = []
+    for name, one in plan.cases.items():
+        state = case.done_state(one, cases)
+        if state:
+            outside = state["wall_s"] - state["solver_s"]
+            rows.append(
+                {
+                    "case": name,
+                    "kind": one.kind,
+                    "solver_s": state["solver_s"],
+                    "outside_s": outside,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
+    """Write each table as CSV and as Parquet, and what the columns mean; nothing else stays."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
+    for name, table in tables.items():
+        write_durably(folder / f"{name}.csv", table.to_csv(index=False))
+        write_durably(folder / f"{name}.parquet", table.to_parquet(index=False))
+    used = sorted({str(column) for table in tables.values() for column in table})
+    rows = [{"column": column, "meaning": COLUMNS[column]} for column in used]
+    write_durably(folder / "columns.csv", pd.DataFrame(rows).to_csv(index=False))
+
+
+def read(folder: Path) -> Tables:
+    """Read the tables that `write` wrote.
+
+    Raises
+    ------
+    OrchestratorError
+        If there are none.
+    """
+    tables = {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
+    if not tables:
+        raise OrchestratorError(
+            "there are no tables", where=str(folder), remedy="run the study first"
+        )
+    return tables

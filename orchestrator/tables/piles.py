@@ -1,0 +1,119 @@
+"""The tables of piles: the stress on them, their grains, their answer to the flow."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains import threshold
+from orchestrator.grains.motion import MODES, Motion
+from orchestrator.grains.pile import PileCase
+from orchestrator.scene import Scene
+from orchestrator.tables.scenes import Row, point
+
+
+def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame]:
+    """The friction velocity along the bed, for the flow of each pile."""
+    for pile in piles:
+        stress = WallStress.from_csv(cases / pile.flow.name / "wall_stress.csv")
+        yield pd.DataFrame(
+            {
+                "flow_case": pile.flow.name,
+                "alpha_deg": pile.bed.slope_deg,
+                "h_m": pile.bed.height,
+                "z0_m": pile.bed.roughness,
+                "s_m": stress.s_m,
+                "s_over_h": stress.s_m / pile.bed.height,
+                "x_m": stress.x_m,
+                "z_m": stress.z_m,
+                "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
+                "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
+                "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
+            }
+        )
+
+
+def grains(pile: PileCase, cases: Path) -> pd.DataFrame:
+    """The windward grains of a pile: the stress on each, when and how it moved."""
+    motion, face = Motion.from_csv(cases / pile.name), pile.face(cases)
+    found = threshold.of_grains(motion)
+    return pd.DataFrame(
+        {
+            "scene_id": pile.scene.id,
+            "grain_id": face.ids,
+            "s_m": face.arc_length,
+            "ustar_over_ustar0": face.speed,
+            "moved_in_hold": motion.level,
+            "fallen_in_hold": motion.fallen,
+            "mode": [MODES[mode] for mode in motion.mode],
+            "ustar0_m_s": found.value,
+        }
+    )
+
+
+def curve(pile: PileCase, cases: Path) -> pd.DataFrame:
+    """The fraction of a pile that had moved, and the stress on it, at each hold."""
+    scene, motion = pile.scene, Motion.from_csv(cases / pile.name)
+    curve = threshold.curve(motion, pile.face(cases).speed, scene.fluid.density)
+    moved = np.rint(curve.fraction * motion.count).astype(int)
+    holds = np.arange(len(motion.flow))
+    return pd.DataFrame(
+        {
+            "scene_id": scene.id,
+            "hold": holds,
+            "u_e_m_s": curve.ustar0 * _lid_speed_ratio(pile),
+            "ustar0_m_s": curve.ustar0,
+            "count": motion.count,
+            "moved": moved,
+            "not_moved": motion.count - moved,
+            "fallen_upstream": [
+                int(((motion.fallen > 0) & (motion.fallen <= k)).sum()) for k in holds
+            ],
+            "fraction_moved": curve.fraction,
+            "mean_tau_pa": curve.mean_tau,
+            "shields": _shields(scene, curve.mean_tau),
+            "reynolds": _reynolds(scene, curve.mean_tau),
+        }
+    )
+
+
+def threshold_rows(pile: PileCase, cases: Path) -> Iterator[Row]:
+    """The threshold of a pile at each fraction that its scene asks for."""
+    scene, motion = pile.scene, Motion.from_csv(cases / pile.name)
+    speed = pile.face(cases).speed
+    pivot = pile.pivot_thresholds(speed)
+    for fraction in scene.protocol.fractions:
+        found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
+        yield {
+            "scene_id": scene.id,
+            **point(scene),
+            "packing": pile.bed.packing,
+            "stress": scene.flow.stress,
+            "fraction": fraction,
+            "shields": _shields(scene, found.tau),
+            "shields_low": _shields(scene, found.tau_low),
+            "shields_high": _shields(scene, found.tau_high),
+            "reynolds": _reynolds(scene, found.tau),
+            "ustar0_m_s": found.ustar0,
+            "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
+            "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
+            "count": motion.count,
+            "highest_fraction": motion.fraction[-1],
+            "case": pile.name,
+        }
+
+
+def _lid_speed_ratio(pile: PileCase) -> float:
+    return pile.flow.speed_m_s / pile.flow.ustar0_m_s
+
+
+def _shields(scene: Scene, tau: Any) -> Any:
+    return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
+
+
+def _reynolds(scene: Scene, tau: Any) -> Any:
+    ustar = np.sqrt(tau / scene.fluid.density)
+    return ustar * scene.grain.diameter / scene.fluid.viscosity

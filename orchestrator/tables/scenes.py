@@ -1,0 +1,64 @@
+"""The table of scenes: what was asked."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from orchestrator.plan import Plan
+from orchestrator.scene import PileBed, Scene
+from orchestrator.study import Study
+
+Row = dict[str, Any]
+
+
+def rows(study: Study, plan: Plan) -> Iterator[Row]:
+    """A row for each scene of each group, in the study's order."""
+    cell_of = {scene.id: one.name for one in plan.cells for scene in one.scenes}
+    for group in study.groups:
+        for scene in group.scenes:
+            pile = plan.piles.get(scene.id)
+            yield {
+                "scene_id": scene.id,
+                "group": group.name,
+                "bed": scene.bed.kind,
+                **point(scene),
+                **_choices(scene),
+                "case": pile.name if pile else cell_of[scene.id],
+                "flow_case": pile.flow.name if pile else None,
+            }
+
+
+def point(scene: Scene) -> Row:
+    """The columns by which a scene is found in a figure."""
+    return {
+        "alpha_deg": scene.bed.slope_deg,
+        "beta_deg": scene.bed.entrainment_angle_deg,
+        "d_m": scene.grain.diameter,
+        # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
+        "z0_over_d": round(scene.bed.roughness / scene.grain.diameter, 9),
+        "nu_m2_s": scene.fluid.viscosity,
+        "closure": scene.closure,
+        "regime": scene.regime,
+    }
+
+
+def _choices(scene: Scene) -> Row:
+    pile = scene.bed if isinstance(scene.bed, PileBed) else None
+    return {
+        "phi_deg": scene.grain.friction_angle_deg,
+        "rho_sol_kg_m3": scene.grain.density,
+        "rho_f_kg_m3": scene.fluid.density,
+        "g_m_s2": scene.fluid.gravity,
+        "z0_m": scene.bed.roughness,
+        "h_m": pile.height if pile else None,
+        "packing": pile.packing if pile else None,
+        "disorder": pile.disorder if pile and pile.packing == "disordered" else None,
+        "seed": pile.seed if pile and pile.packing == "disordered" else None,
+        "mobile_layers": pile.mobile_layers if pile else None,
+        "stress": scene.flow.stress if pile else None,
+        "alpha_s": scene.flow.lift_coefficient,
+        "stiffness": scene.grain.stiffness,
+        "damping": scene.grain.damping,
+        "step": scene.protocol.step,
+        "quiet": scene.protocol.quiet,
+        "marker": scene.protocol.marker,
+    }

@@ -1,0 +1,45 @@
+"""The table of single grains: closed form and DEM."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from orchestrator.grains import threshold
+from orchestrator.grains.cells import CellsCase
+from orchestrator.grains.motion import Motion
+from orchestrator.scene import Scene
+from orchestrator.study import Study
+from orchestrator.tables.scenes import Row, point
+
+
+def rows(study: Study, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
+    """A row for each scene of the finished cases, in the study's order."""
+    found_rows: dict[str, Row] = {}
+    for one in cells:
+        motion = Motion.from_csv(cases / one.name)
+        found = threshold.of_grains(motion)
+        brackets = zip(found.value, found.low, found.high, strict=True)
+        for scene, bracket, fallen in zip(one.scenes, brackets, motion.fallen > 0, strict=True):
+            row = {**_row(scene, bracket), "fell_upstream": bool(fallen)}
+            found_rows[scene.id] = {**row, "case": one.name}
+    yield from (found_rows[scene.id] for scene in study.scenes if scene.id in found_rows)
+
+
+def _row(scene: Scene, bracket: tuple[float, float, float]) -> Row:
+    exact = scene.closed_form(scene.closure)
+    ustar, shields = float(exact.friction_velocity), float(exact.shields)
+    value, low, high = bracket
+    return {
+        "scene_id": scene.id,
+        **point(scene),
+        "reynolds": float(exact.reynolds) * value,
+        "reynolds_closed_form": float(exact.reynolds),
+        "shields_closed_form": shields,
+        "shields_dem": shields * value**2,
+        "shields_dem_low": shields * low**2,
+        "shields_dem_high": shields * high**2,
+        "ustar_closed_form_m_s": ustar,
+        "ustar_m_s": ustar * value,
+        "ustar_low_m_s": ustar * low,
+        "ustar_high_m_s": ustar * high,
+        "drag_over_weight": float(exact.drag) / scene.weight,
+    }

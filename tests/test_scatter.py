@@ -1,0 +1,54 @@
+"""The scatter over seeds, from thresholds that are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.tables.scatter import with_scatter
+
+
+def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
+    # three seeds of one disordered pile, one regular pile of the same slope, one of another
+    shields = [0.95, 1.0, 1.05, 2.0, 3.0]
+    thresholds = pd.DataFrame(
+        {
+            "scene_id": list("abcde"),
+            "alpha_deg": [15.0, 15.0, 15.0, 15.0, 30.0],
+            "closure": "high",
+            "fraction": 0.5,
+            "d_m": 1e-3,
+            "z0_over_d": 0.1,
+            "nu_m2_s": 1e-5,
+            "stress": "wall",
+            "shields": shields,
+            "shields_low": np.multiply(shields, 0.98),
+            "shields_high": np.multiply(shields, 1.02),
+        }
+    )
+    seeds = [0.0, 1.0, 2.0, np.nan, np.nan]
+    disorder = [0.02, 0.02, 0.02, np.nan, np.nan]
+    scenes = pd.DataFrame({"scene_id": list("abcde"), "seed": seeds, "disorder": disorder})
+    return thresholds, scenes
+
+
+def test_half_the_range_widens_the_interval_of_piles_of_the_same_slope() -> None:
+    found = with_scatter(*_tables()).set_index("scene_id")
+    assert found.loc["d", "scatter"] == pytest.approx(0.05)
+    assert found.loc["d", "shields_low"] == pytest.approx(2.0 * 0.98 * 0.95)
+    assert found.loc["d", "shields_high"] == pytest.approx(2.0 * 1.02 * 1.05)
+
+
+def test_without_seeds_there_is_no_scatter() -> None:
+    found = with_scatter(*_tables()).set_index("scene_id")
+    assert np.isnan(found.loc["e", "scatter"])
+    assert found.loc["e", "shields_low"] == pytest.approx(3.0 * 0.98)
+
+
+def test_one_seed_is_not_a_range() -> None:
+    thresholds, scenes = _tables()
+    found = with_scatter(thresholds.iloc[[0, 3]], scenes)
+    assert found["scatter"].isna().all()
+
+
+def test_no_piles_no_table() -> None:
+    assert with_scatter(pd.DataFrame(), pd.DataFrame()).empty
