@@ -159,6 +159,15 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     return state if isinstance(state, dict) and _vouched(directory, state) else None
 
 
+def programs(cases: Path) -> dict[str, str]:
+    """The programs, with versions, that the cases in a directory were made with."""
+    found: dict[str, str] = {}
+    for path in sorted(cases.glob(f"*/{IDENTITY}")):
+        identity = read_json(path)
+        found.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
+    return found
+
+
 def _vouched(directory: Path, state: dict[str, Any]) -> bool:
     try:
         digests = {**state["results_sha256"], **state["derived_sha256"]}

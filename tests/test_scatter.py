@@ -40,7 +40,7 @@ def test_half_the_range_widens_the_interval_of_piles_of_the_same_slope() -> None
 
 def test_without_seeds_there_is_no_scatter() -> None:
     found = with_scatter(*_tables()).set_index("scene_id")
-    assert np.isnan(found.loc["e", "scatter"])
+    assert found["scatter"].isna()["e"]
     assert found.loc["e", "shields_low"] == pytest.approx(3.0 * 0.98)
 
 
