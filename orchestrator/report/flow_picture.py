@@ -35,7 +35,10 @@ def plan(results: Results, folder: Path) -> Iterator[Picture]:
     names = tuple(pile.flow.name for pile in piles)
     yield Picture(
         Figure("flow", "Flow over the pile", captions.flow(piles), names, None),
-        tuple(_job(results.cases, pile, window, folder) for pile in piles),
+        tuple(
+            sampling(results.cases, pile, window, pile.bed.height, _file(folder, pile))
+            for pile in piles
+        ),
         lambda: _frame(piles, window, folder),
     )
 
@@ -46,15 +49,18 @@ def _window(piles: list[PileCase]) -> Window:
     return -BEFORE, toe + BEHIND, 0.0, ABOVE
 
 
-def _job(cases: Path, pile: PileCase, window: Window, folder: Path) -> dict[str, object]:
+def sampling(
+    cases: Path, pile: PileCase, window: Window, unit: float, out: Path
+) -> dict[str, object]:
+    """The job that samples the velocity over a pile; the window is in a unit, that in m."""
     left, right, bottom, top = window
     rows = round(COLUMNS * (top - bottom) / (right - left))
     return {
         "kind": "flow",
         "case": str((cases / pile.flow.name).resolve()),
-        "window": [edge * pile.bed.height for edge in window],
+        "window": [edge * unit for edge in window],
         "shape": [rows, COLUMNS],
-        "out": str(_file(folder, pile)),
+        "out": str(out),
     }
 
 

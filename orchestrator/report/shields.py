@@ -146,7 +146,9 @@ def draw_sloped_air(ax: Axes, scenes: pd.DataFrame, colour: str) -> list[Artist]
         return []
     ax.plot(*lines[name], color=colour, ls="--", lw=0.7, zorder=1.5, gid=f"air: {name}")
     label = f"air: {name} × slope factor"
-    return [Line2D([], [], color="0.2", ls="--", lw=0.7, label=label)]
+    # a colour that means one slope says nothing of the others
+    shown = colour if colour == style.AIR else "0.2"
+    return [Line2D([], [], color=shown, ls="--", lw=0.7, label=label)]
 
 
 def line_entries() -> list[Artist]:

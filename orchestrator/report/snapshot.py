@@ -1,4 +1,4 @@
-"""The grains of a pile at the instant when a fraction of them has moved."""
+"""The grains of a pile at one look of its deck, and at all of them."""
 
 import math
 from dataclasses import dataclass
@@ -14,6 +14,9 @@ from orchestrator.grains.pile import PileCase
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 
 
 @dataclass(frozen=True)
@@ -24,10 +27,11 @@ class Snapshot:
     ----------
     start, place : ndarray, shape (n, 2)
         x and z of the centres in the packing and now.
-    mobile, gone : ndarray of bool, shape (n,)
-        May move; has left the box.
-    fraction : float
-        n/N that was to be reached.
+    mobile, exposed, gone : ndarray of bool, shape (n,)
+        May move; is one of the N counted; has left the box.
+    mode : ndarray of int, shape (n,)
+        How a counted grain moved, index into `orchestrator.grains.motion.MODES`: 0 while it has
+        not, and for all others.
     hold : int
         Number of the hold.
     ustar0 : float
@@ -37,8 +41,9 @@ class Snapshot:
     start: FloatArray
     place: FloatArray
     mobile: BoolArray
+    exposed: BoolArray
     gone: BoolArray
-    fraction: float
+    mode: IntArray
     hold: int
     ustar0: float
 
@@ -47,45 +52,93 @@ class Snapshot:
         """Distance of each grain from its start, shape (n,)."""
         return np.asarray(np.hypot(*(self.place - self.start).T))
 
+    @property
+    def moved(self) -> int:
+        """How many of the counted grains have moved."""
+        return int((self.mode > 0).sum())
 
-def take(pile: PileCase, cases: Path, fraction: float) -> Snapshot | None:
-    """The first look at which a fraction of the exposed windward grains had moved.
 
-    Those grains are in ``passage.dump`` at every look; all other mobile ones in ``bed.dump``, at
-    the end of the hold. None if the fraction was not reached.
+@dataclass(frozen=True)
+class Passage:
+    """What the grains of a pile did at each of the T looks of its deck; lengths in d.
+
+    Attributes
+    ----------
+    pile : PileCase
+        The pile.
+    looks : DataFrame
+        The deck's table of looks, T rows.
+    exposed : ndarray, shape (T + 1, N, 2)
+        x and z of the counted grains, first after settling; NaN where one is gone.
+    rest : ndarray, shape (holds, n, 2)
+        x and z of the mobile grains at the end of each hold, NaN for all others.
+    passed : ndarray of bool, shape (T, N)
+        Which counted grains have moved by then.
+    mode : ndarray of int, shape (N,)
+        How each counted grain moved in the end.
     """
+
+    pile: PileCase
+    looks: pd.DataFrame
+    exposed: FloatArray
+    rest: FloatArray
+    passed: BoolArray
+    mode: IntArray
+
+    def first(self, fraction: float) -> int | None:
+        """The first look at which a fraction of the counted grains had moved, if any."""
+        needed = max(math.ceil(fraction * len(self.mode) - 1e-9), 1)
+        enough = np.flatnonzero(self.passed.sum(axis=1) >= needed)
+        return int(enough[0]) if len(enough) else None
+
+    def at(self, look: int) -> Snapshot:
+        """The grains at a look: those not counted are known at the end of its hold only."""
+        packing, row = self.pile.packing, self.looks.iloc[look]
+        now = np.where(packing.mobile[:, None], self.rest[int(row["level"]) - 1], packing.centres)
+        now[packing.windward] = self.exposed[look + 1]
+        gone = np.isnan(now[:, 0])
+        mode = np.zeros(len(now), np.int64)
+        mode[packing.windward] = np.where(self.passed[look], self.mode, 0)
+        return Snapshot(
+            start=packing.centres,
+            place=np.where(gone[:, None], packing.centres, now),
+            mobile=packing.mobile,
+            exposed=packing.windward,
+            gone=gone,
+            mode=mode,
+            hold=int(row["level"]),
+            ustar0=float(row["flow"]),
+        )
+
+
+def read(pile: PileCase, cases: Path) -> Passage:
+    """Read the dumps of a finished pile."""
     directory, d = cases / pile.name, pile.scene.grain.diameter
     looks = pd.read_csv(directory / motion.LEVELS)
-    count = Motion.from_csv(directory).count
-    needed = max(math.ceil(fraction * count - 1e-9), 1)
-    enough = looks[looks["lying"] <= count - needed]
-    if enough.empty:
-        return None
-    look = enough.iloc[0]
-    counted = _frame(directory / dump.PASSAGE, dump.PASSAGE_COLUMNS, int(look["step"]))
-    last = looks.loc[looks["level"] == look["level"], "step"].iloc[-1]
-    columns = ("id", "type", "x", "z", "vx", "vz", "omegay")
-    bed = _frame(directory / dump.BED, columns, int(last))
-    packing = pile.packing
-    place = packing.centres.copy()
-    gone = packing.mobile.copy()
-    windward = packing.windward
-    for table, chosen in ((bed, ~windward), (counted, windward)):
-        index = table["id"].to_numpy(int) - 1
-        own = chosen[index]
-        place[index[own]] = table.loc[own, ["x", "z"]].to_numpy(float) / d
-        gone[index[own]] = False
-    return Snapshot(
-        packing.centres,
-        place,
-        packing.mobile,
-        gone,
-        fraction,
-        int(look["level"]),
-        float(look["flow"]),
-    )
+    counted = np.cumsum(pile.packing.windward) - 1
+    passage = dump.read_dump(directory / dump.PASSAGE, dump.PASSAGE_COLUMNS)
+    exposed = np.full((len(passage.steps), pile.packing.count, 2), np.nan)
+    _place(exposed, passage.rows, passage.steps, counted, d)
+    ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
+    bed = dump.read_dump(directory / dump.BED, BED_COLUMNS)
+    rest = np.full((len(ends), len(counted), 2), np.nan)
+    _place(rest, bed.rows, ends, np.arange(len(counted)), d)
+    passed = _passed(exposed, pile)
+    return Passage(pile, looks, exposed, rest, passed, Motion.from_csv(directory).mode)
 
 
-def _frame(path: Path, columns: tuple[str, ...], step: int) -> pd.DataFrame:
-    frames = dump.read_dump(path, columns).rows
-    return frames[frames["step"] == step]
+def _place(
+    into: FloatArray, rows: pd.DataFrame, steps: IntArray, columns: IntArray, d: float
+) -> None:
+    """Write the places of a dump's rows into an array by frame and grain."""
+    column = columns[rows["id"].to_numpy(int) - 1]
+    into[np.searchsorted(steps, rows["step"]), column] = rows[["x", "z"]].to_numpy(float) / d
+
+
+def _passed(exposed: FloatArray, pile: PileCase) -> BoolArray:
+    """As `orchestrator.grains.motion.read` counts: one that went upstream has not moved."""
+    marker = pile.scene.protocol.marker
+    travel = (exposed[1:] - exposed[0]) @ pile.triangle.tangent
+    fallen = np.logical_or.accumulate(travel <= -marker, axis=0)
+    passed = (travel >= marker) | (np.isnan(travel) & ~fallen)
+    return np.asarray(np.logical_or.accumulate(passed, axis=0))

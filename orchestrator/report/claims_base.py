@@ -1,0 +1,205 @@
+"""What a judged claim is, and how scenes of a study are compared."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.closures import Closure
+from orchestrator.report.results import split, valid
+from orchestrator.tables import Tables
+
+Verdict = Literal["reproduced", "partly", "not", "no data"]
+
+MOST = 0.95
+"""Share of comparisons from which a claim counts as reproduced; one less it: as not."""
+BY_SHARE = (
+    f"reproduced: so in at least {MOST:.0%} of the comparisons of each regime; not: in at most "
+    f"{1 - MOST:.0%} of each; else partly"
+)
+QUIET = 5.0
+"""Least quiet time of what is a hold rather than a ramp, sqrt(d/g')."""
+NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
+SCENE = (
+    "alpha_deg",
+    "beta_deg",
+    "d_m",
+    "z0_over_d",
+    "nu_m2_s",
+    "closure",
+    "phi_deg",
+    "rho_sol_kg_m3",
+    "rho_f_kg_m3",
+    "g_m_s2",
+    "h_m",
+    "packing",
+    "disorder",
+    "seed",
+    "mobile_layers",
+    "stress",
+    "alpha_s",
+    "stiffness",
+    "damping",
+    "step",
+    "quiet",
+    "marker",
+    "fraction",
+)
+"""Columns in which two rows must agree, but for the one along which they are compared."""
+CHOICES = ("phi_deg", "alpha_s", "stiffness", "damping", "step", "quiet", "marker")
+"""Columns of which single grains are judged at one combination: the one with most scenes."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper, judged.
+
+    Attributes
+    ----------
+    says, where : str
+        The paper's words in short, and its section or figure.
+    measured : tuple of str
+        What this study gives.
+    rule : str
+        When it counts as reproduced, partly or not.
+    verdict : {"reproduced", "partly", "not", "no data"}
+        By the rule, from the numbers.
+    why : str
+        The physics behind it.
+    figures : tuple of str
+        How the names of the page's figures that show it begin.
+    """
+
+    says: str
+    where: str
+    measured: tuple[str, ...]
+    rule: str
+    verdict: Verdict
+    why: str
+    figures: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The tables of a study, as the claims are judged by them."""
+
+    tables: Tables
+
+    @cached_property
+    def scenes(self) -> pd.DataFrame:
+        """Every scene once."""
+        return self.tables["scenes"].drop_duplicates("scene_id")
+
+    def joined(self, name: str) -> pd.DataFrame:
+        """A table with its scenes' columns; it has all columns even where it has no rows."""
+        table = self.tables.get(name, pd.DataFrame())
+        if table.empty:
+            columns = [*self.scenes, *SCENE, *EMPTY]
+            return pd.DataFrame(columns=list(dict.fromkeys(columns))).astype(object)
+        extra = [column for column in self.scenes if column not in table or column == "scene_id"]
+        return table.merge(self.scenes[extra], on="scene_id", how="left", validate="many_to_one")
+
+    @cached_property
+    def grains(self) -> pd.DataFrame:
+        """Single grains whose closure holds, of any protocol."""
+        table = self.joined("single_grain")
+        return table[valid(table)]
+
+    @cached_property
+    def held(self) -> pd.DataFrame:
+        """Those of them under held flows, at the study's commonest contact and protocol."""
+        held = self.grains[self.grains["quiet"] >= QUIET]
+        counts = held.groupby(list(CHOICES), sort=True).size()
+        if counts.empty:
+            return held
+        commonest = dict(zip(CHOICES, counts.idxmax(), strict=True))
+        return held[(held[list(commonest)] == pd.Series(commonest)).all(axis=1)]
+
+    def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
+        """A table of piles whose closure holds, of one packing and one stress."""
+        table = self.joined(name)
+        return table[valid(table) & (table["packing"] == packing) & (table["stress"] == stress)]
+
+
+EMPTY = (
+    "ustar_m_s",
+    "ustar_closed_form_m_s",
+    "ustar0_m_s",
+    "shields",
+    "shields_dem",
+    "shields_dem_low",
+    "shields_closed_form",
+    "reynolds",
+    "reynolds_closed_form",
+    "count",
+    "moved",
+    "fraction_moved",
+    "mode",
+    "s_m",
+    "moved_in_hold",
+)
+"""Columns of results that are asked for even of tables without rows."""
+
+
+def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = ()) -> pd.DataFrame:
+    """Neighbours in one column that agree in all other parameters.
+
+    Returns
+    -------
+    DataFrame
+        A row for each pair: ``closure``, ``low`` and ``high`` of the column, and ``ratio``, the
+        value at the higher over that at the lower; NaN where one is missing.
+    """
+    keys = [c for c in SCENE if c in table and c != along and c not in ignore]
+    rows = []
+    for _, own in split(table, *keys):
+        own = own.sort_values(along, kind="stable")
+        x, y = own[along].to_numpy(float), own[value].to_numpy(float)
+        steps = np.flatnonzero(np.diff(x) > 0)
+        rows += [(own["closure"].iloc[0], x[i], x[i + 1], y[i + 1] / y[i]) for i in steps]
+    return pd.DataFrame(rows, columns=["closure", "low", "high", "ratio"])
+
+
+def rising(found: pd.DataFrame, each: str, names: tuple[str, str] = ("rises", "ratio")) -> str:
+    """How many pairs rise, and by how much in the middle."""
+    known = found["ratio"].dropna()
+    silent = len(found) - len(known)
+    text = (
+        f"{names[0]} in {int((known > 1).sum())} of {len(known)} pairs, by a factor of "
+        f"{known.median():.3f} in the median ({known.min():.3f} … {known.max():.3f}) {each}"
+    )
+    return text + (f"; {silent} pairs without a threshold" if silent else "")
+
+
+def by_regime(found: pd.DataFrame, each: str) -> tuple[str, ...]:
+    """`rising` for each regime that has pairs."""
+    parts = {closure: found[found["closure"] == closure] for closure in NAMES}
+    return tuple(
+        f"{NAMES[closure]}: {rising(part, each)}"
+        for closure, part in parts.items()
+        if part["ratio"].notna().any()
+    )
+
+
+def up(found: pd.DataFrame) -> Verdict:
+    """Whether a value rises, by `BY_SHARE`."""
+    known = found[found["ratio"].notna()]
+    return combined(by_share(part["ratio"] > 1) for _, part in split(known, "closure"))
+
+
+def by_share(true: Iterable[object]) -> Verdict:
+    """The verdict of yes and no."""
+    answers = np.array(list(true), bool)
+    if not len(answers):
+        return "no data"
+    share = answers.mean()
+    return "reproduced" if share >= MOST else "not" if share <= 1 - MOST else "partly"
+
+
+def combined(verdicts: Iterable[Verdict]) -> Verdict:
+    """One verdict of several: partly where they differ."""
+    known = {verdict for verdict in verdicts if verdict != "no data"}
+    return "no data" if not known else known.pop() if len(known) == 1 else "partly"
