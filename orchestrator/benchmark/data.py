@@ -39,6 +39,12 @@ SCENES = {
     "step": "step",
     "quiet": "quiet",
     "marker": "marker",
+    "timestep": "timestep",
+    "until": "until",
+    "solve_u_e_m_s": "solve_u_e",
+    "solve_nu_m2_s": "solve_nu",
+    "first_cell_m": "first_cell_m",
+    "cells_per_face": "cells_per_face",
 }
 SINGLE_GRAIN = {
     "scene_id": "scene_id",

@@ -61,4 +61,10 @@ def _choices(scene: Scene) -> Row:
         "step": scene.protocol.step,
         "quiet": scene.protocol.quiet,
         "marker": scene.protocol.marker,
+        "timestep": scene.protocol.timestep,
+        "until": scene.protocol.until if pile else None,
+        "solve_u_e_m_s": scene.flow.speed if pile else None,
+        "solve_nu_m2_s": scene.flow.viscosity if pile else None,
+        "first_cell_m": scene.first_cell_height if pile else None,
+        "cells_per_face": scene.flow.cells_per_face if pile else None,
     }
