@@ -6,7 +6,9 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import curves
+from orchestrator.grains import motion
 from orchestrator.grains.pile import PileCase
+from orchestrator.grains.protocol import LOOK
 from orchestrator.report import labels, reference, theory
 from orchestrator.report.results import Results, valid
 from orchestrator.report.snapshot import Snapshot
@@ -174,16 +176,42 @@ def flow(piles: list[PileCase]) -> str:
     )
 
 
-def grains(pile: PileCase, found: Snapshot) -> str:
+def grains(pile: PileCase, found: Snapshot, fraction: float) -> str:
     """Of the picture of the grains."""
-    ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
     return (
-        f"After Fig. 13 of the paper. The instant when {found.fraction:.0%} of the N = "
-        f"{int(pile.packing.count)} exposed windward grains had moved: hold {found.hold}, u*₀ = "
-        f"{found.ustar0:.3g} m/s, z₀ = {ratio}, {pile.bed.packing} packing, forces of "
-        f"{'Eq. 2' if pile.scene.closure == 'low' else 'Eq. 4'}. Colour: distance from the grain’s "
-        f"place in the packing; a grain counts as moved from {pile.scene.protocol.marker:g} d "
-        "downstream along the bed. Hollow: grains that had left the box, where they lay. Exposed "
-        "windward grains are drawn at that instant, other mobile ones (which hardly move) at the "
-        "end of the hold. The pile’s inside, which cannot move, is not part of the case."
+        f"After Fig. 13 of the paper. The first look at which {fraction:.0%} of the N = "
+        f"{pile.packing.count} exposed windward grains had moved ({found.moved}): hold "
+        f"{found.hold}, u*₀ = {found.ustar0:.3g} m/s, {_forces(pile)} Above, colour is the "
+        "distance from the grain’s place in the packing; a grain counts as moved from "
+        f"{pile.scene.protocol.marker:g} d downstream along the bed. Below, colour and symbol are "
+        f"how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which does not "
+        "see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that had left "
+        "the box, where they lay (without a symbol: not counted). Other mobile grains, which "
+        "hardly move, are drawn at the end of the hold. Plain grey: the inside of the pile, which "
+        "touches no mobile grain and is left out of the case."
+    )
+
+
+def crest(pile: PileCase, looks: int) -> str:
+    """Of the animation."""
+    return (
+        f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
+        f"symbol: how a grain moved, from {pile.scene.protocol.marker:g} d on: {_modes()} Hollow: "
+        f"left the box, where it lay. The {looks} frames are looks of the deck, {LOOK:g} √(d/g′) "
+        "apart where none is left out: left out are those at which no grain moves near its "
+        "place, so that grains jump or vanish where time was skipped. Other mobile grains are "
+        "drawn at the end of each hold."
+    )
+
+
+def _forces(pile: PileCase) -> str:
+    ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
+    equation = "Eq. 2" if pile.scene.closure == "low" else "Eq. 4"
+    return f"z₀ = {ratio}, {pile.bed.packing} packing, forces of {equation}."
+
+
+def _modes() -> str:
+    return (
+        f"lifted when it rose by more than {motion.LIFTED:g} d over the bed, else rolled when its "
+        f"spin made at least {motion.ROLLED:.0%} of its speed, else slid."
     )

@@ -1,12 +1,13 @@
 """All figures of a study, in the order of the page."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from matplotlib import rc_context
 
 from orchestrator.report import (
+    animation,
     flow_picture,
     grain_picture,
     pictures,
@@ -20,17 +21,21 @@ from orchestrator.report.results import Results
 
 
 def draw(results: Results, folder: Path) -> Iterator[tuple[Figure, bytes]]:
-    """Write each figure's files into a folder; give it with its PNG, or b"" if it is missing."""
+    """Write each figure's files into a folder; give it with its image, or b"" if it is missing.
+
+    The image is a PNG, of an animation a GIF.
+    """
     with rc_context(style.RC):
-        for figure in _figures(results):
-            yield figure, style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
+        yield from _saved(single.draw(results), folder)
+        yield from _saved(_pictures(results), folder)
+        yield from animation.draw(results, folder)
+        yield from _saved(stress.draw(results), folder)
+        yield from _saved(piles.draw(results), folder)
 
 
-def _figures(results: Results) -> Iterator[Figure]:
-    yield from single.draw(results)
-    yield from _pictures(results)
-    yield from stress.draw(results)
-    yield from piles.draw(results)
+def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[tuple[Figure, bytes]]:
+    for figure in figures:
+        yield figure, style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
 
 
 def _pictures(results: Results) -> Iterator[Figure]:

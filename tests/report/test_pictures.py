@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from orchestrator.grains import motion
 from orchestrator.report import flow_picture, grain_picture, pictures, snapshot
 from orchestrator.report.results import Results
+from orchestrator.report.snapshot import Passage
 
 WINDOW = [-1.0, 3.0, -1.0, 1.0]
 
@@ -67,42 +69,78 @@ def test_field_is_that_of_the_flow(results: Results, tmp_path: Path) -> None:
     assert np.asarray(image.get_array()) == pytest.approx(speed, nan_ok=True)
 
 
-def test_snapshot_is_the_first_look_with_enough_grains_moved(results: Results) -> None:
+@pytest.fixture(scope="module")
+def passage(results: Results) -> Passage:
     (pile,) = results.plan.piles.values()
+    return snapshot.read(pile, results.cases)
+
+
+def test_grains_have_passed_as_the_tables_say(results: Results, passage: Passage) -> None:
+    curve = results.tables["pile_curve"]
+    ends = np.flatnonzero(np.diff(passage.looks["level"], append=0))
+    assert passage.passed.sum(axis=1)[ends].tolist() == curve["moved"].tolist()[-len(ends) :]
+    lost = passage.at(len(passage.looks) - 1)
+    table = results.tables["pile_grain"]
+    modes = [motion.MODES[mode] for mode in lost.mode[passage.pile.packing.windward]]
+    assert modes == table["mode"].tolist()
+    assert not (lost.mode[~lost.exposed] > 0).any()
+
+
+def test_snapshot_is_the_first_look_with_enough_grains_moved(
+    results: Results, passage: Passage
+) -> None:
     for fraction in (0.3, 0.7):
-        found = snapshot.take(pile, results.cases, fraction)
-        assert found is not None
-        own = pile.packing.windward
-        along = (found.place - found.start) @ pile.triangle.tangent
-        moved = own & (found.gone | (along >= 0.3 - 1e-6))
-        needed = int(np.ceil(fraction * own.sum()))
-        assert needed <= moved.sum() + 1
+        look = passage.first(fraction)
+        assert look is not None
+        found, before = passage.at(look), passage.at(look - 1)
+        needed = int(np.ceil(fraction * passage.pile.packing.count))
+        assert before.moved < needed <= found.moved
+        along = (found.place - found.start) @ passage.pile.triangle.tangent
+        assert (found.mode[found.exposed & (found.gone | (along >= 0.31))] > 0).all()
         curve = results.tables["pile_curve"]
-        hold = curve[curve["moved"] >= needed]["hold"].iloc[0]
-        assert found.hold == hold
+        assert found.hold == curve[curve["moved"] >= needed]["hold"].iloc[0]
         assert not found.gone[~found.mobile].any()
         assert (found.displacement[~found.mobile] == 0).all()
 
 
-def test_no_snapshot_of_what_was_not_reached(results: Results) -> None:
-    (pile,) = results.plan.piles.values()
-    assert snapshot.take(pile, results.cases, 1.0) is None
+def test_no_snapshot_of_what_was_not_reached(passage: Passage) -> None:
+    assert passage.first(1.0) is None
 
 
 def test_picture_shows_grains_that_are_gone_where_they_lay(
+    results: Results, passage: Passage, tmp_path: Path
+) -> None:
+    (planned,) = grain_picture.plan(results, tmp_path)
+    assert pictures.run(planned.jobs, tmp_path) == ""
+    figure = planned.finished("")
+    assert figure.canvas is not None
+    look = passage.first(0.3)
+    assert look is not None
+    found = passage.at(look)
+    how = figure.canvas.axes[1]
+    for ax in figure.canvas.axes[:2]:
+        (gone,) = [c for c in ax.collections if c.get_gid() == "gone"]
+        offsets = np.asarray(gone.get_offsets())
+        assert offsets == pytest.approx(found.start[found.gone])
+    assert 0 < len(offsets) <= 0.3 * passage.pile.packing.count + 2
+    drawn = {line.get_gid(): len(np.asarray(line.get_xydata())) for line in how.lines}
+    for number, name in enumerate(motion.MODES[1:], 1):
+        assert drawn[f"{name}, here"] == (~found.gone[found.mode == number]).sum()
+        assert drawn[f"{name}, gone"] == found.gone[found.mode == number].sum()
+    assert "30%" in figure.title
+    assert json.dumps(planned.jobs)
+
+
+def test_flow_behind_the_grains_is_faster_above_than_near_the_bed(
     results: Results, tmp_path: Path
 ) -> None:
     (planned,) = grain_picture.plan(results, tmp_path)
     assert pictures.run(planned.jobs, tmp_path) == ""
     figure = planned.finished("")
     assert figure.canvas is not None
-    (pile,) = results.plan.piles.values()
-    found = snapshot.take(pile, results.cases, 0.3)
-    assert found is not None
-    ax = figure.canvas.axes[0]
-    (gone,) = [c for c in ax.collections if c.get_gid() == "gone"]
-    offsets = np.asarray(gone.get_offsets())
-    assert offsets == pytest.approx(found.start[found.gone])
-    assert 0 < len(offsets) <= 0.3 * pile.packing.count + 2
-    assert "30%" in figure.title
-    assert json.dumps(planned.jobs)
+    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[1].images[0].get_array()))
+    speed = np.ma.filled(image, np.nan)
+    column = speed[:, speed.shape[1] // 4]
+    above = column[~np.isnan(column)]
+    assert 0 <= above[0] < 0.5 < above[-1] < 1.2
+    assert len(above) < len(column)
