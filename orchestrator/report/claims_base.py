@@ -46,11 +46,18 @@ SCENE = (
     "step",
     "quiet",
     "marker",
+    "timestep",
+    "until",
+    "solve_u_e_m_s",
+    "solve_nu_m2_s",
+    "cells_per_face",
     "fraction",
 )
 """Columns in which two rows must agree, but for the one along which they are compared."""
-CHOICES = ("phi_deg", "alpha_s", "stiffness", "damping", "step", "quiet", "marker")
+CHOICES = ("alpha_s", "stiffness", "damping", "step", "quiet", "marker")
 """Columns of which single grains are judged at one combination: the one with most scenes."""
+PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg": 35.0}
+"""The grains and the gas of the paper: no others are judged."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +97,9 @@ class Evidence:
 
     @cached_property
     def scenes(self) -> pd.DataFrame:
-        """Every scene once."""
-        return self.tables["scenes"].drop_duplicates("scene_id")
+        """Every scene of the paper's grains and gas, once."""
+        table = self.tables["scenes"].drop_duplicates("scene_id")
+        return table[(table[list(PAPER)] == pd.Series(PAPER)).all(axis=1)]
 
     def joined(self, name: str) -> pd.DataFrame:
         """A table with its scenes' columns; it has all columns even where it has no rows."""
@@ -100,7 +108,7 @@ class Evidence:
             columns = [*self.scenes, *SCENE, *EMPTY]
             return pd.DataFrame(columns=list(dict.fromkeys(columns))).astype(object)
         extra = [column for column in self.scenes if column not in table or column == "scene_id"]
-        return table.merge(self.scenes[extra], on="scene_id", how="left", validate="many_to_one")
+        return table.merge(self.scenes[extra], on="scene_id", how="inner", validate="many_to_one")
 
     @cached_property
     def grains(self) -> pd.DataFrame:
@@ -115,8 +123,8 @@ class Evidence:
         counts = held.groupby(list(CHOICES), sort=True).size()
         if counts.empty:
             return held
-        commonest = dict(zip(CHOICES, counts.idxmax(), strict=True))
-        return held[(held[list(commonest)] == pd.Series(commonest)).all(axis=1)]
+        commonest = counts.reset_index(name="n").nlargest(1, "n")
+        return held.merge(commonest[list(CHOICES)], on=list(CHOICES), how="inner")
 
     def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
         """A table of piles whose closure holds, of one packing and one stress."""
@@ -153,14 +161,18 @@ def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = (
         A row for each pair: ``closure``, ``low`` and ``high`` of the column, and ``ratio``, the
         value at the higher over that at the lower; NaN where one is missing.
     """
-    keys = [c for c in SCENE if c in table and c != along and c not in ignore]
     rows = []
-    for _, own in split(table, *keys):
+    for _, own in split(table, *others(table, along, *ignore)):
         own = own.sort_values(along, kind="stable")
         x, y = own[along].to_numpy(float), own[value].to_numpy(float)
         steps = np.flatnonzero(np.diff(x) > 0)
         rows += [(own["closure"].iloc[0], x[i], x[i + 1], y[i + 1] / y[i]) for i in steps]
     return pd.DataFrame(rows, columns=["closure", "low", "high", "ratio"])
+
+
+def others(table: pd.DataFrame, *along: str) -> list[str]:
+    """The parameters that a table has, but for some."""
+    return [column for column in SCENE if column in table and column not in along]
 
 
 def rising(found: pd.DataFrame, each: str, names: tuple[str, str] = ("rises", "ratio")) -> str:

@@ -17,7 +17,6 @@ Lines = Mapping[str, tuple[FloatArray, FloatArray]]
 
 POINTS = 60
 """Re*, evenly spaced in its logarithm, at which a series is compared with the curves."""
-LARGE_RE = (30.0, 1000.0)
 BETA = (50.0, 55.0)
 Z0_OVER_D = 1 / 30
 GOOD = 1.25
@@ -36,14 +35,14 @@ COLUMNS = (
 """A series: its mean factor from the curves, with and without sign, the largest and its Re*."""
 
 
-def claims(evidence: Evidence) -> list[Claim]:
-    """The one claim."""
+def best_fit(evidence: Evidence) -> Claim:
+    """Single grains on a flat bed against the curves for water, and for air."""
     grains = evidence.held
     flat = grains[(grains["alpha_deg"] == 0) & grains["shields_dem"].notna()].astype(
         {"reynolds": float, "shields_dem": float}
     )
     tables = {name: _distances(flat, lines) for name, lines in _families(evidence, flat).items()}
-    return [_best_fit(flat, tables)]
+    return _judged_fit(tables)
 
 
 def _families(evidence: Evidence, flat: pd.DataFrame) -> dict[str, Lines]:
@@ -96,7 +95,7 @@ def _read(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
     return np.asarray(np.interp(*logs, left=np.nan, right=np.nan))
 
 
-def _best_fit(flat: pd.DataFrame, tables: Mapping[str, pd.DataFrame]) -> Claim:
+def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
     measured = []
     verdicts: list[Verdict] = []
     for family, table in tables.items():
@@ -109,11 +108,13 @@ def _best_fit(flat: pd.DataFrame, tables: Mapping[str, pd.DataFrame]) -> Claim:
         "Best fit with Shields’ laboratory results: β from 50° to 55° and z₀ ≈ d/30, for small and "
         "for large Re*",
         "3.1, Fig. 6",
-        tuple(measured),
+        ("off by: mean factor from the curves (mean of τ over theirs; the worst one)", *measured)
+        if measured
+        else (),
         "in each regime, against the mean of the logarithms of the water curves that cover an Re*: "
         "reproduced if the best of the study’s β and z₀ is one of those named and within a factor "
         f"{GOOD:g} in the mean; not if neither; partly if one, or if the regimes differ",
-        combined(verdicts),
+        combined(verdicts) if len(verdicts) == len(CLOSURES) else "no data",
         "Eq. 3 tends to a constant for Re* → 0, where the curves of water go on rising: no β fits "
         "both ends. And the grains are in air, the curves of water; against those of air, listed "
         "for comparison, the high regime lies far above (their thresholds are lower in Shields’ "
@@ -135,16 +136,21 @@ def _is_named(ratio: float) -> bool:
 
 def _said(family: str, closure: Closure, own: pd.DataFrame) -> str:
     best = own.iloc[0]
-    text = f"{family}, {NAMES[closure]} (Re* = {best['first']:.2g} … {best['last']:.3g}): best "
-    text += _fit(best)
     named = own[own["beta_deg"].between(*BETA) & own["z0_over_d"].map(_is_named)]
-    others = [_fit(row) for _, row in named.sort_values("beta_deg").iterrows()]
-    return text + (f"; the paper’s: {'; '.join(others)}" if others else "")
+    rest = [_fit(row) for at, row in named.sort_values("beta_deg").iterrows() if at != best.name]
+    return (
+        f"{family}, {NAMES[closure]}, Re* = {best['first']:.2g} … {best['last']:.3g}: best "
+        + "; ".join([_fit(best), *rest])
+    )
 
 
 def _fit(row: pd.Series) -> str:
+    worst = f"{row['worst']:.2f} at Re* = {_round(row['worst_at'])}"
     return (
-        f"β = {row['beta_deg']:g}°, {labels.ratio_of_d(row['z0_over_d'])}: off by a factor "
-        f"{row['factor']:.2f} (τ over the curves {row['bias']:.2f} in the mean, {row['worst']:.2f} "
-        f"at worst, at Re* = {row['worst_at']:.2g})"
+        f"β = {row['beta_deg']:g}°, {labels.ratio_of_d(row['z0_over_d'])}: off by "
+        f"{row['factor']:.2f} ({row['bias']:.2f}; {worst})"
     )
+
+
+def _round(reynolds: float) -> str:
+    return f"{reynolds:.0f}" if reynolds >= 10 else f"{reynolds:.2g}"

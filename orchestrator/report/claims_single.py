@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import closures
-from orchestrator.report import labels
 from orchestrator.report.claims_base import (
     BY_SHARE,
     NAMES,
@@ -26,20 +25,9 @@ SMALL_RE = 0.3
 """Re* up to which tau must be constant for a claim to be partly right: a tenth of the range."""
 
 
-def claims(evidence: Evidence) -> list[Claim]:
-    """The claims on one grain, in the paper's order."""
-    return [
-        constant(evidence),
-        compacity(evidence),
-        roughness(evidence),
-        numerical(evidence),
-        slope(evidence),
-    ]
-
-
 def constant(evidence: Evidence) -> Claim:
     """Tau at small Re*."""
-    grains = evidence.held
+    grains = evidence.held[evidence.held["shields_dem"].notna()]
     flat = grains[(grains["closure"] == "low") & (grains["alpha_deg"] == 0)]
     series = [own for _, own in split(flat, "beta_deg", "z0_over_d") if len(own) > 1]
     falls = [_fall(own, closures.LOW_BELOW) for own in series]
@@ -99,8 +87,8 @@ def _beta(series: list[pd.DataFrame], falls: list[float], which: object) -> floa
 
 def _ends(own: pd.DataFrame) -> pd.Series:
     """Smallest and largest Re* of a series by DEM, and the change of tau between them."""
-    known = own[own["shields_dem"].notna()].sort_values("reynolds")
-    first, last = known.iloc[0], known.iloc[-1]
+    ordered = own.sort_values("reynolds")
+    first, last = ordered.iloc[0], ordered.iloc[-1]
     change = last["shields_dem"] / first["shields_dem"] - 1
     return pd.Series({"first": first["reynolds"], "last": last["reynolds"], "fall": change})
 
@@ -162,7 +150,8 @@ def numerical(evidence: Evidence) -> Claim:
         "3.1, Figs. 5 to 8",
         (*_held_measured(held), *_ramps_measured(ramps)),
         "reproduced: under held flows and under ramps the whole interval of DEM lies above the "
-        "closed form in at least 95 % of the grains; not: in at most 5 % of both; else partly",
+        "closed form in at least 95 % of the grains; not: in at most 5 % of either (of those the "
+        "study has); else partly",
         combined(verdicts),
         "The marker costs nothing when the flow waits for it: with holds DEM meets the closed form "
         "within its interval. It costs stress where the flow goes on rising while the grain "

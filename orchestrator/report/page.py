@@ -12,7 +12,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from orchestrator.report import captions, facts
+from orchestrator.report import captions, claims, facts
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
@@ -46,6 +46,7 @@ def render(
         piles=facts.piles(results),
         single_grains=facts.single_grains(results),
         remarks=facts.remarks(results, failures),
+        card=claims.card(claims.judge(results.tables), [figure.name for figure, _ in figures]),
         figures=[_entry(figure, png) for figure, png in figures],
         failures=failures,
         links=links(results),

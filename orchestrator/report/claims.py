@@ -1,0 +1,89 @@
+"""The report card: what the paper claims, and what this study finds of it."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pandas as pd
+
+from orchestrator.report import (
+    claims_curves,
+    claims_model,
+    claims_motion,
+    claims_piles,
+    claims_single,
+)
+from orchestrator.report.claims_base import Claim, Evidence
+from orchestrator.tables import Tables
+
+JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
+    claims_single.constant,
+    claims_single.compacity,
+    claims_single.roughness,
+    claims_curves.best_fit,
+    claims_single.numerical,
+    claims_single.slope,
+    claims_motion.order,
+    claims_motion.modes,
+    claims_piles.slope,
+    claims_piles.above_single,
+    claims_piles.wiggles,
+    claims_piles.saturation,
+    claims_piles.roughness,
+    claims_piles.fraction,
+    claims_model.conditioning,
+    claims_model.regimes,
+    claims_model.stress,
+)
+"""One for each claim: in the paper's order, then those on its method."""
+WORDS = {"reproduced": "reproduced", "partly": "partly", "not": "not reproduced"}
+"""How the page says a verdict."""
+
+
+def judge(tables: Tables) -> list[Claim]:
+    """Every claim of the paper, judged by the tables of a study; some may lack their data."""
+    evidence = Evidence(tables)
+    return [one(evidence) for one in JUDGES]
+
+
+def card(found: Sequence[Claim], figures: Sequence[str]) -> dict[str, Any]:
+    """What the page shows of judged claims.
+
+    Parameters
+    ----------
+    found : sequence of Claim
+        As `judge` gave them.
+    figures : sequence of str
+        Names of the page's figures, in its order.
+    """
+    judged = [claim for claim in found if claim.verdict != "no data"]
+    counts = Counter[str](claim.verdict for claim in judged)
+    return {
+        "entries": [
+            {"claim": claim, "word": WORDS[claim.verdict], "figures": _shown(claim, figures)}
+            for claim in judged
+        ],
+        "counts": [f"{counts[key]} {word}" for key, word in WORDS.items() if counts[key]],
+        "lacking": [claim.says for claim in found if claim.verdict == "no data"],
+    }
+
+
+def _shown(claim: Claim, figures: Sequence[str]) -> list[int]:
+    """Numbers of the figures that show a claim."""
+    return [n for n, name in enumerate(figures, 1) if name.startswith(claim.figures)]
+
+
+def frame(found: Sequence[Claim]) -> pd.DataFrame:
+    """The claims as a table; what was measured is one text, its parts on lines of their own."""
+    rows = [
+        {
+            "claim": claim.says,
+            "where": claim.where,
+            "measured": "\n".join(claim.measured),
+            "verdict": claim.verdict,
+            "rule": claim.rule,
+            "why": claim.why,
+        }
+        for claim in found
+    ]
+    return pd.DataFrame(rows)

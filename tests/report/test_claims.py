@@ -1,0 +1,178 @@
+"""The report card: verdicts follow from the numbers, by the rules that it states."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.report import claims, claims_base, page
+from orchestrator.report.claims_base import Claim, Evidence, Verdict
+from orchestrator.report.results import Results, valid
+from orchestrator.tables import Tables
+
+
+def by_name(found: list[Claim]) -> dict[str, Claim]:
+    names = [f"{one.__module__.rsplit('_')[-1]}.{one.__name__}" for one in claims.JUDGES]
+    return dict(zip(names, found, strict=True))
+
+
+def changed(
+    tables: Tables, name: str, change: Callable[[pd.DataFrame], pd.DataFrame]
+) -> dict[str, Claim]:
+    return by_name(claims.judge({**tables, name: change(tables[name])}))
+
+
+@pytest.fixture(scope="module")
+def judged(results: Results) -> dict[str, Claim]:
+    return by_name(claims.judge(results.tables))
+
+
+@pytest.mark.parametrize(
+    ("answers", "verdict"),
+    [
+        ([True] * 19 + [False], "reproduced"),
+        ([True] * 18 + [False] * 2, "partly"),
+        ([False] * 19 + [True], "not"),
+        ([], "no data"),
+    ],
+)
+def test_verdict_by_share(answers: list[bool], verdict: Verdict) -> None:
+    assert claims_base.by_share(answers) == verdict
+
+
+def test_verdicts_that_differ_are_partly() -> None:
+    assert claims_base.combined(["reproduced", "not"]) == "partly"
+    assert claims_base.combined(["not", "no data"]) == "not"
+    assert claims_base.combined([]) == "no data"
+
+
+def test_pairs_agree_in_all_else() -> None:
+    table = pd.DataFrame(
+        {
+            "closure": "high",
+            "alpha_deg": [20.0, 15.0, 25.0, 15.0],
+            "d_m": [1e-3, 1e-3, 1e-3, 5e-4],
+            "seed": [None] * 4,
+            "value": [3.0, 2.0, np.nan, 9.0],
+        }
+    )
+    found = claims_base.pairs(table, "alpha_deg", "value")
+    assert found["ratio"].tolist()[0] == 1.5
+    assert len(found) == 2
+    assert "1 pairs without a threshold" in claims_base.rising(found, "")
+    assert claims_base.up(found) == "reproduced"
+
+
+def test_what_a_small_study_shows(judged: dict[str, Claim]) -> None:
+    verdicts = {name: claim.verdict for name, claim in judged.items()}
+    assert verdicts["single.constant"] == "partly"
+    assert verdicts["single.compacity"] == "reproduced"
+    assert verdicts["single.roughness"] == "partly"
+    assert verdicts["single.slope"] == "reproduced"
+    assert verdicts["single.numerical"] == "not"
+    assert verdicts["motion.order"] == "reproduced"
+    assert verdicts["piles.above_single"] == "reproduced"
+    for lacking in ("piles.slope", "piles.saturation", "model.regimes", "model.stress"):
+        assert verdicts[lacking] == "no data"
+
+
+def test_constant_states_the_closed_form(judged: dict[str, Claim]) -> None:
+    # lift over drag at Re* = 3 is alpha_s/pi, over tan(beta)
+    steepest = 1 / (1 + 1.615 / np.pi) - 1
+    assert f"{steepest:+.0%} (β = 45°)" in judged["single.constant"].measured[0]
+
+
+def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Claim]) -> None:
+    upside_down = changed(
+        results.tables, "single_grain", lambda t: t.assign(shields_dem=1 / t["shields_dem"])
+    )
+    assert upside_down["single.compacity"].verdict == "not"
+    assert upside_down["single.slope"].verdict == "not"
+    later = changed(
+        results.tables,
+        "pile_grain",
+        lambda t: t.assign(moved_in_hold=t["moved_in_hold"].max() + 1 - t["moved_in_hold"]),
+    )
+    assert later["motion.order"].verdict == "not"
+    low = changed(results.tables, "pile_threshold", lambda t: t.assign(shields=1e-9))
+    assert low["piles.above_single"].verdict == "not"
+    assert judged["piles.above_single"].verdict == "reproduced"
+
+
+def test_transition_is_not_judged(results: Results, judged: dict[str, Claim]) -> None:
+    def spoiled(table: pd.DataFrame) -> pd.DataFrame:
+        return table.assign(shields_dem=table["shields_dem"].where(valid(table), 1e9))
+
+    assert (~valid(results.tables["single_grain"])).any()
+    assert changed(results.tables, "single_grain", spoiled) == judged
+
+
+def test_a_faster_rise_counts_as_a_ramp(results: Results) -> None:
+    scenes = results.tables["scenes"]
+    fast = scenes.assign(quiet=np.where(scenes["alpha_deg"] > 0, 1.0, scenes["quiet"]))
+    ramps = scenes.loc[scenes["alpha_deg"] > 0, "scene_id"]
+    grains = results.tables["single_grain"]
+    factor = np.where(grains["scene_id"].isin(ramps), 1.3, 1.0)
+    raised = {c: grains[c] * factor for c in ("shields_dem", "shields_dem_low")}
+    tables = {**results.tables, "scenes": fast, "single_grain": grains.assign(**raised)}
+    found = by_name(claims.judge(tables))["single.numerical"]
+    assert found.verdict == "partly"
+    assert "+3" in found.measured[-1]
+
+
+def test_other_fluids_are_not_judged(results: Results) -> None:
+    scenes = results.tables["scenes"].assign(rho_f_kg_m3=1000.0)
+    found = claims.judge({**results.tables, "scenes": scenes})
+    assert {claim.verdict for claim in found} == {"no data"}
+    assert claims.card(found, [])["entries"] == []
+
+
+def test_nothing_measured_is_no_data(results: Results) -> None:
+    found = claims.judge({"scenes": results.tables["scenes"]})
+    assert {claim.verdict for claim in found} == {"no data"}
+    assert len(claims.card(found, [])["lacking"]) == len(claims.JUDGES)
+
+
+def test_grains_that_never_moved_are_counted(results: Results) -> None:
+    silent = results.tables["single_grain"].assign(shields_dem=np.nan, shields_dem_low=np.nan)
+    found = by_name(claims.judge({**results.tables, "single_grain": silent}))
+    assert found["single.compacity"].verdict == "no data"
+    held = Evidence({**results.tables, "single_grain": silent}).held
+    assert f"{len(held)} grains never moved" in found["single.numerical"].measured[0]
+
+
+def test_card_names_the_figures_by_number(judged: dict[str, Claim]) -> None:
+    card = claims.card(list(judged.values()), ["flow", "dem-horizontal", "grains-alpha15"])
+    shown = {entry["claim"].says: entry["figures"] for entry in card["entries"]}
+    assert shown[judged["single.compacity"].says] == [2]
+    assert shown[judged["motion.order"].says] == [3]
+
+
+def test_page_has_the_card(results: Results, judged: dict[str, Claim]) -> None:
+    html = page.render(results, [], pd.DataFrame(), {})
+    assert html == page.render(results, [], pd.DataFrame(), {})
+    card = html[html.index('<section id="claims">') :]
+    assert 'class="verdict reproduced">reproduced<' in card
+    assert 'class="verdict not">not reproduced<' in card
+    assert "Re* &lt; 3" in card
+    assert "no data to judge" in card
+
+
+def test_what_is_measured_is_escaped(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    evil = replace(claims.judge(results.tables)[1], measured=("<b>&",), says="<i>", why="<u>")
+    monkeypatch.setattr(claims, "judge", lambda tables: [evil])
+    html = page.render(results, [], pd.DataFrame(), {})
+    assert "&lt;b&gt;&amp;" in html
+    section = html[html.index('id="claims"') :].split("</section>")[0]
+    assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in section]
+
+
+def test_frame_has_a_row_for_each_claim(results: Results, tmp_path: Path) -> None:
+    table = claims.frame(claims.judge(results.tables))
+    table.to_csv(tmp_path / "claims.csv", index=False)
+    again = pd.read_csv(tmp_path / "claims.csv")
+    assert len(again) == len(claims.JUDGES)
+    assert set(again["verdict"]) <= {"reproduced", "partly", "not", "no data"}
