@@ -24,7 +24,7 @@ INKS = (
     "white", "black", EDGE, UNCOUNTED, LYING, FIXED, INSIDE, WAITING, *(c for c, _ in HOW.values())
 )  # fmt: skip
 """All colours of a drawing with these marks alone."""
-LONG = 40.0
+LONG = 25.0
 """Half length of a pile, d, beyond which its crest is shown alone."""
 Window = tuple[float, float, float, float]
 """Left, right, bottom, top."""

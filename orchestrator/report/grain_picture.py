@@ -62,10 +62,10 @@ def plan(results: Results, folder: Path) -> Iterator[Picture]:
 
 
 def chosen(results: Results) -> Iterator[PileCase]:
-    """The pile that stands for all of its slope, by rising slope."""
+    """The pile that stands for all of its slope, by rising slope; of equals the study's first."""
     for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
         order = rows.assign(valid=valid(rows)).sort_values(
-            ["valid", "d_m", "z0_over_d", "scene_id"], ascending=[False, False, True, True]
+            ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
         yield results.plan.piles[str(order["scene_id"].iloc[0])]
 

@@ -59,8 +59,10 @@ def parsed(html: str) -> Page:
 
 
 def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
-    assert all(src.startswith("data:image/png;base64,") for src in parsed.all("img", "src"))
-    assert len(parsed.all("img", "src")) == 10
+    kinds = [src.split(",")[0] for src in parsed.all("img", "src")]
+    assert kinds.count("data:image/png;base64") == 10
+    assert kinds.count("data:image/gif;base64") == 1
+    assert len(kinds) == 11
     assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     style = parsed.texts["style"]
     assert "url(" not in style
@@ -104,8 +106,8 @@ def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
 
 def test_figures_are_beside_the_page(page: Path) -> None:
     files = sorted(path.name for path in (page.parent / "figures").iterdir())
-    assert len(files) == 20
-    assert {Path(name).suffix for name in files} == {".png", ".svg"}
+    assert len(files) == 21
+    assert {Path(name).suffix for name in files} == {".png", ".svg", ".gif"}
     assert not list(page.parent.glob(".*.tmp"))
 
 
@@ -135,7 +137,7 @@ def test_page_says_why_a_picture_is_missing(
     assert parsed.text.count("This picture could not be made") == 2
     assert "SIGSEGV" in parsed.text
     assert "apt-get install --no-install-recommends libosmesa6" in parsed.text
-    assert len(parsed.all("img", "src")) == 3
+    assert len(parsed.all("img", "src")) == 4
 
 
 def test_page_without_results(results: Results, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from matplotlib.image import imread
 
 from orchestrator.grains import motion
 from orchestrator.report import flow_picture, grain_picture, pictures, snapshot
+from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.report.snapshot import Passage
 
@@ -107,38 +108,39 @@ def test_no_snapshot_of_what_was_not_reached(passage: Passage) -> None:
     assert passage.first(1.0) is None
 
 
+@pytest.fixture(scope="module")
+def figure(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Figure:
+    """The picture of the grains."""
+    folder = tmp_path_factory.mktemp("grains")
+    (planned,) = grain_picture.plan(results, folder)
+    assert json.dumps(planned.jobs)
+    assert pictures.run(planned.jobs, folder) == ""
+    return planned.finished("")
+
+
 def test_picture_shows_grains_that_are_gone_where_they_lay(
-    results: Results, passage: Passage, tmp_path: Path
+    passage: Passage, figure: Figure
 ) -> None:
-    (planned,) = grain_picture.plan(results, tmp_path)
-    assert pictures.run(planned.jobs, tmp_path) == ""
-    figure = planned.finished("")
     assert figure.canvas is not None
     look = passage.first(0.3)
     assert look is not None
     found = passage.at(look)
-    how = figure.canvas.axes[1]
-    for ax in figure.canvas.axes[:2]:
+    for ax in figure.canvas.axes[:3]:
         (gone,) = [c for c in ax.collections if c.get_gid() == "gone"]
         offsets = np.asarray(gone.get_offsets())
         assert offsets == pytest.approx(found.start[found.gone])
     assert 0 < len(offsets) <= 0.3 * passage.pile.packing.count + 2
-    drawn = {line.get_gid(): len(np.asarray(line.get_xydata())) for line in how.lines}
+    lines = figure.canvas.axes[2].lines
+    drawn = {line.get_gid(): len(np.asarray(line.get_xydata())) for line in lines}
     for number, name in enumerate(motion.MODES[1:], 1):
         assert drawn[f"{name}, here"] == (~found.gone[found.mode == number]).sum()
         assert drawn[f"{name}, gone"] == found.gone[found.mode == number].sum()
     assert "30%" in figure.title
-    assert json.dumps(planned.jobs)
 
 
-def test_flow_behind_the_grains_is_faster_above_than_near_the_bed(
-    results: Results, tmp_path: Path
-) -> None:
-    (planned,) = grain_picture.plan(results, tmp_path)
-    assert pictures.run(planned.jobs, tmp_path) == ""
-    figure = planned.finished("")
+def test_flow_behind_the_grains_is_faster_above_than_near_the_bed(figure: Figure) -> None:
     assert figure.canvas is not None
-    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[1].images[0].get_array()))
+    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[2].images[0].get_array()))
     speed = np.ma.filled(image, np.nan)
     column = speed[:, speed.shape[1] // 4]
     above = column[~np.isnan(column)]
