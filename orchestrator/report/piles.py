@@ -47,7 +47,9 @@ def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
     panels = [part for _, part in split(rows, *keys)][::-1]
     figure = style.canvas(2.3 * len(panels) + 0.9)
     axes = figure.subplots(len(panels), 2, sharex="col", sharey=True, squeeze=False)
-    colours = style.palette("d_m", results.values("d_m"))
+    # of the piles alone: single grains have more diameters than there are colours
+    diameters = sorted(set(results.beds("pile")["d_m"]))
+    colours = style.palette("d_m", diameters)
     for row, part in zip(axes, panels, strict=True):
         for _, curve in split(part, "scene_id"):
             colour = colours[float(curve["d_m"].iloc[0])]
