@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.report import (
+    claims_counting,
     claims_curves,
     claims_model,
     claims_motion,
@@ -27,7 +28,7 @@ JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
     claims_motion.modes,
     claims_piles.slope,
     claims_piles.above_single,
-    claims_piles.wiggles,
+    claims_counting.wiggles,
     claims_piles.saturation,
     claims_piles.roughness,
     claims_piles.fraction,

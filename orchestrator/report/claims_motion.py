@@ -101,8 +101,8 @@ def modes(evidence: Evidence) -> Claim:
         combined(verdicts),
         "Lifted means: rose by more than 0.3 d over its bed within 2 √(d/g′) of passing the "
         "marker. Such a grain need not be lifted by the flow: in the low regime lift is small, and "
-        "a grain that leaves its pocket hops over its neighbours under a drag that stays as it was "
-        "at the start and needs to be larger, for want of lift.",
+        "a grain that leaves its pocket presumably hops over its neighbours under a drag that "
+        "stays as it was at the start and needs to be larger, for want of lift.",
         ("grains",),
     )
 

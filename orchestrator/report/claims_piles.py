@@ -26,12 +26,6 @@ FloatArray = NDArray[np.float64]
 
 LATER = 1.5
 """Saturation: n/N is read at this many times the stress that moves 30 %."""
-FINE_M = 5e-4
-"""Diameter above which the paper sees wiggles, m."""
-STEEP = 0.2
-"""Wiggles are looked for above this n/N: below it the curve rises too steeply for the holds."""
-SMOOTH = np.array([-3, 12, 17, 12, -3]) / 35
-"""Weights of five neighbours whose sum is the value of the parabola that fits them best."""
 
 
 def slope(evidence: Evidence) -> Claim:
@@ -201,51 +195,6 @@ def _saturation_measured(
         for (alpha,), own in split(found, "alpha_deg")
     )
     return (*texts, f"n/N at {LATER:g} τ₃₀ by slope, median: {slopes}")
-
-
-def wiggles(evidence: Evidence) -> Claim:
-    """Roughness of the curves of the fraction."""
-    rows = [
-        (own["d_m"].iloc[0], _roughness(own), 1 / own["count"].iloc[0]) for own in curves(evidence)
-    ]
-    found = pd.DataFrame(rows, columns=["d_m", "wiggle", "grain"]).dropna()
-    coarse, fine = found[found["d_m"] > FINE_M], found[found["d_m"] <= FINE_M]
-    measured, answers = [], []
-    for name, own in (("d > 0.5 mm", coarse), ("d ≤ 0.5 mm", fine)):
-        if len(own):
-            measured.append(
-                f"{name}: n/N departs from a smooth curve by {own['wiggle'].median():.2%} (rms, "
-                f"median of {len(own)} piles); one grain is {own['grain'].median():.2%}, so the "
-                f"wiggle is {(own['wiggle'] / own['grain']).median():.2f} grains"
-            )
-    if len(coarse) and len(fine):
-        answers = [
-            by_share(coarse["wiggle"] > fine["wiggle"].median()),
-            by_share(coarse["wiggle"] < coarse["grain"]),
-        ]
-    return Claim(
-        "Wiggles for d > 0.5 mm, ascribed to counting few grains",
-        "3.2, Fig. 14",
-        tuple(measured),
-        "wiggle: rms distance of n/N at a hold from the parabola through its five neighbours, for "
-        f"n/N ≥ {STEEP:.0%}; "
-        "reproduced: in at least 95 % of the piles with d > 0.5 mm it is above the median of the "
-        "others, and below one grain, 1/N; not: in at most 5 % each; else partly",
-        combined(answers),
-        "N falls as 1/d: a pile of 1 mm has a tenth of the grains of one of 0.1 mm, and its n/N "
-        "takes steps of 1/N. Small grains have as rough a curve for another reason: many share the "
-        "stress of one cell of the flow’s mesh and go together.",
-        ("fractions",),
-    )
-
-
-def _roughness(own: pd.DataFrame) -> float:
-    fraction = own["fraction_moved"].to_numpy(float)
-    fraction = fraction[fraction >= STEEP]
-    if len(fraction) < len(SMOOTH):
-        return float("nan")
-    rest = fraction[2:-2] - np.convolve(fraction, SMOOTH, mode="valid")
-    return float(np.sqrt(np.mean(rest**2)))
 
 
 def fraction(evidence: Evidence) -> Claim:

@@ -134,8 +134,8 @@ def slope(evidence: Evidence) -> Claim:
         by_regime(found, "from one slope to the next steeper, at the same d"),
         BY_SHARE,
         up(found),
-        "The pivot asks for cos(α − β), which grows until α = β. On one regime’s line a steeper "
-        "slope also raises Re* and with it lift, which damps the rise.",
+        "The pivot asks for cos(α − β), which grows until α = β. In Eq. 3 a steeper slope "
+        "also raises Re* and with it lift over drag, which damps the rise.",
         ("dem-slope",),
     )
 

@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import claims, claims_base, page
+from orchestrator import curves, study
+from orchestrator.report import claims, claims_base, claims_counting, page
 from orchestrator.report.claims_base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
-from orchestrator.tables import Tables
+from orchestrator.scene import Scene
+from orchestrator.tables import Tables, scenes
 
 
 def by_name(found: list[Claim]) -> dict[str, Claim]:
@@ -102,6 +104,92 @@ def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Clai
     assert judged["piles.above_single"].verdict == "reproduced"
 
 
+@pytest.fixture(scope="module")
+def exact() -> Tables:
+    """Single grains of the preset of the paper, as if DEM gave the closed form."""
+    asked, grains = [], []
+    for scene in study.load("paper").scenes:
+        if scene.bed.kind == "grain":
+            asked.append({"scene_id": scene.id, "bed": "grain", **_parameters(scene)})
+            grains.append({"scene_id": scene.id, **_closed_form(scene)})
+    return {"scenes": pd.DataFrame(asked), "single_grain": pd.DataFrame(grains)}
+
+
+def _parameters(scene: Scene) -> dict[str, object]:
+    protocol = scene.protocol.model_dump(include={"step", "quiet", "marker"})
+    contact = scene.grain.model_dump(include={"stiffness", "damping"})
+    return {
+        **scenes.point(scene),
+        "phi_deg": scene.grain.friction_angle_deg,
+        "rho_sol_kg_m3": scene.grain.density,
+        "rho_f_kg_m3": scene.fluid.density,
+        "g_m_s2": scene.fluid.gravity,
+        "alpha_s": scene.flow.lift_coefficient,
+        "packing": None,
+        "stress": None,
+        **contact,
+        **protocol,
+    }
+
+
+def _closed_form(scene: Scene) -> dict[str, float]:
+    found = scene.closed_form(scene.closure)
+    shields, ustar = float(found.shields), float(found.friction_velocity)
+    row = dict.fromkeys(("shields_dem", "shields_dem_low", "shields_closed_form"), shields)
+    speeds = dict.fromkeys(("ustar_m_s", "ustar_closed_form_m_s"), ustar)
+    return {**row, **speeds, "reynolds": float(found.reynolds)}
+
+
+def test_the_closed_form_itself_is_judged_so(exact: Tables) -> None:
+    found = by_name(claims.judge(exact))
+    assert found["single.numerical"].verdict == "not"
+    assert "0 of" in found["single.numerical"].measured[0]
+    assert found["model.conditioning"].verdict == "not"
+    assert found["curves.best_fit"].verdict == "partly"
+    assert "best β = 45°, d/30: off by 1.6" in found["curves.best_fit"].measured[1]
+    assert "best β = 50°, d/30: off by 1.1" in found["curves.best_fit"].measured[2]
+
+
+def test_grains_on_the_curves_fit_them(exact: Tables) -> None:
+    scene = exact["scenes"].set_index("scene_id")
+    grains = exact["single_grain"].copy()
+    own = scene.loc[grains["scene_id"]]
+    wide = grains["reynolds"].to_numpy() > 0.01
+    named = ((own["beta_deg"] == 50) & (own["z0_over_d"] < 0.05)).to_numpy() & wide
+    known = [curve.points(2000) for curve in curves.WATER]
+    at = np.log(grains.loc[named, "reynolds"])
+    logs = [np.interp(at, np.log(x), np.log(y), left=np.nan, right=np.nan) for x, y in known]
+    grains.loc[named, "shields_dem"] = np.exp(np.nanmean(logs, axis=0))
+    found = by_name(claims.judge({**exact, "single_grain": grains}))["curves.best_fit"]
+    assert found.verdict == "reproduced"
+    assert "best β = 50°, d/30: off by 1.0" in found.measured[1]
+
+
+def test_soft_contacts_that_matter_are_found(exact: Tables) -> None:
+    soft = exact["scenes"].set_index("scene_id")["stiffness"] < 1e4
+    grains = exact["single_grain"]
+    factor = np.where(soft.loc[grains["scene_id"]], 1.2, 1.0)
+    spoiled = grains.assign(ustar_m_s=grains["ustar_m_s"] * factor)
+    found = by_name(claims.judge({**exact, "single_grain": spoiled}))["model.conditioning"]
+    assert found.verdict == "partly"
+
+
+def test_wiggles_are_steps_of_the_stress_or_of_the_count() -> None:
+    smooth = np.linspace(0.2, 1.0, 40) ** 2
+    assert claims_counting._wiggle(smooth) < 1e-3
+    assert claims_counting._wiggle(smooth + 0.01 * (-1) ** np.arange(40)) > 5e-3
+    stress = np.linspace(0.5, 1.5, 801)
+    flow = np.geomspace(0.6, 2.0, 40)
+    own = pd.DataFrame({"ustar0_m_s": flow, "fraction_moved": np.linspace(0, 1, 40)})
+    steps = np.repeat(stress[::40], 40)[:801]
+    assert len(claims_counting._smoothed(steps)) == len(steps)
+    rough, even = (
+        claims_counting._wiggle(claims_counting._pivot(own, one))
+        for one in (steps, claims_counting._smoothed(steps))
+    )
+    assert even < 0.5 * rough
+
+
 def test_transition_is_not_judged(results: Results, judged: dict[str, Claim]) -> None:
     def spoiled(table: pd.DataFrame) -> pd.DataFrame:
         return table.assign(shields_dem=table["shields_dem"].where(valid(table), 1e9))
@@ -111,9 +199,9 @@ def test_transition_is_not_judged(results: Results, judged: dict[str, Claim]) ->
 
 
 def test_a_faster_rise_counts_as_a_ramp(results: Results) -> None:
-    scenes = results.tables["scenes"]
-    fast = scenes.assign(quiet=np.where(scenes["alpha_deg"] > 0, 1.0, scenes["quiet"]))
-    ramps = scenes.loc[scenes["alpha_deg"] > 0, "scene_id"]
+    asked = results.tables["scenes"]
+    fast = asked.assign(quiet=np.where(asked["alpha_deg"] > 0, 1.0, asked["quiet"]))
+    ramps = asked.loc[asked["alpha_deg"] > 0, "scene_id"]
     grains = results.tables["single_grain"]
     factor = np.where(grains["scene_id"].isin(ramps), 1.3, 1.0)
     raised = {c: grains[c] * factor for c in ("shields_dem", "shields_dem_low")}
@@ -124,8 +212,8 @@ def test_a_faster_rise_counts_as_a_ramp(results: Results) -> None:
 
 
 def test_other_fluids_are_not_judged(results: Results) -> None:
-    scenes = results.tables["scenes"].assign(rho_f_kg_m3=1000.0)
-    found = claims.judge({**results.tables, "scenes": scenes})
+    water = results.tables["scenes"].assign(rho_f_kg_m3=1000.0)
+    found = claims.judge({**results.tables, "scenes": water})
     assert {claim.verdict for claim in found} == {"no data"}
     assert claims.card(found, [])["entries"] == []
 
