@@ -116,7 +116,7 @@ class Scene:
         marks.ground(ax, passage.pile, window)
         fixed = passage.pile.packing.centres[~passage.pile.packing.mobile]
         marks.discs(ax, fixed, fc=marks.FIXED, ec=marks.EDGE, lw=0.4)
-        marks.mode_legend(figure)
+        marks.mode_legend(figure, passage.pile)
         nothing = np.empty((0, 2))
         self._gone = marks.discs(ax, nothing, fc="white", lw=0.6, zorder=1.5)
         self._here = marks.discs(ax, nothing, lw=0.4, ec=marks.EDGE, zorder=2)
@@ -139,11 +139,10 @@ class Scene:
             self._ax.draw_artist(artist)
         return np.array(self._agg.buffer_rgba())[..., :3]
 
-    def _moving(self) -> Iterator[Artist]:
-        yield from (self._gone, self._here)
-        for pair in self._symbols.values():
-            yield from pair
-        yield self._text
+    def _moving(self) -> list[Artist]:
+        """From the lowest to the uppermost."""
+        marked = [mark for pair in self._symbols.values() for mark in pair]
+        return sorted([self._gone, self._here, *marked, self._text], key=Artist.get_zorder)
 
     def _said(self, found: Snapshot) -> str:
         count = len(self._passage.mode)

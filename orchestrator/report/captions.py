@@ -197,10 +197,10 @@ def crest(pile: PileCase, looks: int) -> str:
     return (
         f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
         f"symbol: how a grain moved, from {pile.scene.protocol.marker:g} d on: {_modes()} Hollow: "
-        f"left the box, where it lay. The {looks} frames are looks of the deck, {LOOK:g} √(d/g′) "
-        "apart where none is left out: left out are those at which no grain moves near its "
-        "place, so that grains jump or vanish where time was skipped. Other mobile grains are "
-        "drawn at the end of each hold."
+        f"left the box, where it lay (without a symbol: not counted). The {looks} frames are looks "
+        f"of the deck, {LOOK:g} √(d/g′) apart where none is left out: left out are those at which "
+        "no grain moves near its place, so that grains jump or vanish where time was skipped. "
+        "Other mobile grains are drawn at the end of each hold."
     )
 
 

@@ -75,19 +75,17 @@ def discs(ax: Axes, places: NDArray[np.float64], **look: Any) -> EllipseCollecti
 
 def symbols(ax: Axes, window: Window) -> dict[str, tuple[Line2D, Line2D]]:
     """For each way to move the symbols, none yet, of grains that are here and that are gone."""
+    size = 170 / (window[1] - window[0])
+    shared: dict[str, Any] = {"ls": "", "ms": size, "mew": 0.25 * size}
     found = {}
     for name, (colour, marker) in HOW.items():
-        here, gone = (
-            ax.plot([], [], marker, **_symbol(ax, window, ink), gid=f"{name}, {state}", zorder=3)[0]
-            for ink, state in (("white", "here"), (colour, "gone"))
+        here = Line2D([], [], color="white", marker=marker, zorder=3, gid=f"{name}, here", **shared)
+        # lower: another grain may be where it lay
+        gone = Line2D(
+            [], [], color=colour, marker=marker, zorder=1.6, gid=f"{name}, gone", **shared
         )
-        found[name] = here, gone
+        found[name] = ax.add_line(here), ax.add_line(gone)
     return found
-
-
-def _symbol(ax: Axes, window: Window, ink: str) -> dict[str, Any]:
-    size = 170 / (window[1] - window[0])
-    return {"ms": size, "mew": 0.25 * size, "color": ink, "mec": ink}
 
 
 def place(marks: dict[str, tuple[Line2D, Line2D]], found: Snapshot) -> None:
@@ -98,7 +96,7 @@ def place(marks: dict[str, tuple[Line2D, Line2D]], found: Snapshot) -> None:
         gone.set_data(*found.start[own & found.gone].T)
 
 
-def mode_legend(figure: Canvas) -> None:
+def mode_legend(figure: Canvas, pile: PileCase) -> None:
     """What colours and symbols by mode mean, under the panels."""
     entries: dict[str, tuple[Line2D | Patch, ...]] = {
         name: (_disc(colour, colour), _sample(marker, "white"))
@@ -110,7 +108,8 @@ def mode_legend(figure: Canvas) -> None:
         _sample(marker, colour),
     )
     entries["exposed, has not moved"] = (_disc(WAITING, EDGE),)
-    entries["mobile under it"] = (_disc(LYING, "none"),)
+    if (pile.packing.mobile & ~pile.packing.windward).any():
+        entries["mobile under it"] = (_disc(LYING, "none"),)
     entries["fixed"] = (_disc(FIXED, "none"),)
     entries["inside, not in the case"] = (Patch(color=INSIDE, lw=0),)
     handles: list[Any] = list(entries.values())  # its stubs know no samples of two marks

@@ -129,7 +129,7 @@ def _frame(shown: Shown) -> Canvas:
     axes[-1].set_xlabel("$x/d$ from the windward toe")
     _bars(figure, axes)
     style.legends(figure, _entries(), [])
-    marks.mode_legend(figure)
+    marks.mode_legend(figure, shown.pile)
     return figure
 
 

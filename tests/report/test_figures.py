@@ -180,7 +180,7 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
     lost = table.assign(shields=table["shields"].where(table["fraction"] < 0.5))
     (_, figure) = piles.draw(replace(results, tables={**results.tables, "pile_threshold": lost}))
     (ax,) = drawn([figure])["extended-shields-d30"]
-    assert points(marked(ax, SOLID)) == rows(lost.dropna(), "reynolds", "shields")
+    assert points(marked(ax, SOLID)) == rows(lost.dropna(subset=["shields"]), "reynolds", "shields")
 
 
 def test_piles_in_the_transition_are_hollow(results: Results) -> None:
