@@ -186,9 +186,9 @@ def grains(pile: PileCase, found: Snapshot, fraction: float) -> str:
         f"{pile.scene.protocol.marker:g} d downstream along the bed. Below, colour and symbol are "
         f"how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which does not "
         "see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that had left "
-        "the box, where they lay (without a symbol: not counted). Other mobile grains, which "
-        "hardly move, are drawn at the end of the hold. Plain grey: the inside of the pile, which "
-        "touches no mobile grain and is left out of the case."
+        "the box, where they lay (without a symbol: not counted as moved). Other mobile grains, "
+        "most of which hardly move, are drawn at the end of the hold. Plain grey: the inside of "
+        "the pile, which touches no mobile grain and is left out of the case."
     )
 
 
@@ -197,10 +197,10 @@ def crest(pile: PileCase, looks: int) -> str:
     return (
         f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
         f"symbol: how a grain moved, from {pile.scene.protocol.marker:g} d on: {_modes()} Hollow: "
-        f"left the box, where it lay (without a symbol: not counted). The {looks} frames are looks "
-        f"of the deck, {LOOK:g} √(d/g′) apart where none is left out: left out are those at which "
-        "no grain moves near its place, so that grains jump or vanish where time was skipped. "
-        "Other mobile grains are drawn at the end of each hold."
+        "left the box, where it lay (without a symbol: not counted as moved). The "
+        f"{looks} frames are looks of the deck, {LOOK:g} √(d/g′) apart where none is left out: "
+        "left out are those at which no grain moves near its place, so that grains jump or vanish "
+        "where time was skipped. Other mobile grains are drawn at the end of each hold."
     )
 
 
