@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 FIGURES = "figures"
+CLAIMS = "claims.csv"
 
 
 def write(
@@ -43,12 +44,13 @@ def write(
     """
     # the drawing libraries take half a second to import: only who draws waits for them
     from orchestrator.files import write_durably
-    from orchestrator.report import gallery, page
+    from orchestrator.report import claims, gallery, page
     from orchestrator.report.results import Results
 
     results = Results(study, plan, tables, out / "cases")
     folder = out / FIGURES
     folder.mkdir(exist_ok=True)
     figures = list(gallery.draw(results, folder))
+    write_durably(out / CLAIMS, claims.frame(claims.judge(tables)).to_csv(index=False))
     write_durably(out / PAGE, page.render(results, figures, timings, failures))
     return out / PAGE

@@ -9,15 +9,16 @@ import pandas as pd
 import pytest
 
 from orchestrator import curves, study
-from orchestrator.report import claims, claims_base, claims_counting, page
-from orchestrator.report.claims_base import Claim, Evidence, Verdict
+from orchestrator.report import claims, page
+from orchestrator.report.claims import base, counting
+from orchestrator.report.claims.base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
 from orchestrator.scene import Scene
 from orchestrator.tables import Tables, scenes
 
 
 def by_name(found: list[Claim]) -> dict[str, Claim]:
-    names = [f"{one.__module__.rsplit('_')[-1]}.{one.__name__}" for one in claims.JUDGES]
+    names = [f"{one.__module__.rpartition('.')[2]}.{one.__name__}" for one in claims.JUDGES]
     return dict(zip(names, found, strict=True))
 
 
@@ -42,13 +43,13 @@ def judged(results: Results) -> dict[str, Claim]:
     ],
 )
 def test_verdict_by_share(answers: list[bool], verdict: Verdict) -> None:
-    assert claims_base.by_share(answers) == verdict
+    assert base.by_share(answers) == verdict
 
 
 def test_verdicts_that_differ_are_partly() -> None:
-    assert claims_base.combined(["reproduced", "not"]) == "partly"
-    assert claims_base.combined(["not", "no data"]) == "not"
-    assert claims_base.combined([]) == "no data"
+    assert base.combined(["reproduced", "not"]) == "partly"
+    assert base.combined(["not", "no data"]) == "not"
+    assert base.combined([]) == "no data"
 
 
 def test_pairs_agree_in_all_else() -> None:
@@ -61,11 +62,11 @@ def test_pairs_agree_in_all_else() -> None:
             "value": [3.0, 2.0, np.nan, 9.0],
         }
     )
-    found = claims_base.pairs(table, "alpha_deg", "value")
+    found = base.pairs(table, "alpha_deg", "value")
     assert found["ratio"].tolist()[0] == 1.5
     assert len(found) == 2
-    assert "1 pairs without a threshold" in claims_base.rising(found, "")
-    assert claims_base.up(found) == "reproduced"
+    assert "1 pairs without a threshold" in base.rising(found, "")
+    assert base.up(found) == "reproduced"
 
 
 def test_what_a_small_study_shows(judged: dict[str, Claim]) -> None:
@@ -176,16 +177,15 @@ def test_soft_contacts_that_matter_are_found(exact: Tables) -> None:
 
 def test_wiggles_are_steps_of_the_stress_or_of_the_count() -> None:
     smooth = np.linspace(0.2, 1.0, 40) ** 2
-    assert claims_counting._wiggle(smooth) < 1e-3
-    assert claims_counting._wiggle(smooth + 0.01 * (-1) ** np.arange(40)) > 5e-3
+    assert counting._wiggle(smooth) < 1e-3
+    assert counting._wiggle(smooth + 0.01 * (-1) ** np.arange(40)) > 5e-3
     stress = np.linspace(0.5, 1.5, 801)
     flow = np.geomspace(0.6, 2.0, 40)
     own = pd.DataFrame({"ustar0_m_s": flow, "fraction_moved": np.linspace(0, 1, 40)})
     steps = np.repeat(stress[::40], 40)[:801]
-    assert len(claims_counting._smoothed(steps)) == len(steps)
+    assert len(counting._smoothed(steps)) == len(steps)
     rough, even = (
-        claims_counting._wiggle(claims_counting._pivot(own, one))
-        for one in (steps, claims_counting._smoothed(steps))
+        counting._wiggle(counting._pivot(own, one)) for one in (steps, counting._smoothed(steps))
     )
     assert even < 0.5 * rough
 

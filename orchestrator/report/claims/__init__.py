@@ -6,35 +6,28 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.report import (
-    claims_counting,
-    claims_curves,
-    claims_model,
-    claims_motion,
-    claims_piles,
-    claims_single,
-)
-from orchestrator.report.claims_base import Claim, Evidence
+from orchestrator.report.claims import counting, curves, model, motion, piles, single
+from orchestrator.report.claims.base import Claim, Evidence
 from orchestrator.tables import Tables
 
 JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
-    claims_single.constant,
-    claims_single.compacity,
-    claims_single.roughness,
-    claims_curves.best_fit,
-    claims_single.numerical,
-    claims_single.slope,
-    claims_motion.order,
-    claims_motion.modes,
-    claims_piles.slope,
-    claims_piles.above_single,
-    claims_counting.wiggles,
-    claims_piles.saturation,
-    claims_piles.roughness,
-    claims_piles.fraction,
-    claims_model.conditioning,
-    claims_model.regimes,
-    claims_model.stress,
+    single.constant,
+    single.compacity,
+    single.roughness,
+    curves.best_fit,
+    single.numerical,
+    single.slope,
+    motion.order,
+    motion.modes,
+    piles.slope,
+    piles.above_single,
+    counting.wiggles,
+    piles.saturation,
+    piles.roughness,
+    piles.fraction,
+    model.conditioning,
+    model.regimes,
+    model.stress,
 )
 """One for each claim: in the paper's order, then those on its method."""
 WORDS = {"reproduced": "reproduced", "partly": "partly", "not": "not reproduced"}

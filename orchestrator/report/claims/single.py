@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import closures
-from orchestrator.report.claims_base import (
+from orchestrator.report.claims.base import (
     BY_SHARE,
     NAMES,
     QUIET,

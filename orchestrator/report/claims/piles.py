@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator import closures
-from orchestrator.report.claims_base import (
+from orchestrator.report.claims.base import (
     BY_SHARE,
     NAMES,
     Claim,

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.report import labels
-from orchestrator.report.claims_base import (
+from orchestrator.report.claims.base import (
     NAMES,
     QUIET,
     Claim,

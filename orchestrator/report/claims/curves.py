@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from orchestrator import curves
 from orchestrator.closures import CLOSURES, Closure
 from orchestrator.report import labels, reference
-from orchestrator.report.claims_base import NAMES, Claim, Evidence, Verdict, combined
+from orchestrator.report.claims.base import NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]
