@@ -50,7 +50,8 @@ def write(
     results = Results(study, plan, tables, out / "cases")
     folder = out / FIGURES
     folder.mkdir(exist_ok=True)
-    figures = list(gallery.draw(results, folder))
-    write_durably(out / CLAIMS, claims.frame(claims.judge(tables)).to_csv(index=False))
-    write_durably(out / PAGE, page.render(results, figures, timings, failures))
+    figures = gallery.draw(results, folder)
+    judged = claims.judge(tables)
+    write_durably(out / CLAIMS, claims.frame(judged).to_csv(index=False))
+    write_durably(out / PAGE, page.render(results, figures, timings, failures, judged))
     return out / PAGE

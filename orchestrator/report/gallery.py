@@ -1,7 +1,11 @@
 """All figures of a study, in the order of the page."""
 
+import multiprocessing
+import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib import rc_context
@@ -19,31 +23,73 @@ from orchestrator.report import (
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
+Drawn = tuple[Figure, bytes]
+"""A figure without its canvas, and its image: PNG, of an animation GIF, b"" if it is missing."""
 
-def draw(results: Results, folder: Path) -> Iterator[tuple[Figure, bytes]]:
-    """Write each figure's files into a folder; give it with its image, or b"" if it is missing.
 
-    The image is a PNG, of an animation a GIF.
+def draw(results: Results, folder: Path) -> list[Drawn]:
+    """Write each figure's files into a folder; give it with its image.
+
+    The sections are drawn side by side: matplotlib holds one core for seconds a figure.
     """
+    _shared.append(results)
+    try:
+        # forked, the workers have the results and the imported libraries already
+        context = multiprocessing.get_context("fork")
+        workers = min(os.cpu_count() or 1, len(SECTIONS))
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            parts = list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
+    finally:
+        _shared.clear()
+    # the order of the page: the pictures stand behind the single grains
+    order = [part for _, part in sorted(zip(PLACES, parts, strict=True), key=lambda pair: pair[0])]
+    return [drawn for part in order for drawn in part]
+
+
+_shared: list[Results] = []
+"""What the workers inherit: results are too large to be sent to each."""
+
+
+def _section(number: int, folder: Path) -> list[Drawn]:
     with rc_context(style.RC):
-        yield from _saved(single.draw(results), folder)
-        yield from _saved(_pictures(results), folder)
-        yield from animation.draw(results, folder)
-        yield from _saved(stress.draw(results), folder)
-        yield from _saved(piles.draw(results), folder)
+        return list(SECTIONS[number](_shared[0], folder))
 
 
-def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[tuple[Figure, bytes]]:
+def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:
     for figure in figures:
-        yield figure, style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
+        image = style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
+        yield replace(figure, canvas=None), image
 
 
-def _pictures(results: Results) -> Iterator[Figure]:
+def _pictures(results: Results, folder: Path) -> Iterator[Drawn]:
     with tempfile.TemporaryDirectory(prefix="orchestrator-") as name:
-        folder = Path(name)
-        planned = [*flow_picture.plan(results, folder), *grain_picture.plan(results, folder)]
+        scratch = Path(name)
+        planned = [*flow_picture.plan(results, scratch), *grain_picture.plan(results, scratch)]
         cause = ""
         if planned:
-            cause = pictures.run([job for picture in planned for job in picture.jobs], folder)
-        for picture in planned:
-            yield picture.finished(cause)
+            cause = pictures.run([job for picture in planned for job in picture.jobs], scratch)
+        yield from _saved((picture.finished(cause) for picture in planned), folder)
+    yield from animation.draw(results, folder)
+
+
+def _single(results: Results, folder: Path) -> Iterator[Drawn]:
+    yield from _saved(single.draw(results), folder)
+
+
+def _stress(results: Results, folder: Path) -> Iterator[Drawn]:
+    yield from _saved(stress.draw(results), folder)
+
+
+def _fractions(results: Results, folder: Path) -> Iterator[Drawn]:
+    yield from _saved(piles.fractions(results), folder)
+
+
+def _extended(results: Results, folder: Path) -> Iterator[Drawn]:
+    yield from _saved(piles.extended(results), folder)
+
+
+SECTIONS: tuple[Callable[[Results, Path], Iterator[Drawn]], ...]
+SECTIONS = (_fractions, _extended, _pictures, _single, _stress)
+"""The dearest first."""
+PLACES = (3, 4, 1, 0, 2)
+"""Their places on the page."""

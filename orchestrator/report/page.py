@@ -13,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from orchestrator.report import captions, claims, facts
+from orchestrator.report.claims.base import Claim
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
@@ -24,6 +25,7 @@ def render(
     figures: Sequence[tuple[Figure, bytes]],
     timings: pd.DataFrame,
     failures: Mapping[str, str],
+    judged: Sequence[Claim],
 ) -> str:
     """The page's HTML.
 
@@ -37,6 +39,8 @@ def render(
         Wall times of the finished cases.
     failures : mapping of str to str
         Causes by name of case.
+    judged : sequence of Claim
+        The paper's claims.
     """
     return _template().render(
         study=results.study,
@@ -46,7 +50,7 @@ def render(
         piles=facts.piles(results),
         single_grains=facts.single_grains(results),
         remarks=facts.remarks(results, failures),
-        card=claims.card(claims.judge(results.tables), [figure.name for figure, _ in figures]),
+        card=claims.card(judged, [figure.name for figure, _ in figures]),
         figures=[_entry(figure, png) for figure, png in figures],
         failures=failures,
         links=links(results),

@@ -16,8 +16,8 @@ LOOKS = {"low": "--", "high": "-"}
 """By closure, in the figure of fractions."""
 
 
-def draw(results: Results) -> Iterator[Figure]:
-    """The figures that the study's piles give, one at a time."""
+def fractions(results: Results) -> Iterator[Figure]:
+    """Fig. 14, one for each slope."""
     curve = results.joined("pile_curve")
     moved = curve[curve["moved"] > 0] if len(curve) else curve
     for (alpha,), rows in split(moved, "alpha_deg"):
@@ -28,6 +28,10 @@ def draw(results: Results) -> Iterator[Figure]:
             tuple(sorted(set(rows["case"]))),
             _fractions(results, rows),
         )
+
+
+def extended(results: Results) -> Iterator[Figure]:
+    """Figs. 15 and 16, the extended Shields diagram, one for each z0/d."""
     found = results.joined("pile_threshold")
     reached = found[found["shields"].notna()] if len(found) else found
     for (ratio,), rows in split(reached, "z0_over_d"):

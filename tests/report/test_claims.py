@@ -240,8 +240,8 @@ def test_card_names_the_figures_by_number(judged: dict[str, Claim]) -> None:
 
 
 def test_page_has_the_card(results: Results, judged: dict[str, Claim]) -> None:
-    html = page.render(results, [], pd.DataFrame(), {})
-    assert html == page.render(results, [], pd.DataFrame(), {})
+    html = page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
+    assert html == page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
     card = html[html.index('<section id="claims">') :]
     assert 'class="verdict reproduced">reproduced<' in card
     assert 'class="verdict not">not reproduced<' in card
@@ -252,7 +252,7 @@ def test_page_has_the_card(results: Results, judged: dict[str, Claim]) -> None:
 def test_what_is_measured_is_escaped(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     evil = replace(claims.judge(results.tables)[1], measured=("<b>&",), says="<i>", why="<u>")
     monkeypatch.setattr(claims, "judge", lambda tables: [evil])
-    html = page.render(results, [], pd.DataFrame(), {})
+    html = page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
     assert "&lt;b&gt;&amp;" in html
     section = html[html.index('id="claims"') :].split("</section>")[0]
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in section]

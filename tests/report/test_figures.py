@@ -1,6 +1,6 @@
 """The figures hold what the tables say: the axes' data, not their pixels."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,11 @@ from tests.report.conftest import only
 
 LINE, SOLID, HOLLOW = shields.RESULT
 Points = set[tuple[float, float]]
+
+
+def pile_figures(results: Results) -> Iterator[Figure]:
+    yield from piles.fractions(results)
+    yield from piles.extended(results)
 
 
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
@@ -49,7 +54,7 @@ def grains(results: Results) -> dict[str, list[Axes]]:
 
 @pytest.fixture(scope="module")
 def heaps(results: Results) -> dict[str, list[Axes]]:
-    return drawn(piles.draw(results))
+    return drawn(pile_figures(results))
 
 
 def test_study_has_the_figures_of_its_beds(results: Results) -> None:
@@ -59,10 +64,10 @@ def test_study_has_the_figures_of_its_beds(results: Results) -> None:
     }  # fmt: skip
     one = only(results, "grain")
     assert {figure.name for figure in single.draw(one)} == names
-    assert list(piles.draw(one)) == list(stress.draw(one)) == []
+    assert list(pile_figures(one)) == list(stress.draw(one)) == []
     heap = only(results, "pile")
     assert list(single.draw(heap)) == []
-    assert [figure.name for figure in piles.draw(heap)] == [
+    assert [figure.name for figure in pile_figures(heap)] == [
         "fractions-alpha15", "extended-shields-d30",
     ]  # fmt: skip
 
@@ -178,7 +183,7 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
     assert points(marked(ax, SOLID)) == rows(table, "reynolds", "shields")
     assert marked(ax, LINE)
     lost = table.assign(shields=table["shields"].where(table["fraction"] < 0.5))
-    (_, figure) = piles.draw(replace(results, tables={**results.tables, "pile_threshold": lost}))
+    (_, figure) = pile_figures(replace(results, tables={**results.tables, "pile_threshold": lost}))
     (ax,) = drawn([figure])["extended-shields-d30"]
     assert points(marked(ax, SOLID)) == rows(lost.dropna(subset=["shields"]), "reynolds", "shields")
 
@@ -187,7 +192,7 @@ def test_piles_in_the_transition_are_hollow(results: Results) -> None:
     table = results.tables["pile_threshold"].assign(regime="transition")
     scenes = results.scenes.assign(regime="transition")
     changed = {**results.tables, "pile_threshold": table, "scenes": scenes}
-    found = drawn(piles.draw(replace(results, tables=changed)))
+    found = drawn(pile_figures(replace(results, tables=changed)))
     (ax,) = found["extended-shields-d30"]
     assert not marked(ax, SOLID)
     assert points(marked(ax, HOLLOW)) == rows(table, "reynolds", "shields")
@@ -217,4 +222,4 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert {figure.name for figure in single.draw(empty)} == {
         "closed-form-horizontal", "closed-form-slope-beta60",
     }  # fmt: skip
-    assert list(piles.draw(empty)) == list(stress.draw(empty)) == []
+    assert list(pile_figures(empty)) == list(stress.draw(empty)) == []
