@@ -239,14 +239,21 @@ def exposed(
 
 
 def _unshadowed(along: FloatArray, height: FloatArray, reach: float, stray: float) -> BoolArray:
-    order = np.argsort(along)
-    sorted_along, sorted_height = along[order], height[order]
-    start = np.searchsorted(sorted_along, sorted_along - reach)
-    stop = np.searchsorted(sorted_along, sorted_along + reach)
-    free = np.empty(len(along), bool)
-    for place, (low, high) in enumerate(zip(start, stop, strict=True)):
-        free[order[place]] = sorted_height[low:high].max() <= sorted_height[place] + stray
-    return free
+    """Which points have none that is higher within a reach along the face."""
+    order = np.argsort(along, kind="stable")
+    x, z = along[order], height[order]
+    free = np.ones(len(x), bool)
+    # neighbours by place: first each point with the next one, then with the one after that
+    for apart in range(1, len(x)):
+        near = np.flatnonzero(x[apart:] - x[:-apart] <= reach)
+        if not len(near):
+            break
+        first, second = near, near + apart
+        free[first] &= z[second] <= z[first] + stray
+        free[second] &= z[first] <= z[second] + stray
+    found = np.empty_like(free)
+    found[order] = free
+    return found
 
 
 def _lattice(

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator import __version__, case, engine, plan, report, tables
+from orchestrator import __version__, engine, plan, report, tables
 from orchestrator.case import Case
 from orchestrator.errors import OrchestratorError
 from orchestrator.files import (
@@ -65,7 +65,7 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     space = Workspace(out.absolute())
     space.claim(study.name, study.text, list(planned.cases))
     with space.held():
-        done = {name for name, one in planned.cases.items() if case.is_done(one, space.cases)}
+        done = planned.done(space.cases)
         todo = {name: one for name, one in planned.cases.items() if name not in done}
         if not todo and _is_drawn(study, planned, space):
             return Finished(space.page, 0, {})
@@ -108,8 +108,9 @@ def draw(
 ) -> None:
     """Write tables, figures and page, and last the marker that says of which cases."""
     space.drawn.unlink(missing_ok=True)
-    results = tables.make(study, planned, space.cases)
-    times = tables.timings(planned, space.cases)
+    states = planned.done(space.cases)
+    results = tables.make(study, planned, space.cases, states)
+    times = tables.timings(planned, states)
     tables.write(results, space.tables)
     tables.write({"timings": times}, space.root / "timings")
     causes = {name: str(error) for name, error in failures.items()}

@@ -1,8 +1,10 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from orchestrator.case import Case
+from orchestrator.case import Case, done_state
 from orchestrator.errors import InputError
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import PileCase
@@ -27,6 +29,11 @@ class Plan:
     piles: dict[str, PileCase]
     cells: tuple[CellsCase, ...]
     cases: dict[str, Case]
+
+    def done(self, directory: Path) -> dict[str, dict[str, Any]]:
+        """The markers of the cases that are done, by name; their results are checked."""
+        found = {name: done_state(one, directory) for name, one in self.cases.items()}
+        return {name: state for name, state in found.items() if state is not None}
 
 
 def make(study: Study) -> Plan:

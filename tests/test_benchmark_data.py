@@ -59,7 +59,7 @@ def _fresh(paper: Study, chosen: list[str], root: Path) -> tables.Tables:
     for one in planned.cases.values():
         engine.execute(one, root, 300.0, threading.Event())
         assert case.is_done(one, root)
-    return tables.make(asked, planned, root)
+    return tables.make(asked, planned, root, planned.done(root))
 
 
 def test_fresh_piles_fall_within_the_stated_intervals(

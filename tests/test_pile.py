@@ -76,7 +76,8 @@ def test_it_empties_from_the_crest_down(slow: PileCase, cases: Path) -> None:
 
 def test_tables_reconcile(slow: PileCase, cases: Path) -> None:
     asked = _study(step=0.01)
-    made = tables.make(asked, plan.make(asked), cases)
+    planned = plan.make(asked)
+    made = tables.make(asked, planned, cases, planned.done(cases))
     curve = made["pile_curve"]
     assert ((curve["moved"] + curve["not_moved"]) == curve["count"]).all()
     assert (curve["count"] == slow.packing.count).all()
@@ -96,7 +97,8 @@ def test_every_column_has_a_meaning_and_survives_its_files(
     slow: PileCase, cases: Path, tmp_path: Path
 ) -> None:
     asked = _study(step=0.01)
-    made = tables.make(asked, plan.make(asked), cases)
+    planned = plan.make(asked)
+    made = tables.make(asked, planned, cases, planned.done(cases))
     tables.write(made, tmp_path)
     listed = pd.read_csv(tmp_path / "columns.csv").set_index("column")
     assert {str(c) for table in made.values() for c in table} == set(listed.index)

@@ -89,7 +89,7 @@ def _extended(results: Results, folder: Path) -> Iterator[Drawn]:
 
 
 SECTIONS: tuple[Callable[[Results, Path], Iterator[Drawn]], ...]
-SECTIONS = (_fractions, _extended, _pictures, _single, _stress)
+SECTIONS = (_pictures, _fractions, _extended, _single, _stress)
 """The dearest first."""
-PLACES = (3, 4, 1, 0, 2)
+PLACES = (1, 3, 4, 0, 2)
 """Their places on the page."""

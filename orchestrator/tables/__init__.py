@@ -4,12 +4,12 @@ Tables of results hold no time and no path of a machine: the same study gives th
 wherever and whenever it runs. What the runs took is in `timings`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from orchestrator import case
 from orchestrator.errors import OrchestratorError
 from orchestrator.files import write_durably
 from orchestrator.plan import Plan
@@ -23,9 +23,8 @@ Tables = dict[str, pd.DataFrame]
 __all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
 
 
-def make(study: Study, plan: Plan, cases: Path) -> Tables:
+def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    done = {name for name, one in plan.cases.items() if case.is_done(one, cases)}
     flows = {p.flow.name: p for p in plan.piles.values() if p.flow.name in done}
     ready = [p for p in plan.piles.values() if p.name in done and p.flow.name in done]
     cells = [one for one in plan.cells if one.name in done]
@@ -47,22 +46,17 @@ def _concat(frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(listed, ignore_index=True) if listed else pd.DataFrame()
 
 
-def timings(plan: Plan, cases: Path) -> pd.DataFrame:
-    """Wall times of the finished cases."""
-    rows = []
-    for name, one in plan.cases.items():
-        state = case.done_state(one, cases)
-        if state:
-            outside = state["wall_s"] - state["solver_s"]
-            rows.append(
-                {
-                    "case": name,
-                    "kind": one.kind,
-                    "solver_s": state["solver_s"],
-                    "outside_s": outside,
-                }
-            )
-    return pd.DataFrame(rows)
+def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """Wall times of the finished cases, from their states by name."""
+    return pd.DataFrame(
+        {
+            "case": name,
+            "kind": plan.cases[name].kind,
+            "solver_s": state["solver_s"],
+            "outside_s": state["wall_s"] - state["solver_s"],
+        }
+        for name, state in states.items()
+    )
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:

@@ -50,7 +50,9 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
         planned.cases, out / "cases", workers=2, limit_s=120.0, report=lambda outcome: None
     )
     assert not failed
-    return Results(asked, planned, tables.make(asked, planned, out / "cases"), out / "cases")
+    cases = out / "cases"
+    made = tables.make(asked, planned, cases, planned.done(cases))
+    return Results(asked, planned, made, out / "cases")
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +62,7 @@ def page(results: Results) -> Path:
 
 
 def write(results: Results, out: Path, failures: dict[str, str]) -> Path:
-    times = tables.timings(results.plan, results.cases)
+    times = tables.timings(results.plan, results.plan.done(results.cases))
     return report.write(results.study, results.plan, results.tables, times, failures, out)
 
 
