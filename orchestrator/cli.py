@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator import __version__
-from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.errors import InputError, OrchestratorError, of_system
 
 INTERRUPTED = 130
 NUMBERS: dict[str, tuple[float | None, str]] = {
@@ -44,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        print(f"orchestrator: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
+        print(f"orchestrator: {of_system(error)}", file=sys.stderr)
         return 1
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from orchestrator import case as case_states
 from orchestrator.case import Case
-from orchestrator.errors import Interrupted, OrchestratorError, SolverError
+from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
 from orchestrator.solvers import process
 
 LOG = "log.Allrun"
@@ -164,7 +164,7 @@ def _outcome(case: Case, future: Future[None]) -> Outcome:
     except OrchestratorError as error:
         return Outcome(case, error)
     except OSError as error:
-        return Outcome(case, SolverError(str(error), where=case.name, remedy="see the disk"))
+        return Outcome(case, of_system(error, case.name))
 
 
 def _give_up(

@@ -1,5 +1,8 @@
 """Failures that a user can act on: each says what, where and what to do."""
 
+import errno
+import shutil
+
 
 class OrchestratorError(Exception):
     """A failure with a place and a remedy; the command line prints it without a traceback.
@@ -44,3 +47,15 @@ class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error
     """The user stopped the run; the same command continues it."""
 
     exit_code = 130
+
+
+def of_system(error: OSError, where: str = "") -> OrchestratorError:
+    """The message of a failure of the file system; `where` is used if it does not say itself."""
+    # shutil collects what went wrong with each file: the first one tells the story
+    said = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
+    full = error.errno == errno.ENOSPC or "No space left" in (said or "")
+    return OrchestratorError(
+        "no space is left on the disk" if full else said or str(error),
+        where=where or str(error.filename or ""),
+        remedy="make room, then the same command continues" if full else "see the file system",
+    )
