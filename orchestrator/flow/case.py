@@ -61,7 +61,7 @@ class FlowCase(Case):
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 1
+    recipe: ClassVar[int] = 2
     results: ClassVar[tuple[str, ...]] = tuple(
         f"[1-9]*/{field}" for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress")
     )

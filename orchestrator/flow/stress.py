@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orchestrator.closures import KARMAN
+from orchestrator.closures import log_law_ustar
 from orchestrator.errors import InputError, SolverError
 from orchestrator.files import write_durably
 from orchestrator.solvers.openfoam import read_last_time, read_numbers
@@ -26,7 +26,7 @@ Measure = Literal["wall", "eq10"]
 
 def undisturbed_ustar(speed_m_s: float, lid_height_m: float, roughness_m: float) -> float:
     """Friction velocity of the approaching flow, m/s: u*_0 = 0.41 U_e / ln((z_lid + z0)/z0)."""
-    return float(KARMAN * speed_m_s / np.log((lid_height_m + roughness_m) / roughness_m))
+    return float(log_law_ustar(speed_m_s, lid_height_m, roughness_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,8 +177,8 @@ def read_openfoam(directory: Path) -> WallStress:
         z_e_m=z_e,
         # OpenFOAM's is the stress of the bed on the flow
         tau_wall=-_along(stress, faces.tangents) / ustar0**2,
-        ustar_over_ustar0_eq10=KARMAN * u_t / np.log((z_e + z0) / z0) / ustar0,
-        ustar_over_ustar0_eq10_printed=KARMAN * u_t / np.log(z_e / z0) / ustar0,
+        ustar_over_ustar0_eq10=log_law_ustar(u_t, z_e, z0) / ustar0,
+        ustar_over_ustar0_eq10_printed=log_law_ustar(u_t, z_e, z0, printed=True) / ustar0,
     )
 
 

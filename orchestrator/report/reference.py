@@ -46,11 +46,6 @@ def water_band(reynolds: FloatArray) -> Band:
     return Band(reynolds, low, high)
 
 
-def water_names() -> str:
-    """The curves behind the band, for a caption."""
-    return "; ".join(curve.name for curve in curves.WATER)
-
-
 def air_lines(
     scenes: pd.DataFrame, slope_deg: float = 0.0
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
