@@ -145,6 +145,15 @@ def fail(directory: Path, cause: str) -> None:
         write_json(directory / FAILED, {"ended": "failed", "cause": cause})
 
 
+def failure(directory: Path) -> str | None:
+    """Why the case in a directory failed, or None if it is not known to have failed."""
+    path = directory / FAILED
+    state = read_json(path)
+    if isinstance(state, dict):
+        return str(state.get("cause", ""))
+    return "its note of failure cannot be read" if path.is_file() else None
+
+
 def is_done(case: Case, cases: Path) -> bool:
     """Whether the case's directory holds its finished results, unharmed."""
     return done_state(case, cases) is not None

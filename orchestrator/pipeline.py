@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator import __version__, engine, plan, report, tables
+from orchestrator import __version__, case, engine, plan, report, tables
 from orchestrator.case import Case
 from orchestrator.errors import OrchestratorError
 from orchestrator.files import (
@@ -98,9 +98,12 @@ def redraw(out: Path) -> Finished:
     space = Workspace(out.absolute())
     about = space.description()
     study = parse(about["study"], name=about["name"], where=str(out))
+    planned = plan.make(study)
     with space.held():
-        draw(study, plan.make(study), space, {})
-    return Finished(space.page, 0, {})
+        causes = {name: case.failure(space.cases / name) for name in planned.cases}
+        failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
+        draw(study, planned, space, failures)
+    return Finished(space.page, 0, failures)
 
 
 def draw(

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.case import DONE, FAILED
+from orchestrator.case import DONE, failure
 from orchestrator.files import read_json
 from orchestrator.workspace import Workspace
 
@@ -52,7 +52,7 @@ def read(directory: Path) -> Status:
         done=_with(states, "done"),
         unfinished=_with(states, "unfinished"),
         waiting=_with(states, "waiting"),
-        failed={name: _cause(space.cases / name) for name in _with(states, "failed")},
+        failed={name: failure(space.cases / name) or "" for name in _with(states, "failed")},
         page=space.page if space.drawn.is_file() and space.page.is_file() else None,
     )
 
@@ -64,14 +64,9 @@ def _with(states: dict[str, str], wanted: str) -> tuple[str, ...]:
 def _state(directory: Path) -> str:
     if isinstance(read_json(directory / DONE), dict):
         return "done"
-    if (directory / FAILED).is_file():
+    if failure(directory) is not None:
         return "failed"
     return "unfinished" if directory.is_dir() else "waiting"
-
-
-def _cause(directory: Path) -> str:
-    state = read_json(directory / FAILED)
-    return str(state.get("cause", "")) if isinstance(state, dict) else "unreadable"
 
 
 def text(status: Status) -> str:

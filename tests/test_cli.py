@@ -229,6 +229,9 @@ def test_a_failed_case_is_told_and_the_others_are_finished(
     assert status.returncode == 3
     assert "1 done" in status.stdout
     assert "1 failed" in status.stdout
+    redrawn = orchestrator("report", "out")
+    assert redrawn.returncode == 3
+    assert "ERROR" in (tmp_path / "out" / "report.html").read_text()
     again = orchestrator("study", "grains.toml", "--out", "out")
     assert again.returncode == 0, again.stderr
 
