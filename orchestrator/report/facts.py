@@ -11,7 +11,7 @@ from orchestrator import __version__
 from orchestrator.case import IDENTITY
 from orchestrator.files import read_json
 from orchestrator.report import labels
-from orchestrator.report.results import Results, split, valid, varying
+from orchestrator.report.results import Results, held, split, valid, varying
 from orchestrator.tables import COLUMNS
 
 PACKAGES = (
@@ -100,21 +100,22 @@ def _threshold(row: pd.Series) -> str:
 
 
 def single_grains(results: Results) -> Sheet | None:
-    """How far DEM is from the closed form, by closure and whether it holds."""
+    """How far DEM is from the closed form, by closure, whether it holds, and protocol."""
     found = results.joined("single_grain")
     if found.empty:
         return None
     ratio = found["ustar_m_s"] / found["ustar_closed_form_m_s"]
     width = (found["ustar_high_m_s"] - found["ustar_low_m_s"]) / found["ustar_closed_form_m_s"] / 2
-    table = found.assign(holds=valid(found), ratio=ratio, width=width)
+    table = found.assign(holds=valid(found), held=held(found), ratio=ratio, width=width)
     rows = []
-    for (closure, holds), own in split(table, "closure", "holds"):
+    for (closure, holds, quiet), own in split(table, "closure", "holds", "held"):
         equation = "Eqs. 2, 3" if closure == "low" else "Eqs. 4, 5"
         far = (own["ratio"] - 1).abs()
         rows.append(
             (
                 equation,
                 "yes" if holds else "no (transition)",
+                "holds" if quiet else "ramps",
                 str(len(own)),
                 str(int(own["ratio"].isna().sum())),
                 f"{own['ratio'].mean() - 1:+.3%}",
@@ -125,13 +126,14 @@ def single_grains(results: Results) -> Sheet | None:
     head = (
         "forces",
         "closure holds",
+        "protocol",
         "grains",
         "never moved",
         "mean of u*/u*(closed form) − 1",
         "largest |u*/u*(closed form) − 1|",
         "median half width of the interval",
     )
-    return Sheet(head, tuple(sorted(rows, key=lambda row: row[:2], reverse=True)))
+    return Sheet(head, tuple(sorted(rows, key=lambda row: row[:3], reverse=True)))
 
 
 def parameters(results: Results) -> Sheet:
@@ -222,12 +224,13 @@ def _stray_grains(results: Results) -> list[str]:
     grains = results.joined("single_grain")
     if grains.empty:
         return []
-    far = (grains["ustar_m_s"] / grains["ustar_closed_form_m_s"] - 1).abs() > 0.01
+    ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]
+    far = ((ratio - 1).abs() > 0.01) & held(grains)
     silent = grains["ustar_m_s"].isna()
     found = []
     if far.any():
         found.append(
-            f"Single grains more than 1 % from the closed form: {int(far.sum())}, of which "
+            f"Single grains held more than 1 % from the closed form: {int(far.sum())}, of which "
             f"{int((far & valid(grains)).sum())} where their closure holds."
         )
     if silent.any():

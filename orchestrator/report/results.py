@@ -13,6 +13,8 @@ from orchestrator.plan import Plan
 from orchestrator.study import Study
 from orchestrator.tables import Tables
 
+RAMP_BELOW = 3.0
+"""Quiet time, sqrt(d/g'), below which a sequence of holds is a ramp."""
 PHYSICS = ("phi_deg", "alpha_s", "h_m", "packing", "stress")
 """Columns that part the panels of a figure wherever a study varies them."""
 
@@ -75,6 +77,14 @@ def split(
 def varying(table: pd.DataFrame) -> tuple[str, ...]:
     """Which of the columns that part panels differ within a table."""
     return tuple(c for c in PHYSICS if c in table and table[c].nunique(dropna=False) > 1)
+
+
+def held(table: pd.DataFrame) -> pd.Series:
+    """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp.
+
+    A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the marker.
+    """
+    return table["quiet"] >= RAMP_BELOW
 
 
 def valid(table: pd.DataFrame) -> pd.Series:

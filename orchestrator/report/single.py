@@ -7,18 +7,22 @@ import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
 
 from orchestrator.report import captions, labels, shields, style, theory
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, split, varying
+from orchestrator.report.results import Results, held, split, valid, varying
 
+CROSS = "beyond the paper"
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """The figures that the study's single grains give, one at a time."""
+    """The figures that the study's single grains give, one at a time; ramps are not thresholds."""
     grains = results.beds("grain")
+    grains = grains[held(grains)]
     dem = results.joined("single_grain")
+    dem = dem[held(dem)] if len(dem) else dem
     flat = grains[grains["alpha_deg"] == 0]
     if len(flat):
         yield from _pair(results, flat, dem, "beta_deg", "horizontal bed")
@@ -68,9 +72,30 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
     style.legends(
         figure,
         _colour_entries(scenes, by, colours),
-        looks + shields.point_entries(points) if len(points) else looks,
+        looks + _point_entries(points) if len(points) else looks,
     )
     return figure
+
+
+def _beyond(points: pd.DataFrame) -> "pd.Series[bool]":
+    """Which points are of diameters that the paper does not have."""
+    low, high = theory.SWEEP_M
+    return ~points["d_m"].between(low, high)
+
+
+def _cross(ax: Axes, points: pd.DataFrame) -> None:
+    """Cross out the markers of some points: white on a full marker, grey in a hollow one."""
+    for filled, colour in ((True, "white"), (False, "0.4")):
+        own = points[valid(points) == filled]
+        ax.plot(own[DEM[0]], own[DEM[1]], "x", color=colour, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
+
+
+def _point_entries(points: pd.DataFrame) -> list[Artist]:
+    entries = shields.point_entries(points)
+    if _beyond(points).any():
+        label = "crossed: diameter beyond the paper’s"
+        entries.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
+    return entries
 
 
 def _colour_entries(scenes: pd.DataFrame, by: str, colours: dict[float, str]) -> list[Artist]:
@@ -89,6 +114,7 @@ def _panel(
         if len(points):
             own = points[points["scene_id"].isin(series["scene_id"])]
             shields.draw_points(ax, own, colour, DEM)
+            _cross(ax, own[_beyond(own)])
         if by == "alpha_deg":
             references = shields.draw_sloped_air(ax, series, colour)
     if by == "beta_deg":

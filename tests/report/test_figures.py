@@ -223,3 +223,19 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
         "closed-form-horizontal", "closed-form-slope-beta60",
     }  # fmt: skip
     assert list(pile_figures(empty)) == list(stress.draw(empty)) == []
+
+
+def test_ramps_are_no_points_of_the_diagrams(results: Results) -> None:
+    ramps = {**results.tables, "scenes": results.tables["scenes"].assign(quiet=1.0)}
+    assert list(single.draw(replace(results, tables=ramps))) == []
+
+
+def test_diameters_beyond_the_papers_are_crossed(results: Results) -> None:
+    large = results.tables["single_grain"].assign(d_m=1.5e-3)
+    found = drawn(single.draw(replace(results, tables={**results.tables, "single_grain": large})))
+    ax = found["dem-horizontal"][0]
+    points, crosses = (
+        sum(np.size(line.get_xdata()) for line in marked(ax, *marks))
+        for marks in ((SOLID, HOLLOW), (single.CROSS,))
+    )
+    assert points == crosses > 0
