@@ -66,7 +66,17 @@ class Motion:
     @property
     def fraction(self) -> FloatArray:
         """n/N at the end of each hold, shape (levels + 1,)."""
-        return np.asarray(self._counts(self.level) / self.count)
+        return np.asarray(self.moved / self.count)
+
+    @property
+    def moved(self) -> IntArray:
+        """How many grains had moved by the end of each hold, shape (levels + 1,)."""
+        return self._counts(self.level)
+
+    @property
+    def fallen_upstream(self) -> IntArray:
+        """How many had been a marker's length upstream by then, shape (levels + 1,)."""
+        return self._counts(self.fallen)
 
     def _counts(self, level: IntArray) -> IntArray:
         """How many grains had their level by the end of each hold."""
@@ -76,10 +86,11 @@ class Motion:
 
     def to_csv(self, directory: Path, grains: GrainTable) -> None:
         """Write ``holds.csv`` and ``motion.csv``: the same, for people and for `from_csv`."""
-        moved = self._counts(self.level)
         holds = pd.DataFrame({"hold": np.arange(len(self.flow)), "flow": self.flow})
         holds = holds.assign(
-            moved=moved, not_moved=self.count - moved, fallen_upstream=self._counts(self.fallen)
+            moved=self.moved,
+            not_moved=self.count - self.moved,
+            fallen_upstream=self.fallen_upstream,
         )
         holds.to_csv(directory / HOLDS, index=False)
         columns = {

@@ -26,16 +26,20 @@ __all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
     flows = {p.flow.name: p for p in plan.piles.values() if p.flow.name in done}
-    ready = [p for p in plan.piles.values() if p.name in done and p.flow.name in done]
+    ready = [
+        piles.Answer.read(pile, cases)
+        for pile in plan.piles.values()
+        if pile.name in done and pile.flow.name in done
+    ]
     cells = [one for one in plan.cells if one.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))
-    thresholds = pd.DataFrame(row for pile in ready for row in piles.threshold_rows(pile, cases))
+    thresholds = pd.DataFrame(row for answer in ready for row in piles.threshold_rows(answer))
     made = {
         "scenes": asked,
         "single_grain": pd.DataFrame(single.rows(study, cells, cases)),
         "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
-        "pile_grain": _concat(piles.grains(pile, cases) for pile in ready),
-        "pile_curve": _concat(piles.curve(pile, cases) for pile in ready),
+        "pile_grain": _concat(map(piles.grains, ready)),
+        "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_scatter(thresholds, asked),
     }
     return {name: table for name, table in made.items() if not table.empty}

@@ -1,6 +1,7 @@
 """The tables of piles: the stress on them, their grains, their answer to the flow."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,23 @@ import pandas as pd
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Face, PileCase
 from orchestrator.scene import Scene
 from orchestrator.tables.scenes import Row, point
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A pile with what its finished cases say, read once for all of its tables."""
+
+    pile: PileCase
+    motion: Motion
+    face: Face
+
+    @classmethod
+    def read(cls, pile: PileCase, cases: Path) -> "Answer":
+        """Read the motion of a pile and the stress on it."""
+        return cls(pile, Motion.from_csv(cases / pile.name), pile.face(cases))
 
 
 def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame]:
@@ -36,13 +51,13 @@ def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame
         )
 
 
-def grains(pile: PileCase, cases: Path) -> pd.DataFrame:
+def grains(answer: Answer) -> pd.DataFrame:
     """The windward grains of a pile: the stress on each, when and how it moved."""
-    motion, face = Motion.from_csv(cases / pile.name), pile.face(cases)
+    motion, face = answer.motion, answer.face
     found = threshold.of_grains(motion)
     return pd.DataFrame(
         {
-            "scene_id": pile.scene.id,
+            "scene_id": answer.pile.scene.id,
             "grain_id": face.ids,
             "s_m": face.arc_length,
             "ustar_over_ustar0": face.speed,
@@ -54,24 +69,20 @@ def grains(pile: PileCase, cases: Path) -> pd.DataFrame:
     )
 
 
-def curve(pile: PileCase, cases: Path) -> pd.DataFrame:
+def curve(answer: Answer) -> pd.DataFrame:
     """The fraction of a pile that had moved, and the stress on it, at each hold."""
-    scene, motion = pile.scene, Motion.from_csv(cases / pile.name)
-    curve = threshold.curve(motion, pile.face(cases).speed, scene.fluid.density)
-    moved = np.rint(curve.fraction * motion.count).astype(int)
-    holds = np.arange(len(motion.flow))
+    scene, motion = answer.pile.scene, answer.motion
+    curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
     return pd.DataFrame(
         {
             "scene_id": scene.id,
-            "hold": holds,
-            "u_e_m_s": curve.ustar0 * _lid_speed_ratio(pile),
+            "hold": np.arange(len(motion.flow)),
+            "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
             "ustar0_m_s": curve.ustar0,
             "count": motion.count,
-            "moved": moved,
-            "not_moved": motion.count - moved,
-            "fallen_upstream": [
-                int(((motion.fallen > 0) & (motion.fallen <= k)).sum()) for k in holds
-            ],
+            "moved": motion.moved,
+            "not_moved": motion.count - motion.moved,
+            "fallen_upstream": motion.fallen_upstream,
             "fraction_moved": curve.fraction,
             "mean_tau_pa": curve.mean_tau,
             "shields": _shields(scene, curve.mean_tau),
@@ -80,10 +91,10 @@ def curve(pile: PileCase, cases: Path) -> pd.DataFrame:
     )
 
 
-def threshold_rows(pile: PileCase, cases: Path) -> Iterator[Row]:
+def threshold_rows(answer: Answer) -> Iterator[Row]:
     """The threshold of a pile at each fraction that its scene asks for."""
-    scene, motion = pile.scene, Motion.from_csv(cases / pile.name)
-    speed = pile.face(cases).speed
+    pile, motion, speed = answer.pile, answer.motion, answer.face.speed
+    scene = pile.scene
     pivot = pile.pivot_thresholds(speed)
     for fraction in scene.protocol.fractions:
         found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
