@@ -21,6 +21,11 @@ def presets() -> Path:
     return PACKAGE / "presets"
 
 
+def known() -> Path:
+    """The folder of what the ladder and the maps found."""
+    return PACKAGE / "known"
+
+
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
     *("log.*", "postProcessing", "polyMesh", "levels.csv", "*.dump"),

@@ -7,6 +7,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-VALUED = ("--out", "--workers", "--roughness", *NUMBERS)
+VALUED = ("--out", "--workers", "--tolerance", "--roughness", *NUMBERS)
 FLAGS = ("-h", "--help", "--version", "--json", "--")
 
 
@@ -83,6 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_study(commands)
     _add_threshold(commands)
     _add_directory_commands(commands)
+    _add_experiments(commands)
     _add_benchmark(commands)
     command = commands.add_parser(
         "doctor", help="are the solvers here, can it draw; what to install"
@@ -100,11 +102,35 @@ def _add_study(commands: Any) -> None:
         metavar="FILE|PRESET",
         help="default: %(default)s",
     )
+    _add_run_options(command)
+    command.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="X",
+        help="relative error that tau_c may have: the cheapest models known to be within it",
+    )
+    command.set_defaults(run=_study)
+
+
+def _add_run_options(command: Any) -> None:
     command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
     command.add_argument(
         "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
     )
-    command.set_defaults(run=_study)
+
+
+def _add_experiments(commands: Any) -> None:
+    command = commands.add_parser(
+        "ladder", help="what each model costs and how far it is off: speed against accuracy"
+    )
+    command.add_argument(
+        "source", nargs="?", default="ladder", metavar="FILE|PRESET", help="default: %(default)s"
+    )
+    _add_run_options(command)
+    command.set_defaults(run=_ladder)
+    command = commands.add_parser("stability", help="maps of where each method fails")
+    _add_run_options(command)
+    command.set_defaults(run=_stability)
 
 
 def _add_threshold(commands: Any) -> None:
@@ -151,11 +177,31 @@ def _study(options: argparse.Namespace) -> int:
     from orchestrator import pipeline, study
 
     asked = study.load(options.source)
+    if options.tolerance is not None:
+        study.check_tolerance(options.tolerance, "--tolerance")
+        asked = replace(asked, tolerance=options.tolerance)
     out = options.out or Path("results") / asked.name
     finished = pipeline.run(asked, out, workers=options.workers)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     return _end(finished.page, finished.failures)
+
+
+def _ladder(options: argparse.Namespace) -> int:
+    from orchestrator import study
+    from orchestrator.experiments import run
+
+    asked = study.load(options.source)
+    out = options.out or Path("results") / "ladder"
+    finished = run.run_ladder(asked, out, workers=options.workers)
+    return _end(finished.page, finished.failures)
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from orchestrator.experiments import run
+
+    out = options.out or Path("results") / "stability"
+    return _end(run.run_stability(out, workers=options.workers).page, {})
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -1,12 +1,12 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from orchestrator import __version__, case, engine, plan, report, tables
 from orchestrator.case import Case
-from orchestrator.errors import OrchestratorError
+from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.files import (
     canonical_json,
     digest_file,
@@ -61,23 +61,43 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     Interrupted
         If the user stopped it; every child has ended.
     """
-    planned = plan.make(study)
     space = Workspace(out.absolute())
-    space.claim(study.name, study.text, list(planned.cases))
+    planned = plan.settled(study, space.cases)
+    _claim(space, study, planned)
     with space.held():
-        done = planned.done(space.cases)
-        todo = {name: one for name, one in planned.cases.items() if name not in done}
-        if not todo and _is_drawn(study, planned, space):
-            return Finished(space.page, 0, {})
-        check_solvers(todo.values())
-        failures = {}
-        if todo:
-            with Display(list(todo.values()), workers) as display:
-                failures = engine.run(
-                    todo, space.cases, workers=workers, limit_s=study.time_limit_s, report=display
-                )
-        draw(study, planned, space, failures)
-        return Finished(space.page, len(todo), failures)
+        started, failures = 0, {}
+        while todo := missing(planned, space):
+            started += len(todo)
+            failures = complete(todo, space, workers=workers, limit_s=study.time_limit_s)
+            settled = plan.settled(study, space.cases)
+            if failures or settled.cases.keys() == planned.cases.keys():
+                break
+            # a check has overruled a cheap rung
+            planned = settled
+            _claim(space, study, planned)
+        if started or not _is_drawn(study, planned, space):
+            draw(study, planned, space, failures)
+        return Finished(space.page, started, failures)
+
+
+def _claim(space: Workspace, study: Study, planned: Plan) -> None:
+    about = {"study": study.text, "tolerance": study.tolerance}
+    space.claim(study.name, list(planned.cases), **about)
+
+
+def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
+    """The cases of a plan that are not done yet, by name."""
+    done = planned.done(space.cases)
+    return {name: one for name, one in planned.cases.items() if name not in done}
+
+
+def complete(
+    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float
+) -> dict[str, OrchestratorError]:
+    """Run cases, with a display of how far they are; the failures by the cases' names."""
+    check_solvers(todo.values())
+    with Display(list(todo.values()), workers) as display:
+        return engine.run(todo, space.cases, workers=workers, limit_s=limit_s, report=display)
 
 
 def check_solvers(cases: Iterable[Case]) -> None:
@@ -97,8 +117,16 @@ def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     about = space.description()
+    if "study" not in about:
+        raise InputError(
+            f"this is no study but an experiment, {about['name']}",
+            where=str(out),
+            remedy=f"`orchestrator {about['name']} --out {out}` draws it again",
+        )
     study = parse(about["study"], name=about["name"], where=str(out))
-    planned = plan.make(study)
+    if about.get("tolerance"):
+        study = replace(study, tolerance=about["tolerance"])
+    planned = plan.settled(study, space.cases)
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
@@ -127,7 +155,7 @@ def draw(
 def _origin(study: Study, planned: Plan) -> str:
     """Digest of all that the tables and figures are made of."""
     cases = [one.id for one in planned.cases.values()]
-    return digest_text(canonical_json([__version__, study.text, cases]))
+    return digest_text(canonical_json([__version__, study.text, study.tolerance, cases]))
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:

@@ -17,6 +17,7 @@ from orchestrator.files import canonical_json, digest_text
 Positive = Annotated[float, Field(gt=0)]
 Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
+Method = Literal["dem", "peeling", "pivot"]
 
 
 class Part(BaseModel):
@@ -104,8 +105,10 @@ class Flow(Part):
 
 
 class Protocol(Part):
-    """How the threshold is found: the flow is raised in steps and held at each."""
+    """How the threshold is found; by DEM the flow is raised in steps and held at each."""
 
+    method: Method = "dem"
+    """dem; peeling, without dynamics; or pivot, each grain by itself (Eq. 3 or 5)"""
     step: Annotated[float, Field(gt=0, le=0.2)] = 0.02
     """relative rise of u* from one hold to the next"""
     quiet: Annotated[float, Field(ge=1)] = 10.0

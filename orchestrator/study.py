@@ -21,7 +21,7 @@ from orchestrator.scene import PileBed, Scene, UnfitError, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "group")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "group")
 TIME_LIMIT_S = 3600.0
 MOST_SCENES = 100_000
 
@@ -48,6 +48,8 @@ class Study:
         In the file's order; every scene has its closure decided.
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
+    tolerance : float or None
+        Relative error that tau_c may have; None: every scene as it is asked for.
     text : str
         The file itself.
     """
@@ -56,6 +58,7 @@ class Study:
     title: str
     groups: tuple[Group, ...]
     time_limit_s: float
+    tolerance: float | None
     text: str
 
     @property
@@ -115,7 +118,26 @@ def parse(text: str, *, name: str, where: str) -> Study:
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
     groups = tuple(_groups(data, where))
-    return Study(name, title, groups, float(limit), text)
+    tolerance = data.get("tolerance")
+    if tolerance is not None:
+        check_tolerance(tolerance, f"{where}: tolerance")
+    return Study(name, title, groups, float(limit), tolerance, text)
+
+
+def check_tolerance(value: Any, where: str) -> None:
+    """A tolerance is a relative error between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value < 1:
+        raise InputError(
+            f"{value!r} is not a relative error between 0 and 1",
+            where=where,
+            remedy="0.05 allows tau_c to be 5 % off",
+        )
 
 
 def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:

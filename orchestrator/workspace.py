@@ -43,8 +43,8 @@ class Workspace:
         """Marker that tables, figures and page were finished, and of which cases."""
         return self.root / "report.json"
 
-    def claim(self, name: str, text: str, cases: list[str]) -> None:
-        """Make the directory this study's own, or take it up again.
+    def claim(self, name: str, cases: list[str], **about: Any) -> None:
+        """Make the directory this study's own, or take it up again; `about` is kept with it.
 
         Raises
         ------
@@ -58,7 +58,12 @@ class Workspace:
                 self.cases.mkdir(exist_ok=True)
                 write_json(
                     self.root / MARKER,
-                    {"orchestrator": __version__, "name": name, "study": text, "cases": cases},
+                    {
+                        "orchestrator": __version__,
+                        "name": name,
+                        **about,
+                        "cases": cases,
+                    },
                 )
         except OSError as error:
             raise InputError(
@@ -88,7 +93,7 @@ class Workspace:
             If the directory holds no study.
         """
         value = read_json(self.root / MARKER)
-        if not isinstance(value, dict) or not {"name", "study", "cases"} <= value.keys():
+        if not isinstance(value, dict) or not {"name", "cases"} <= value.keys():
             raise InputError(
                 "there is no study in this directory",
                 where=str(self.root),

@@ -47,12 +47,38 @@ class Motion:
         unless it had passed the marker before.
     mode : ndarray of int, shape (N,)
         How it moved: index into `MODES`.
+    exact : bool
+        Whether a grain moves at its level's very flow, as by a formula; else between the hold
+        before and that one.
     """
 
     flow: FloatArray
     level: IntArray
     fallen: IntArray
     mode: IntArray
+    exact: bool = False
+
+    @classmethod
+    def of_flows(cls, flows: FloatArray) -> "Motion":
+        """The motion of grains that roll at known flows, shape (N,); infinite for never."""
+        moves = np.isfinite(flows)
+        levels = np.unique(flows[moves])
+        # before the first level nothing moves
+        flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
+        level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
+        none, rolled = MODES.index("none"), MODES.index("rolled")
+        return cls(
+            flow=flow,
+            level=level,
+            fallen=np.zeros_like(level),
+            mode=np.where(moves, rolled, none),
+            exact=True,
+        )
+
+    @property
+    def low(self) -> FloatArray:
+        """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
+        return self.flow if self.exact else self.flow[np.maximum(np.arange(len(self.flow)), 1) - 1]
 
     def moved_by(self, level: int) -> NDArray[np.bool_]:
         """Which grains have moved by the end of a hold."""

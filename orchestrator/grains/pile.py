@@ -13,8 +13,9 @@ from orchestrator.case import Case
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains import deck, motion, peeling, protocol
 from orchestrator.grains.case import GrainCase
+from orchestrator.grains.motion import Motion
 from orchestrator.scene import PileBed, Scene
 
 FloatArray = NDArray[np.float64]
@@ -93,6 +94,11 @@ class PileCase(GrainCase):
         return (self.flow,)
 
     @property
+    def runs(self) -> tuple[Case, ...]:
+        """The cases that its answer is read from: the flow's and, by DEM, its own."""
+        return (*self.needs, self) if self.scene.protocol.method == "dem" else self.needs
+
+    @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
         return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
@@ -158,6 +164,27 @@ class PileCase(GrainCase):
         found = motion.read(directory, grains, self.scene.protocol.marker, all_rest=True)
         found.to_csv(directory, grains)
 
+    def motion(self, cases: Path) -> Motion:
+        """What the windward grains do, by the scene's method; from the finished cases.
+
+        Only the deck shows how a grain moves: without it, all roll.
+        """
+        if self.scene.protocol.method == "dem":
+            return Motion.from_csv(cases / self.name)
+        speed = self._speed(cases)
+        if self.scene.protocol.method == "pivot":
+            return Motion.of_flows(self._alone(speed[self.packing.windward]))
+        grains = self._grains(speed)
+        flows = peeling.flows(
+            self.packing.centres,
+            grains.kind >= deck.COUNTED,
+            grains.force,
+            weight=self.scene.weight,
+            along=self.triangle.tangent,
+            marker=self.scene.protocol.marker,
+        )
+        return Motion.of_flows(flows[self.packing.windward])
+
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""
         chosen = self.packing.windward
@@ -172,14 +199,17 @@ class PileCase(GrainCase):
 
         Sorted, shape (N,); infinite for grains in flow that runs back.
         """
-        alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
         if not np.any(speed > 0):
             raise InputError(
                 "no grain of the windward face feels a flow up the slope",
                 where=f"scene {self.scene.id}: flow",
                 remedy="look at the flow case; the mesh or the stress is wrong",
             )
-        return np.sort(np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf))
+        return np.sort(self._alone(speed))
+
+    def _alone(self, speed: FloatArray) -> FloatArray:
+        alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
+        return np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf)
 
     def _speed(self, cases: Path) -> FloatArray:
         """Signed friction velocity at each grain over the undisturbed one."""

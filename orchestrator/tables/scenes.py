@@ -14,15 +14,17 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
     """A row for each scene of each group, in the study's order."""
     cell_of = {scene.id: one.name for one in plan.cells for scene in one.scenes}
     for group in study.groups:
-        for scene in group.scenes:
-            pile = plan.piles.get(scene.id)
+        for asked in group.scenes:
+            scene, pile = plan.answers[asked.id], plan.piles.get(asked.id)
+            runs = [one.name for one in pile.runs] if pile else [cell_of.get(scene.id)]
             yield {
-                "scene_id": scene.id,
+                "scene_id": asked.id,
                 "group": group.name,
                 "bed": scene.bed.kind,
                 **point(scene),
                 **_choices(scene),
-                "case": pile.name if pile else cell_of[scene.id],
+                "method": scene.protocol.method,
+                "case": runs[-1] if scene.protocol.method == "dem" else None,
                 "flow_case": pile.flow.name if pile else None,
             }
 
