@@ -217,6 +217,11 @@ def is_open(scene: Scene) -> bool:
     )
 
 
+def meaning(part: Part, name: str) -> str:
+    """What a rung is; nothing for a scene that is on none."""
+    return next((one.meaning for one in LADDER[part] if one.name == name), "")
+
+
 @dataclass(frozen=True)
 class _Pair:
     flow: Rung

@@ -8,6 +8,7 @@ from platform import python_version
 import pandas as pd
 
 from orchestrator import __version__
+from orchestrator import rungs as ladder
 from orchestrator.case import IDENTITY
 from orchestrator.files import read_json
 from orchestrator.report import labels
@@ -236,3 +237,50 @@ def _stray_grains(results: Results) -> list[str]:
     if silent.any():
         found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
     return found
+
+
+def rungs(results: Results) -> Sheet | None:
+    """On which rungs of the ladder the piles were answered, and what is known of them."""
+    table = results.tables.get("pile_threshold", pd.DataFrame())
+    if table.empty:
+        return None
+    rows = []
+    for (flow, grains), own in split(table, "flow_rung", "grain_rung"):
+        known = own["error_estimate"].max()
+        rows.append(
+            (
+                f"{flow} | {grains}",
+                _meaning(flow, grains),
+                str(own["scene_id"].nunique()),
+                "not known" if pd.isna(known) else f"{100 * known:.1f} %",
+            )
+        )
+    return Sheet(("flow | grains", "what they are", "piles", "known error of τ_c, up to"), tuple(rows))
+
+
+def _meaning(flow: str, grains: str) -> str:
+    listed = (("flow", flow), ("grains", grains))
+    meanings = (ladder.meaning(part, name) for part, name in listed)
+    return "; ".join(text for text in meanings if text)
+
+
+def checks(results: Results) -> Sheet | None:
+    """The piles that DEM answered as well: how far the cheap answers are from it."""
+    table = results.tables.get("check", pd.DataFrame())
+    if table.empty:
+        return None
+    rows = [
+        (
+            f"{one.alpha_deg:g}°, {one.packing}, {one.closure}",
+            f"{1e3 * one.d_m:g} mm",
+            f"{one.fraction:.0%}",
+            f"{one.shields:.4g}",
+            f"{one.shields_dem:.4g} ({one.shields_dem_low:.4g} … {one.shields_dem_high:.4g})",
+            f"{100 * one.difference:+.1f} %",
+            "yes" if one.agree else "no",
+            str(one.case),
+        )
+        for one in table.itertuples(index=False)
+    ]
+    head = ("piles", "d", "n/N", "τ_c", "by DEM", "difference", "agree", "case")
+    return Sheet(head, tuple(rows))
