@@ -25,11 +25,11 @@ __all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {p.flow.name: p for p in plan.piles.values() if p.flow.name in done}
+    flows = {need.name: p for p in plan.piles.values() for need in p.needs if need.name in done}
     ready = [
         piles.Answer.read(pile, cases)
         for pile in plan.piles.values()
-        if pile.name in done and pile.flow.name in done
+        if pile.name in done and all(need.name in done for need in pile.needs)
     ]
     cells = [one for one in plan.cells if one.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))
