@@ -154,6 +154,14 @@ def failure(directory: Path) -> str | None:
     return "its note of failure cannot be read" if path.is_file() else None
 
 
+def ended(directory: Path) -> tuple[str, str]:
+    """In which way the case in a directory failed, and why; empty where it is not known to have."""
+    state = read_json(directory / FAILED)
+    if not isinstance(state, dict):
+        return "", ""
+    return str(state.get("ended", "")), str(state.get("cause", ""))
+
+
 def is_done(case: Case, cases: Path) -> bool:
     """Whether the case's directory holds its finished results, unharmed."""
     return done_state(case, cases) is not None

@@ -96,9 +96,7 @@ def settled(study: Study, directory: Path) -> Plan:
         if study.tolerance is None or not planned.checks:
             return planned
         done = planned.done(directory)
-        more = checks.overruled(
-            planned.piles, planned.checks, study.tolerance, directory, done
-        )
+        more = checks.overruled(planned.piles, planned.checks, study.tolerance, directory, done)
         if not more:
             return planned
         escalated |= more

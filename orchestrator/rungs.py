@@ -175,9 +175,7 @@ def error(scene: Scene) -> float:
     return sum(known_error(part, name, scene) for part, name in names(scene).items())
 
 
-def choose(
-    scene: Scene, tolerance: float, *, above: Mapping[Part, str] | None = None
-) -> Scene:
+def choose(scene: Scene, tolerance: float, *, above: Mapping[Part, str] | None = None) -> Scene:
     """A scene on the cheapest rungs that are known to be within a tolerance of the dearest.
 
     Parameters

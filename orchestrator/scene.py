@@ -18,6 +18,12 @@ Positive = Annotated[float, Field(gt=0)]
 Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
+Model = Literal["solve", "hill", "flat"]
+Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
+Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
+Forced = Literal["exposed", "all but crest", "all but toe"]
+BUILDABLE_DEG = (2.0, 60.0)
+"""Slopes of piles that can be meshed and packed."""
 
 
 class Part(BaseModel):
@@ -88,6 +94,8 @@ class PileBed(Bed):
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
+    model: Model = "solve"
+    """of a pile's flow: OpenFOAM; linear theory of a low hill; or u* = u*_0 as on a flat bed"""
     speed: Positive = 10.0
     """U_e at which the flow over a pile is solved, m/s; it is then scaled"""
     viscosity: Positive = 1e-5
@@ -96,12 +104,26 @@ class Flow(Part):
     """of the mesh on the bed, m; default: `default_first_cell_height`"""
     cells_per_face: Annotated[int, Field(ge=10)] = 40
     """of the mesh along each face of the pile"""
+    roughness: Positive | None = None
+    """z0 of the solve, m, for beds of nearly the same one to share it; default: the bed's"""
+    turbulence: Turbulence = "kEpsilon"
+    """OpenFOAM's model of it"""
+    convection: Convection = "linearUpwind"
+    """OpenFOAM's scheme for the convection of U"""
+    correctors: Annotated[int, Field(ge=0, le=5)] = 1
+    """of the pressure for cells that are not orthogonal, in each iteration"""
     closure: Literal["auto", "low", "high"] = "auto"
     """which of Eqs. 2 and 4 gives the forces; auto: the valid one, or both in the transition"""
     lift_coefficient: Annotated[float, Field(ge=0)] = closures.LIFT_COEFFICIENT
     """alpha_s"""
     stress: Stress = "wall"
     """the flow's wall stress, or Eq. 10 at the first cell"""
+    average: Positive = 1 / 40
+    """least bed length, over h, that a grain's stress is averaged on: the crest's own value never
+    converges with the mesh"""
+    forced: Forced = "exposed"
+    """exposed grains of a pile that carry the flow's force: all, or without the topmost one, or
+    without those on the lowest 5 % of the windward face"""
 
 
 class Protocol(Part):
@@ -146,12 +168,9 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
-        check_slope(
-            self.bed.slope_deg, self.bed.entrainment_angle_deg, self.grain.friction_angle_deg
-        )
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
-            check_first_cell(self.bed.roughness, self.first_cell_height)
+            check_mesh(self.bed.height, self.first_cell_height)
         elif self.bed.roughness >= self.grain.diameter:
             raise UnfitError(
                 "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
@@ -181,12 +200,17 @@ class Scene(Part):
         )
 
     @property
+    def solve_roughness(self) -> float:
+        """z0 at which the flow over a pile is solved, m."""
+        return self.flow.roughness or self.bed.roughness
+
+    @property
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
-        return default_first_cell_height(self.bed.height, self.bed.roughness)
+        return default_first_cell_height(self.bed.height, self.solve_roughness)
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
@@ -254,29 +278,28 @@ def check_density(density: float, fluid_density: float) -> None:
         )
 
 
-def check_slope(slope_deg: float, entrainment_angle_deg: float, friction_angle_deg: float) -> None:
-    """Beyond these limits a grain rolls or slides back without any flow."""
-    limit = min(friction_angle_deg, 90 - entrainment_angle_deg)
-    if slope_deg > limit + 1e-9:
-        raise UnfitError(
-            "bed.slope_deg",
-            f"{slope_deg:g} deg is beyond min(friction angle, 90 deg - entrainment angle)"
-            f" = {limit:g} deg",
-            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
-        )
-
-
 def check_pile(bed: PileBed, diameter: float) -> None:
-    """What the meshes and packings of piles can be built for."""
-    if not 10 <= bed.slope_deg <= 35:
+    """What meshes and packings of piles can be built at all."""
+    low, high = BUILDABLE_DEG
+    if not low <= bed.slope_deg <= high:
         raise UnfitError(
-            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", "choose 10 ... 35 deg"
+            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
         )
     if bed.height < 5 * diameter:
         raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
+        )
+
+
+def check_mesh(height: float, first_cell_height: float) -> None:
+    """The mesh must resolve the pile."""
+    if first_cell_height > height / 4:
+        raise UnfitError(
+            "flow.first_cell_height",
+            f"{first_cell_height:g} m is above a quarter of the pile's {height:g} m",
+            "lower it, or raise bed.height",
         )
 
 
@@ -289,17 +312,6 @@ def default_first_cell_height(height: float, roughness: float) -> float:
     """
     rough = min(30 * roughness, max(height / 20, 20 * roughness))
     return min(max(height / 40, rough), height / 4)
-
-
-def check_first_cell(roughness: float, first_cell_height: float) -> None:
-    """The rough wall's log law fails where the first cell's centre is near the roughness."""
-    if 4 * roughness > first_cell_height:
-        raise UnfitError(
-            "bed.roughness",
-            f"z0 = {roughness:g} m is above half of z_e = {first_cell_height / 2:g} m, the height"
-            " of the first cell's centre",
-            "lower it, or raise flow.first_cell_height or bed.height; z_e of 10 z0 is sound",
-        )
 
 
 def roughness_length(value: Any, diameter: float) -> Any:

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from orchestrator import assets
+from orchestrator import assets, limits
 from orchestrator.errors import InputError
 from orchestrator.scene import PileBed, Scene, UnfitError, roughness_length
 
@@ -72,8 +72,8 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in assets.presets().glob("*.toml"))
 
 
-def load(source: str) -> Study:
-    """Read a study file, or a preset by its name.
+def load(source: str, *, guarded: bool = True) -> Study:
+    """Read a study file, or a preset by its name; `guarded` as in `parse`.
 
     Raises
     ------
@@ -93,11 +93,13 @@ def load(source: str) -> Study:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None
-    return parse(text, name=path.stem, where=source)
+    return parse(text, name=path.stem, where=source, guarded=guarded)
 
 
-def parse(text: str, *, name: str, where: str) -> Study:
+def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
     """Make a study of a TOML file's text; `where` names the file in messages.
+
+    A guarded study refuses scenes beyond `limits`; an unguarded one what cannot be built.
 
     Raises
     ------
@@ -117,7 +119,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
     title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    groups = tuple(_groups(data, where))
+    groups = tuple(_groups(data, where, guarded))
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
@@ -140,7 +142,7 @@ def check_tolerance(value: Any, where: str) -> None:
         )
 
 
-def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
+def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Group]:
     listed = data.get("group", [{}])
     if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
         raise InputError(
@@ -150,7 +152,7 @@ def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
         place = f"{where}: group {number}" if "group" in data else where
         _known(item, GROUP_KEYS, place, "")
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
-        scenes = tuple(_scenes(merged, place))
+        scenes = tuple(_scenes(merged, place, guarded))
         yield Group(str(item.get("name", f"group {number}")), scenes)
 
 
@@ -166,7 +168,7 @@ def _merged(
     return {**tables[0], **tables[1]}
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> Iterator[Scene]:
     axes = tables["axes"]
     for key, values in axes.items():
         part, dot, field = key.partition(".")
@@ -190,11 +192,13 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]
         for key, value in zip(axes, point, strict=True):
             part, _, field = key.partition(".")
             parts[part][field] = value
-        yield from make_scene(parts, where).resolved()
+        yield from make_scene(parts, where, guarded=guarded).resolved()
 
 
-def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
+def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool = True) -> Scene:
     """Validate the tables of one scene; `where` names the file in messages.
+
+    A guarded scene is within `limits` too.
 
     Raises
     ------
@@ -206,7 +210,10 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
     try:
         if isinstance(diameter, int | float):
             bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
-        return Scene.model_validate({**parts, "bed": bed})
+        scene = Scene.model_validate({**parts, "bed": bed})
+        if guarded:
+            limits.check(scene)
+        return scene
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from orchestrator import rungs
 from orchestrator.experiments import naive
@@ -33,7 +32,6 @@ REFERENCE: Pair = ("fine", "reference")
 AGAIN: Pair = ("fine", "soft reference")
 """The same with every number of the grains' run changed: the reference's own uncertainty."""
 FINER: Pair = ("finest", "peeling")
-FLOWS = (REFERENCE[0], FINER[0])
 BESIDE = "peeling"
 """The grains' rung beside which the flow's are measured."""
 USED: tuple[Pair, ...] = (
@@ -113,9 +111,7 @@ def points(
     )
 
 
-def _point(
-    key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[str, Any]]
-) -> Row:
+def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[str, Any]]) -> Row:
     pile = planned.piles[key.text]
     started = time.process_time()
     motion = pile.motion(cases)
@@ -152,100 +148,3 @@ def label(scene: Scene) -> str:
     if scene.bed.packing == "disordered":
         words.append(f"gaps {scene.bed.disorder:g} d")
     return ", ".join(words)
-
-
-def errors(found: pd.DataFrame) -> pd.DataFrame:
-    """The points with their relative errors against the dearest pair that their scene has.
-
-    For scenes without DEM that is the dearest flow, by peeling. `reference_error` is how far the
-    reference itself moved when all of its numbers were changed.
-    """
-    return pd.concat(
-        [_against(own) for _, own in found.groupby("scene_id", sort=False)], ignore_index=True
-    )
-
-
-def _against(own: pd.DataFrame) -> pd.DataFrame:
-    pairs = list(zip(own["flow_rung"], own["grain_rung"], strict=True))
-    by_pair = dict(zip(pairs, own.index, strict=True))
-    dearest = REFERENCE if REFERENCE in by_pair else (REFERENCE[0], BESIDE)
-    again = AGAIN if REFERENCE in by_pair else FINER
-    if dearest not in by_pair:
-        return own.iloc[:0]
-    reference = own.loc[by_pair[dearest]]
-    columns = [name for name in own if str(name).startswith(("tau_", "curve_"))]
-    relative = own[columns].astype(float) / reference[columns].astype(float) - 1
-    table = own.assign(
-        **{
-            f"error_{round(100 * float(name[4:]))}": relative[name]
-            for name in columns
-            if name.startswith("tau_")
-        },
-        error_curve=relative[[n for n in columns if n.startswith("curve_")]].abs().mean(axis=1),
-        cost_core_s=own["flow_s"] + own["grains_s"],
-        reference_error=np.nan,
-    )
-    if again in by_pair:
-        shifts = relative.loc[by_pair[again], [n for n in columns if n.startswith("tau_")]]
-        table["reference_error"] = float(shifts.abs().max())
-    return table
-
-
-def known(found: pd.DataFrame) -> pd.DataFrame:
-    """What is known of each rung, for each kind of scene and fraction: `rungs.known` reads it.
-
-    The error is the largest over the scenes, the reference's own uncertainty included; it is
-    infinite where one of the two did not reach the fraction.
-    """
-    grains = found[(found["flow_rung"] == REFERENCE[0]) & (found["asked"] == "dem")]
-    flow = found[(found["grain_rung"] == BESIDE) & found["same_model"]]
-    rows = [*_known("grains", grains, REFERENCE[1], AGAIN[1]), *_known("flow", flow, *FLOWS)]
-    return pd.DataFrame(rows).sort_values(["part", "rung", "like", "fraction"])
-
-
-def _known(part: Part, own: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
-    name = f"{'grain' if part == 'grains' else 'flow'}_rung"
-    cost = f"{part}_s"
-    for like, alike in own.groupby(f"like_{part}", sort=True):
-        by_rung = {rung: rows.set_index("scene_id") for rung, rows in alike.groupby(name)}
-        for rung, rows in by_rung.items():
-            for column in [n for n in rows if str(n).startswith("tau_")]:
-                reference = by_rung[dearest][column]
-                shift = (by_rung[again][column] / reference - 1).abs() if again in by_rung else None
-                error = (rows[column] / reference.reindex(rows.index) - 1).abs()
-                # where neither reaches the fraction they agree
-                both = rows[column].isna() & reference.reindex(rows.index).isna()
-                unsure = 0.0 if shift is None else float(shift.max())
-                worst = float(error.fillna(math.inf).where(~both, 0.0).max()) + unsure
-                yield {
-                    "part": part,
-                    "rung": rung,
-                    "like": like,
-                    "fraction": float(str(column)[4:]),
-                    "error": worst,
-                    "cost_core_s": float(rows[cost].mean()),
-                    "scenes": len(rows),
-                }
-
-
-def with_front(table: pd.DataFrame) -> pd.DataFrame:
-    """Mark the pairs that no other of their packing beats in both cost and error."""
-    worst = table.filter(regex=r"^error_\d+$").abs().max(axis=1, skipna=False)
-    on_front = pd.Series(False, index=table.index)
-    rows = table.assign(worst=worst)[table["same_model"] & (table["asked"] == "dem")]
-    for _, own in rows.groupby("packing"):
-        mean = own.groupby(["flow_rung", "grain_rung"])[["cost_core_s", "worst"]].max()
-        front = mean[_undominated(mean.to_numpy(float))].index
-        chosen = [pair in front for pair in zip(own["flow_rung"], own["grain_rung"], strict=True)]
-        on_front[own.index] = chosen
-    return table.assign(pareto=on_front)
-
-
-def _undominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    return np.array(
-        [
-            np.isfinite(one).all()
-            and not any((other <= one).all() and (other < one).any() for other in values)
-            for one in values
-        ]
-    )

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+
 import pandas as pd
 
 from orchestrator import case as case_states
 from orchestrator import pipeline
 from orchestrator.case import Case
-from orchestrator.experiments import ladder, maps, naive, stability
+from orchestrator.experiments import ladder, maps, naive, ranking, stability
 from orchestrator.files import write_durably
 from orchestrator.pipeline import Finished
 from orchestrator.plan import of
@@ -40,8 +41,8 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
         states = planned.done(space.cases)
         found = ladder.points(study, planned, space.cases, states)
         tables = {
-            "points": ladder.with_front(ladder.errors(found)),
-            "rungs": ladder.known(found),
+            "points": ranking.with_front(ranking.errors(found)),
+            "rungs": ranking.known(found),
             "naive": naive.costs(
                 {name: planned.piles[name] for name in beside},
                 planned.piles[ladder.fast(study)],

@@ -10,15 +10,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.case import Case
-from orchestrator.closures import KARMAN
 from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
-from orchestrator.scene import default_first_cell_height
+from orchestrator.scene import BUILDABLE_DEG, Convection, Turbulence
 from orchestrator.solvers import openfoam
 
 WALL_STRESS = "wall_stress.csv"
 LID_OVER_HEIGHT = 10.0
+FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
+"""Of the last iteration; epsilon or omega, as the turbulence model has it."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,17 @@ class FlowCase(Case):
         The stress depends on it: `default_first_cell_height` is the choice of the studies.
     cells_per_face : int
         Cells along each face of the pile; the others follow.
+    turbulence : str
+        OpenFOAM's model of it: kEpsilon, RNGkEpsilon, realizableKE or kOmegaSST.
+    convection : str
+        Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
+    correctors : int
+        Of the pressure for cells that are not orthogonal, in each iteration.
 
     Raises
     ------
     InputError
-        If a field is out of the range in which the model holds.
+        If the case cannot be built.
     """
 
     slope_deg: float
@@ -58,59 +65,50 @@ class FlowCase(Case):
     viscosity_m2_s: float
     first_cell_m: float
     cells_per_face: int = 40
+    turbulence: Turbulence = "kEpsilon"
+    convection: Convection = "linearUpwind"
+    correctors: int = 1
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 2
-    results: ClassVar[tuple[str, ...]] = tuple(
-        f"[1-9]*/{field}" for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress")
-    )
+    recipe: ClassVar[int] = 3
+    results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
 
     def __post_init__(self) -> None:
         self._check_numbers()
-        self._check_scales()
+        self._check_mesh()
 
     def _check_numbers(self) -> None:
         for name, value in self.parameters.items():
-            if not isfinite(value) or (value <= 0.0 and name != "slope_deg"):
+            if isinstance(value, str) or (value == 0 and name in ("slope_deg", "correctors")):
+                continue
+            if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
-        if self.slope_deg != 0.0 and not 5.0 <= self.slope_deg <= 40.0:
+
+    def _check_mesh(self) -> None:
+        low, high = BUILDABLE_DEG
+        if self.slope_deg != 0.0 and not low <= self.slope_deg <= high:
             raise InputError(
-                f"{self.slope_deg:g} is neither 0 nor within 5 to 40 degrees", where="slope_deg"
+                f"{self.slope_deg:g} is neither 0 nor within {low:g} to {high:g} degrees",
+                where="slope_deg",
             )
         if not 8 <= self.cells_per_face <= 400:
             raise InputError(
                 f"{self.cells_per_face} is not within 8 to 400", where="cells_per_face"
             )
-
-    def _check_scales(self) -> None:
-        default = default_first_cell_height(self.height_m, self.roughness_m)
-        if not 4.0 * self.roughness_m <= self.first_cell_m <= self.height_m / 4.0:
+        if self.first_cell_m > self.height_m / 4.0:
             raise InputError(
-                f"{self.first_cell_m:g} m is not between 4 z0 = {4 * self.roughness_m:g} m, below "
-                f"which the log law fails, and h/4 = {self.height_m / 4:g} m",
+                f"{self.first_cell_m:g} m is above h/4 = {self.height_m / 4:g} m",
                 where="first_cell_m",
-                remedy=f"the default is {default:g}; if that is too high, z0 is too large",
-            )
-        eddy_over_molecular = (
-            KARMAN * self.ustar0_m_s * self.first_cell_m / 2.0 / self.viscosity_m2_s
-        )
-        if eddy_over_molecular < 1.0:
-            raise InputError(
-                "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
-                f"{eddy_over_molecular:.2g} of the molecular one",
-                where="viscosity_m2_s",
-                remedy="take the field of a lower viscosity or a higher speed: u*/U_e is the same",
             )
 
     @property
     def parameters(self) -> dict[str, Any]:
         """The fields, as JSON; SI units, degrees."""
-        cells = int(self.cells_per_face)
-        return {name: float(value) for name, value in asdict(self).items()} | {
-            "cells_per_face": cells
-        }
+        whole = {name: int(getattr(self, name)) for name in ("cells_per_face", "correctors")}
+        fields = asdict(self).items()
+        return {n: v if isinstance(v, str) else float(v) for n, v in fields} | whole
 
     @property
     def ustar0_m_s(self) -> float:
@@ -147,6 +145,9 @@ class FlowCase(Case):
             lidHeight=LID_OVER_HEIGHT * self.height_m,
             roughnessLength=self.roughness_m,
             viscosity=self.viscosity_m2_s,
+            turbulence=self.turbulence,
+            convection=self.convection,
+            correctors=self.correctors,
         )
         _set_values(
             directory / "parameters.geo",
@@ -188,11 +189,11 @@ def _grown(length_over_first: float, growth: float) -> float:
     return log(1.0 + length_over_first * (growth - 1.0)) / log(growth)
 
 
-def _set_values(path: Path, **values: float) -> None:
-    """Replace the values in a template's list of numbers; its comments stay."""
+def _set_values(path: Path, **values: float | str) -> None:
+    """Replace the values in a template's list; its comments stay."""
     text = path.read_text(encoding="utf-8")
     for name, value in values.items():
-        text, found = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{value!r};", text)
+        text, found = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{value};", text)
         if found != 1:
             raise ValueError(f"{path.name} has {found} entries named {name}")
     path.write_text(text, encoding="utf-8")

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from orchestrator import packing
 from orchestrator.case import Case
 from orchestrator.errors import InputError
-from orchestrator.flow.case import FlowCase
+from orchestrator.flow import theory
+from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import deck, motion, peeling, protocol
 from orchestrator.grains.case import GrainCase
@@ -23,9 +24,8 @@ FloatArray = NDArray[np.float64]
 MARGIN = 3.0
 """From the outermost grains to the walls of the box, and from a face to the height at which a
 grain in flight is gone, diameters."""
-AVERAGE_OVER_HEIGHT = 1 / 40
-"""Least bed length, over h, that a grain's stress is averaged on: the crest's own value never
-converges with the mesh."""
+TOE = 0.05
+"""Of the windward face: its lowest part, of the knob `flow.forced`."""
 
 FIELD_OF = {
     "height_m": "bed.height",
@@ -34,6 +34,7 @@ FIELD_OF = {
     "viscosity_m2_s": "flow.viscosity",
     "first_cell_m": "flow.first_cell_height",
     "cells_per_face": "flow.cells_per_face",
+    "correctors": "flow.correctors",
 }
 """What a study file calls the fields of a flow case."""
 
@@ -73,16 +74,22 @@ class PileCase(GrainCase):
 
     @cached_property
     def flow(self) -> FlowCase:
-        """The flow that gives the stress; scenes that differ in their grains alone share it."""
+        """The solved flow that gives the stress; scenes that differ in their grains alone share it.
+
+        Where the stress is that of a theory, its u*_0 and U_e are the theory's too.
+        """
         try:
             return FlowCase(
                 slope_deg=self.bed.slope_deg,
                 height_m=self.bed.height,
-                roughness_m=self.bed.roughness,
+                roughness_m=self.scene.solve_roughness,
                 speed_m_s=self.scene.flow.speed,
                 viscosity_m2_s=self.scene.flow.viscosity,
                 first_cell_m=self.scene.first_cell_height,
                 cells_per_face=self.scene.flow.cells_per_face,
+                turbulence=self.scene.flow.turbulence,
+                convection=self.scene.flow.convection,
+                correctors=self.scene.flow.correctors,
             )
         except InputError as error:
             field = FIELD_OF.get(error.where, error.where)
@@ -90,8 +97,8 @@ class PileCase(GrainCase):
 
     @property
     def needs(self) -> tuple[Case, ...]:
-        """The flow."""
-        return (self.flow,)
+        """The flow, where it is solved."""
+        return (self.flow,) if self.scene.flow.model == "solve" else ()
 
     @property
     def runs(self) -> tuple[Case, ...]:
@@ -211,13 +218,33 @@ class PileCase(GrainCase):
         alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
         return np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf)
 
+    def stress(self, cases: Path) -> WallStress:
+        """The flow's stress along the bed: of the finished flow case, or of the scene's theory."""
+        bed = self.bed
+        match self.scene.flow.model:
+            case "flat":
+                return theory.flat(bed.slope_deg, bed.height)
+            case "hill":
+                return theory.hill(bed.slope_deg, bed.height, self.scene.solve_roughness)
+            case "solve":
+                return WallStress.from_csv(cases / self.flow.name / WALL_STRESS)
+
     def _speed(self, cases: Path) -> FloatArray:
-        """Signed friction velocity at each grain over the undisturbed one."""
-        stress = WallStress.from_csv(cases / self.flow.name / "wall_stress.csv")
-        d = self.scene.grain.diameter
-        length = max(d, AVERAGE_OVER_HEIGHT * self.bed.height)
-        tau = stress.mean_over(self.packing.arc_length * d, length, self.scene.flow.stress)
-        return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+        """Signed friction velocity that drives each grain over the undisturbed one."""
+        flow, d = self.scene.flow, self.scene.grain.diameter
+        length = max(d, flow.average * self.bed.height)
+        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)
+        return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
+
+    @property
+    def _forgotten(self) -> NDArray[np.bool_]:
+        """Grains that go without the flow's force though they are exposed."""
+        windward, s = self.packing.windward, self.packing.arc_length
+        if self.scene.flow.forced == "all but crest":
+            return np.asarray(windward & (s == s[windward].max()))
+        if self.scene.flow.forced == "all but toe":
+            return np.asarray(windward & (s < TOE * np.linalg.norm(self.triangle.crest)))
+        return np.zeros_like(windward)
 
     def _grains(self, speed: FloatArray) -> deck.GrainTable:
         bed, d = self.packing, self.scene.grain.diameter

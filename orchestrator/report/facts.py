@@ -250,17 +250,18 @@ def rungs(results: Results) -> Sheet | None:
         rows.append(
             (
                 f"{flow} | {grains}",
-                _meaning(flow, grains),
+                _meaning(str(flow), str(grains)),
                 str(own["scene_id"].nunique()),
                 "not known" if pd.isna(known) else f"{100 * known:.1f} %",
             )
         )
-    return Sheet(("flow | grains", "what they are", "piles", "known error of τ_c, up to"), tuple(rows))
+    return Sheet(
+        ("flow | grains", "what they are", "piles", "known error of τ_c, up to"), tuple(rows)
+    )
 
 
 def _meaning(flow: str, grains: str) -> str:
-    listed = (("flow", flow), ("grains", grains))
-    meanings = (ladder.meaning(part, name) for part, name in listed)
+    meanings = (ladder.meaning("flow", flow), ladder.meaning("grains", grains))
     return "; ".join(text for text in meanings if text)
 
 
@@ -271,16 +272,17 @@ def checks(results: Results) -> Sheet | None:
         return None
     rows = [
         (
-            f"{one.alpha_deg:g}°, {one.packing}, {one.closure}",
-            f"{1e3 * one.d_m:g} mm",
-            f"{one.fraction:.0%}",
-            f"{one.shields:.4g}",
-            f"{one.shields_dem:.4g} ({one.shields_dem_low:.4g} … {one.shields_dem_high:.4g})",
-            f"{100 * one.difference:+.1f} %",
-            "yes" if one.agree else "no",
-            str(one.case),
+            f"{one['alpha_deg']:g}°, {one['packing']}, {one['closure']}",
+            f"{1e3 * one['d_m']:g} mm",
+            f"{one['fraction']:.0%}",
+            f"{one['shields']:.4g}",
+            f"{one['shields_dem']:.4g} "
+            f"({one['shields_dem_low']:.4g} … {one['shields_dem_high']:.4g})",
+            f"{100 * one['difference']:+.1f} %",
+            "yes" if one["agree"] else "no",
+            str(one["case"]),
         )
-        for one in table.itertuples(index=False)
+        for one in table.to_dict("records")
     ]
     head = ("piles", "d", "n/N", "τ_c", "by DEM", "difference", "agree", "case")
     return Sheet(head, tuple(rows))

@@ -51,8 +51,11 @@ class Shown:
 
 
 def plan(results: Results, folder: Path) -> Iterator[Picture]:
-    """One figure for each slope: of its largest grains, whose closure holds if any does."""
-    for pile in chosen(results):
+    """One figure for each slope: of its largest grains, whose closure holds if any does.
+
+    None where that pile's flow is a theory's, which has no field to show.
+    """
+    for pile in (one for one in chosen(results) if one.needs):
         fraction = min(pile.scene.protocol.fractions, key=lambda f: abs(f - FRACTION))
         passage = snapshot.read(pile, results.cases)
         look = passage.first(fraction)

@@ -90,7 +90,9 @@ def _judge(found: str) -> None:
 def read_numbers(path: Path) -> dict[str, float]:
     """The entries `name number;` of a dictionary file, such as a case's `parameters`."""
     text = path.read_text(encoding="utf-8")
-    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([^\s;]+);", text)}
+    return {
+        name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([-+.\d][^\s;]*);", text)
+    }
 
 
 def read_last_time(

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import checks, rungs
-from orchestrator.flow.stress import WallStress
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Face, PileCase
@@ -21,7 +20,7 @@ from orchestrator.tables.scenes import Row, point
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to one scene: a pile with what its finished cases say, read once for all tables."""
+    """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
     scene_id: str
     pile: PileCase
@@ -35,15 +34,15 @@ class Answer:
 
 
 def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame]:
-    """The friction velocity along the bed, for the flow of each pile."""
+    """The friction velocity along the bed, for the solved flow of each pile."""
     for pile in piles:
-        stress = WallStress.from_csv(cases / pile.flow.name / "wall_stress.csv")
+        stress = pile.stress(cases)
         yield pd.DataFrame(
             {
                 "flow_case": pile.flow.name,
                 "alpha_deg": pile.bed.slope_deg,
                 "h_m": pile.bed.height,
-                "z0_m": pile.bed.roughness,
+                "z0_m": pile.flow.roughness_m,
                 "s_m": stress.s_m,
                 "s_over_h": stress.s_m / pile.bed.height,
                 "x_m": stress.x_m,

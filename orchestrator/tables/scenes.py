@@ -25,7 +25,7 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
                 **_choices(scene),
                 "method": scene.protocol.method,
                 "case": runs[-1] if scene.protocol.method == "dem" else None,
-                "flow_case": pile.flow.name if pile else None,
+                "flow_case": pile.needs[0].name if pile and pile.needs else None,
             }
 
 
@@ -56,7 +56,10 @@ def _choices(scene: Scene) -> Row:
         "disorder": pile.disorder if pile and pile.packing == "disordered" else None,
         "seed": pile.seed if pile and pile.packing == "disordered" else None,
         "mobile_layers": pile.mobile_layers if pile else None,
+        "flow_model": scene.flow.model if pile else None,
         "stress": scene.flow.stress if pile else None,
+        "average": scene.flow.average if pile else None,
+        "forced": scene.flow.forced if pile else None,
         "alpha_s": scene.flow.lift_coefficient,
         "stiffness": scene.grain.stiffness,
         "damping": scene.grain.damping,
@@ -66,7 +69,11 @@ def _choices(scene: Scene) -> Row:
         "timestep": scene.protocol.timestep,
         "until": scene.protocol.until if pile else None,
         "solve_u_e_m_s": scene.flow.speed if pile else None,
+        "solve_z0_m": scene.solve_roughness if pile else None,
         "solve_nu_m2_s": scene.flow.viscosity if pile else None,
         "first_cell_m": scene.first_cell_height if pile else None,
         "cells_per_face": scene.flow.cells_per_face if pile else None,
+        "turbulence": scene.flow.turbulence if pile else None,
+        "convection": scene.flow.convection if pile else None,
+        "correctors": scene.flow.correctors if pile else None,
     }

@@ -13,7 +13,7 @@ from orchestrator.tables.scenes import Row, point
 
 
 def rows(plan: Plan, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
-    """A row for each scene that the finished cases or the closed form answer, in the plan's order."""
+    """A row for each scene that a finished case or the closed form answers, in the plan's order."""
     measured: dict[str, Row] = {}
     for one in cells:
         motion = Motion.from_csv(cases / one.name)
