@@ -11,7 +11,7 @@ class GrainCase(Case):
     """A case that runs the deck ``in.bed``."""
 
     template: ClassVar[str] = "liggghts/bed"
-    results: ClassVar[tuple[str, ...]] = ("levels.csv", "passage.dump", "bed.dump")
+    results: ClassVar[tuple[str, ...]] = ("settling.csv", "levels.csv", "passage.dump", "bed.dump")
     derived: ClassVar[tuple[str, ...]] = ("holds.csv", "motion.csv")
 
     def versions(self) -> dict[str, str]:

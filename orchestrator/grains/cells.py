@@ -39,7 +39,7 @@ class CellsCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 4
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -66,13 +66,14 @@ class CellsCase(GrainCase):
             "density": DENSITY,
             "gravity": GRAVITY,
             **protocol.contact(self._grain, rules),
-            **protocol.holds(rules, first=protocol.START, last=LAST, enough=0),
+            **protocol.raising(rules, enough=0),
             # no face, no ceiling: the planes lie far above the box
             "slope": 0.0,
             "ceiling_x": 0.0,
             "ceiling_z": 1e3 * DIAMETER,
         }
-        deck.write(directory, self._grains(), parameters, margin=4 * DIAMETER)
+        holds = protocol.holds(protocol.START, LAST, rules.step)
+        deck.write(directory, self._grains(), parameters, holds, margin=4 * DIAMETER)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``."""

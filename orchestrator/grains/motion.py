@@ -161,7 +161,7 @@ def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) 
         If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
     """
     looks = _looks(directory)
-    track = read_track(directory / PASSAGE, grains, looks["step"].to_numpy(np.int64))
+    track = read_track(directory, grains, looks)
     if all_rest and not track.stayed.all():
         raise SolverError(
             f"{int((~track.stayed).sum())} of {len(track.stayed)} grains were lost before the flow"

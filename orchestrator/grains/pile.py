@@ -64,7 +64,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 4
 
     @property
     def bed(self) -> PileBed:
@@ -152,17 +152,14 @@ class PileCase(GrainCase):
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
-            **protocol.holds(
-                rules,
-                first=protocol.START * thresholds[0],
-                last=protocol.BEYOND * last,
-                enough=int((1 - rules.until) * self.packing.count + 1e-9),
-            ),
+            **protocol.raising(rules, int((1 - rules.until) * self.packing.count + 1e-9)),
             "slope": self.bed.slope_deg,
             "ceiling_x": self.triangle.crest[0] * d,
             "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
         }
-        deck.write(directory, self._grains(speed), parameters, margin=MARGIN * d)
+        first, last = protocol.START * thresholds[0], protocol.BEYOND * last
+        holds = protocol.holds(first, last, rules.step)
+        deck.write(directory, self._grains(speed), parameters, holds, margin=MARGIN * d)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
