@@ -72,12 +72,20 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         check_solvers(todo.values())
         failures = {}
         if todo:
-            with Display(list(todo.values()), workers) as display:
-                failures = engine.run(
-                    todo, space.cases, workers=workers, limit_s=study.time_limit_s, report=display
-                )
+            failures = complete(todo, space, workers=workers, limit_s=study.time_limit_s)
         draw(study, planned, space, failures)
         return Finished(space.page, len(todo), failures)
+
+
+def complete(
+    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float
+) -> dict[str, OrchestratorError]:
+    """Run cases, with a display of how far they are; the failures by the cases' names."""
+    with (
+        engine.local(space.cases, workers=workers, limit_s=limit_s) as pool,
+        Display(list(todo.values()), workers) as display,
+    ):
+        return engine.run(todo, pool, display)
 
 
 def check_solvers(cases: Iterable[Case]) -> None:
