@@ -1,35 +1,121 @@
-"""Run what is missing of a plan's cases: in parallel, each after what it needs, none twice."""
+"""Run what is missing of a plan's cases: many at a time, wherever a pool runs them, none twice."""
 
 import concurrent.futures
+import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, Future
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from orchestrator import case as case_states
+from orchestrator.agenda import Agenda
 from orchestrator.case import Case
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
 from orchestrator.solvers import process
 
 LOG = "log.Allrun"
 POLL_S = 0.2
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""As many cases run as there are cores: a solver that took more would take them from others."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended: without an error, it is done."""
+    """How a case ended: without an error, it is done.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    seconds : float
+        What it took, s; 0 where that is not known.
+    error : OrchestratorError or None
+        Why it failed.
+    """
 
     case: Case
+    seconds: float = 0.0
     error: OrchestratorError | None = None
 
 
 Report = Callable[[Outcome], None]
 
 
-def execute(case: Case, cases: Path, limit_s: float, stop: threading.Event) -> None:
-    """Run one case from its inputs to its marker of being done.
+@dataclass(frozen=True)
+class Pool:
+    """Where cases run.
+
+    Attributes
+    ----------
+    executor : Executor
+        Threads or processes, here or elsewhere.
+    task : callable
+        Runs a case and returns what it took, s.
+    places : int
+        How many cases to hand to the executor at a time.
+    lost : tuple of exception types
+        What the executor raises for a case whose process it lost for good.
+    """
+
+    executor: Executor
+    task: Callable[[Case], float]
+    places: int
+    lost: tuple[type[Exception], ...] = ()
+
+
+@contextlib.contextmanager
+def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
+    """Threads of this process, each with one solver at a time.
+
+    While `workers` solvers run, other threads prepare the next cases and read what the last ones
+    left, so that no solver waits for Python. An exception ends all children before it goes on.
+
+    Parameters
+    ----------
+    cases : Path
+        The directory of the study's cases.
+    workers : int
+        How many solvers run at a time.
+    limit_s : float
+        Wall time after which a run counts as hung, s.
+    """
+    stop, turn = threading.Event(), threading.BoundedSemaphore(workers)
+    task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, turn=turn)
+    places = 2 * workers
+    with concurrent.futures.ThreadPoolExecutor(places, thread_name_prefix="case") as threads:
+        try:
+            yield Pool(threads, task, places)
+        except BaseException:
+            stop.set()
+            threads.shutdown(cancel_futures=True)
+            raise
+
+
+def execute(
+    case: Case,
+    cases: Path,
+    limit_s: float,
+    stop: threading.Event | None = None,
+    turn: AbstractContextManager[object] = nullcontext(),  # noqa: B008 - it holds nothing
+) -> float:
+    """Run one case from its inputs to its marker of being done, and return what it took, s.
+
+    Parameters
+    ----------
+    case : Case
+        The case; what it needs is done.
+    cases : Path
+        The directory of the study's cases.
+    limit_s : float
+        Wall time after which the run counts as hung, s.
+    stop : threading.Event, optional
+        Set by another thread to end the run early.
+    turn : context manager, optional
+        Held while the solver runs; the wait for it is not counted.
 
     Raises
     ------
@@ -39,19 +125,27 @@ def execute(case: Case, cases: Path, limit_s: float, stop: threading.Event) -> N
     Interrupted
         If `stop` was set.
     """
-    started = time.monotonic()
+    began = time.monotonic()
     directory = case_states.prepare(case, cases)
+    outside_s = time.monotonic() - began
     try:
-        ended = process.run(
-            ["./Allrun"], cwd=directory, log=directory / LOG, limit_s=limit_s, stop=stop
-        )
+        with turn:
+            ended = process.run(
+                ["./Allrun"],
+                cwd=directory,
+                log=directory / LOG,
+                limit_s=limit_s,
+                stop=stop,
+                env=ONE_THREAD,
+            )
+        began = time.monotonic()
         _check(case, directory, ended, limit_s)
-        case_states.finish(
-            case, directory, solver_s=ended.seconds, wall_s=time.monotonic() - started
-        )
+        took_s = outside_s + ended.seconds + time.monotonic() - began
+        case_states.finish(case, directory, solver_s=ended.seconds, wall_s=took_s)
     except SolverError as error:
         case_states.fail(directory, str(error))
         raise
+    return took_s
 
 
 def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) -> None:
@@ -69,26 +163,15 @@ def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) ->
         )
 
 
-def run(
-    todo: Mapping[str, Case],
-    cases: Path,
-    *,
-    workers: int,
-    limit_s: float,
-    report: Report,
-) -> dict[str, OrchestratorError]:
+def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet.
 
     Parameters
     ----------
     todo : mapping of str to Case
         By name; what a case needs is either here too or done already.
-    cases : Path
-        The directory of the study's cases.
-    workers : int
-        How many at a time.
-    limit_s : float
-        Wall time after which a run counts as hung, s.
+    pool : Pool
+        Where they run.
     report : callable
         Told of each case as it ends.
 
@@ -100,79 +183,50 @@ def run(
     Raises
     ------
     Interrupted
-        By SIGINT or SIGTERM, after every child has ended.
+        If the pool was stopped.
     """
-    stop = threading.Event()
-    with concurrent.futures.ThreadPoolExecutor(workers, thread_name_prefix="case") as pool:
-        try:
-            return _drive(pool, dict(todo), cases, limit_s, stop, report)
-        except BaseException:
-            stop.set()
-            pool.shutdown(cancel_futures=True)
-            raise
-
-
-def _drive(
-    pool: Executor,
-    waiting: dict[str, Case],
-    cases: Path,
-    limit_s: float,
-    stop: threading.Event,
-    report: Report,
-) -> dict[str, OrchestratorError]:
-    running: dict[Future[None], Case] = {}
+    agenda = Agenda(todo)
+    running: dict[Future[float], Case] = {}
     failed: dict[str, OrchestratorError] = {}
-    while waiting or running:
-        for case in _ready(waiting, running, failed):
-            running[pool.submit(execute, case, cases, limit_s, stop)] = waiting.pop(case.name)
+    while agenda or running:
+        while len(running) < pool.places and (case := agenda.next()):
+            running[pool.executor.submit(pool.task, case)] = case
         # a wait without a limit would not let the main thread see a signal
         ended, _ = concurrent.futures.wait(
             running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
         )
         for future in ended:
-            outcome = _outcome(running.pop(future), future)
-            if outcome.error:
-                failed[outcome.case.name] = outcome.error
-            report(outcome)
-        _give_up(waiting, failed, report)
+            outcome = _outcome(running.pop(future), future, pool)
+            for each in (outcome, *_after(outcome, agenda)):
+                report(each)
+                if each.error:
+                    failed[each.case.name] = each.error
     return failed
 
 
-def _ready(
-    waiting: Mapping[str, Case],
-    running: Mapping[Future[None], Case],
-    failed: Mapping[str, OrchestratorError],
-) -> list[Case]:
-    """Cases whose needs are met, the dearest first; those they wait for count with their cost."""
-    open_names = {*waiting, *(case.name for case in running.values()), *failed}
-    ready = [c for c in waiting.values() if not any(n.name in open_names for n in c.needs)]
-    behind = {name: _cost_behind(name, waiting) for name in (c.name for c in ready)}
-    return sorted(ready, key=lambda case: -(case.cost_s + behind[case.name]))
-
-
-def _cost_behind(name: str, waiting: Mapping[str, Case]) -> float:
-    costs = (c.cost_s for c in waiting.values() if any(n.name == name for n in c.needs))
-    return max(costs, default=0.0)
-
-
-def _outcome(case: Case, future: Future[None]) -> Outcome:
+def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
     try:
-        future.result()
-        return Outcome(case)
+        return Outcome(case, future.result())
     except Interrupted:
         raise
     except OrchestratorError as error:
-        return Outcome(case, error)
+        return Outcome(case, error=error)
     except OSError as error:
-        return Outcome(case, of_system(error, case.name))
+        return Outcome(case, error=of_system(error, case.name))
+    except pool.lost as error:
+        lost = SolverError(
+            f"the processes that ran it were lost: {error}",
+            where=case.name,
+            remedy="see the logs of their jobs: out of memory, or of time?",
+        )
+        return Outcome(case, error=lost)
 
 
-def _give_up(
-    waiting: dict[str, Case], failed: dict[str, OrchestratorError], report: Report
-) -> None:
-    for case in list(waiting.values()):
-        lost = next((need for need in case.needs if need.name in failed), None)
-        if lost:
-            error = SolverError(f"it needs {lost.name}, which failed", where=case.name)
-            failed[case.name] = error
-            report(Outcome(waiting.pop(case.name), error))
+def _after(outcome: Outcome, agenda: Agenda) -> Iterator[Outcome]:
+    """Let the agenda know how a case ended; the cases that are lost with it."""
+    if not outcome.error:
+        agenda.done(outcome.case)
+        return
+    for without, need in agenda.lost(outcome.case):
+        error = SolverError(f"it needs {need.name}, which failed", where=without.name)
+        yield Outcome(without, error=error)

@@ -96,8 +96,11 @@ def complete(
 ) -> dict[str, OrchestratorError]:
     """Run cases, with a display of how far they are; the failures by the cases' names."""
     check_solvers(todo.values())
-    with Display(list(todo.values()), workers) as display:
-        return engine.run(todo, space.cases, workers=workers, limit_s=limit_s, report=display)
+    with (
+        engine.local(space.cases, workers=workers, limit_s=limit_s) as pool,
+        Display(list(todo.values()), workers) as display,
+    ):
+        return engine.run(todo, pool, display)
 
 
 def check_solvers(cases: Iterable[Case]) -> None:

@@ -1,7 +1,6 @@
 """The benchmark's data: complete, and a fresh run of some of its points agrees with it."""
 
 import dataclasses
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +56,7 @@ def _fresh(paper: Study, chosen: list[str], root: Path) -> tables.Tables:
     asked = dataclasses.replace(paper, groups=(Group("fresh", scenes),))
     planned = plan.make(asked)
     for one in planned.cases.values():
-        engine.execute(one, root, 300.0, threading.Event())
+        engine.execute(one, root, 300.0)
         assert case.is_done(one, root)
     return tables.make(asked, planned, root, planned.done(root))
 

@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,7 @@ def _study(packing: str = "aligned", step: float = 0.05) -> study.Study:
 def _run(asked: study.Study, cases: Path) -> PileCase:
     planned = plan.make(asked)
     for one in planned.cases.values():
-        engine.execute(one, cases, 300.0, threading.Event())
+        engine.execute(one, cases, 300.0)
     (pile,) = planned.piles.values()
     return pile
 

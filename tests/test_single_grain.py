@@ -3,7 +3,6 @@
 import os
 import shutil
 import subprocess
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ def _cells(text: str) -> CellsCase:
 
 
 def _run(one: CellsCase, cases: Path, limit_s: float = 120.0) -> Motion:
-    engine.execute(one, cases, limit_s, threading.Event())
+    engine.execute(one, cases, limit_s)
     return Motion.from_csv(cases / one.name)
 
 

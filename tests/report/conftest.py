@@ -46,10 +46,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     (out / "cases").mkdir(parents=True)
     asked = study.parse(TEXT, name="small", where="test")
     planned = plan.make(asked)
-    failed = engine.run(
-        planned.cases, out / "cases", workers=2, limit_s=120.0, report=lambda outcome: None
-    )
-    assert not failed
+    with engine.local(out / "cases", workers=2, limit_s=120.0) as pool:
+        assert not engine.run(planned.cases, pool, lambda outcome: None)
     cases = out / "cases"
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, out / "cases")
