@@ -32,12 +32,23 @@ def digest_files(paths: Iterable[Path], *, root: Path) -> dict[str, str]:
 def write_durably(path: Path, content: str | bytes) -> None:
     """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    with temporary.open("wb") as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.replace(temporary, path)
+    try:
+        with temporary.open("wb") as stream:
+            stream.write(content.encode() if isinstance(content, str) else content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        remove_empty_directory(path)
+        os.replace(temporary, path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
     sync_directory(path.parent)
+
+
+def remove_empty_directory(path: Path) -> None:
+    """Clear the way for a file where something has put a directory; one that holds files stays."""
+    if path.is_dir() and not path.is_symlink():
+        path.rmdir()
 
 
 def sync_directory(directory: Path) -> None:

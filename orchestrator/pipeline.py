@@ -63,8 +63,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     """
     planned = plan.make(study)
     space = Workspace(out.absolute())
-    space.claim(study.name, study.text, list(planned.cases))
     with space.held():
+        space.claim(study.name, study.text, list(planned.cases))
         done = planned.done(space.cases)
         todo = {name: one for name, one in planned.cases.items() if name not in done}
         if not todo and _is_drawn(study, planned, space):
