@@ -51,6 +51,29 @@ def remove_empty_directory(path: Path) -> None:
         path.rmdir()
 
 
+def remove_empty_folders(root: Path, folders: Iterable[Path]) -> None:
+    """Remove those of some folders below `root` that are empty, and their parents if they are."""
+    for folder in sorted({*folders}, reverse=True):
+        while folder != root and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+            folder = folder.parent
+
+
+def size_of(directory: Path) -> int:
+    """Size of all files below a directory, bytes; what vanishes meanwhile does not count."""
+    total = 0
+    try:
+        with os.scandir(directory) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    total += size_of(Path(entry.path))
+                else:
+                    total += entry.stat(follow_symlinks=False).st_size
+    except OSError:
+        pass
+    return total
+
+
 def sync_directory(directory: Path) -> None:
     """Make the names in a directory durable."""
     handle = os.open(directory, os.O_RDONLY)

@@ -96,14 +96,25 @@ def check_solvers(cases: Iterable[Case]) -> None:
 def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
-    about = space.description()
-    study = parse(about["study"], name=about["name"], where=str(out))
-    planned = plan.make(study)
+    study, planned = reopen(space)
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, failures)
     return Finished(space.page, 0, failures)
+
+
+def reopen(space: Workspace) -> tuple[Study, Plan]:
+    """The study that a directory was made for, and its plan.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no study.
+    """
+    about = space.description()
+    study = parse(about["study"], name=about["name"], where=str(space.root))
+    return study, plan.make(study)
 
 
 def draw(

@@ -66,6 +66,11 @@ class FlowCase(Case):
         f"[1-9]*/{field}" for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress")
     )
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
+    bulky: ClassVar[tuple[str, ...]] = (
+        "[1-9]*/**/*",
+        "constant/polyMesh/**/*",
+        "postProcessing/**/*",
+    )
 
     def __post_init__(self) -> None:
         self._check_numbers()
