@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator import case as case_states
+from orchestrator import retry
 from orchestrator.case import Case
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
 from orchestrator.solvers import process
@@ -42,7 +43,7 @@ def execute(case: Case, cases: Path, limit_s: float, stop: threading.Event) -> N
     started = time.monotonic()
     directory = case_states.prepare(case, cases)
     try:
-        ended = process.run(
+        ended = retry.run(
             ["./Allrun"], cwd=directory, log=directory / LOG, limit_s=limit_s, stop=stop
         )
         _check(case, directory, ended, limit_s)
