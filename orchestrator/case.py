@@ -13,6 +13,7 @@ from orchestrator.files import (
     digest_files,
     digest_text,
     read_json,
+    remove_empty_folders,
     write_durably,
     write_json,
 )
@@ -40,6 +41,8 @@ class Case(ABC):
     """Glob patterns of the files that a rerun by hand must reproduce byte for byte."""
     derived: ClassVar[tuple[str, ...]] = ()
     """Tables that `collect` makes of the results; not the solver's own."""
+    bulky: ClassVar[tuple[str, ...]] = ()
+    """Large files that the run leaves and no table is made of: `prune` drops them."""
 
     @property
     @abstractmethod
@@ -176,6 +179,32 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     return state if isinstance(state, dict) and _vouched(directory, state) else None
 
 
+def prune(case: Case, cases: Path) -> None:
+    """Drop the bulky files of a case that is done.
+
+    Their digests stay in the marker, beside a list of what was dropped, and in `CHECKSUMS`: a
+    rerun by hand is still compared with the run that the tables were made of.
+    """
+    directory, state = cases / case.name, done_state(case, cases)
+    if state is None:
+        return
+    files = _matching(directory, case.bulky)
+    names = {path.relative_to(directory).as_posix() for path in files}
+    # first what makes up for the files: killed in between, the case is still done
+    pruned = sorted(names.union(state.get("pruned", [])))
+    write_json(directory / DONE, {**state, "pruned": pruned})
+    for path in files:
+        path.unlink()
+    remove_empty_folders(directory, (path.parent for path in files))
+
+
+def is_whole(case: Case, cases: Path) -> bool:
+    """Whether a finished case has all of its files: nothing was pruned, or a rerun made it anew."""
+    state = read_json(cases / case.name / DONE)
+    pruned = state.get("pruned", []) if isinstance(state, dict) else []
+    return all((cases / case.name / name).is_file() for name in pruned)
+
+
 def programs(cases: Path) -> dict[str, str]:
     """The programs, with versions, that the cases in a directory were made with."""
     found: dict[str, str] = {}
@@ -188,8 +217,10 @@ def programs(cases: Path) -> dict[str, str]:
 def _vouched(directory: Path, state: dict[str, Any]) -> bool:
     try:
         digests = {**state["results_sha256"], **state["derived_sha256"]}
+        dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
         return bool(digests) and all(
-            digest_file(directory / name) == digest for name, digest in digests.items()
+            name in dropped or digest_file(directory / name) == digest
+            for name, digest in digests.items()
         )
     except (KeyError, TypeError, OSError):
         return False

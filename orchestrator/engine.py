@@ -13,6 +13,7 @@ from pathlib import Path
 
 from orchestrator import case as case_states
 from orchestrator.agenda import Agenda
+from orchestrator import retry
 from orchestrator.case import Case
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
 from orchestrator.solvers import process
@@ -130,7 +131,7 @@ def execute(
     outside_s = time.monotonic() - began
     try:
         with turn:
-            ended = process.run(
+            ended = retry.run(
                 ["./Allrun"],
                 cwd=directory,
                 log=directory / LOG,

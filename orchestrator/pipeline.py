@@ -62,9 +62,9 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         If the user stopped it; every child has ended.
     """
     space = Workspace(out.absolute())
-    planned = plan.settled(study, space.cases)
-    _claim(space, study, planned)
     with space.held():
+        planned = plan.settled(study, space.cases)
+        _claim(space, study, planned)
         started, failures = 0, {}
         while todo := missing(planned, space):
             started += len(todo)
@@ -119,22 +119,32 @@ def check_solvers(cases: Iterable[Case]) -> None:
 def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
-    about = space.description()
-    if "study" not in about:
-        raise InputError(
-            f"this is no study but an experiment, {about['name']}",
-            where=str(out),
-            remedy=f"`orchestrator {about['name']} --out {out}` draws it again",
-        )
-    study = parse(about["study"], name=about["name"], where=str(out))
-    if about.get("tolerance"):
-        study = replace(study, tolerance=about["tolerance"])
-    planned = plan.settled(study, space.cases)
+    study, planned = reopen(space)
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, failures)
     return Finished(space.page, 0, failures)
+
+
+def reopen(space: Workspace) -> tuple[Study, Plan]:
+    """The study that a directory was made for, and its plan.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no study.
+    """
+    about = space.description()
+    if "study" not in about:
+        raise InputError(
+            f"this is no study but an experiment, {about['name']}",
+            where=str(space.root),
+            remedy=f"`orchestrator {about['name']} --out {space.root}` draws it again",
+        )
+    study = parse(about["study"], name=about["name"], where=str(space.root))
+    study = replace(study, tolerance=about.get("tolerance"))
+    return study, plan.settled(study, space.cases)
 
 
 def draw(

@@ -30,8 +30,8 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
     beside = naive.answers(naive.small(study))
     planned = of({**ladder.answers(study), **beside}, study.name)
     space = Workspace(out.absolute())
-    space.claim("ladder", list(planned.cases))
     with space.held():
+        space.claim("ladder", list(planned.cases))
         todo = pipeline.missing(planned, space)
         failures = (
             pipeline.complete(todo, space, workers=workers, limit_s=study.time_limit_s)
@@ -68,8 +68,8 @@ def run_stability(out: Path, *, workers: int) -> Finished:
     drawn = maps.load_all()
     planned = stability.plan(drawn)
     space = Workspace(out.absolute())
-    space.claim("stability", list(planned.cases))
     with space.held():
+        space.claim("stability", list(planned.cases))
         todo = {
             name: one
             for name, one in pipeline.missing(planned, space).items()

@@ -74,6 +74,11 @@ class FlowCase(Case):
     recipe: ClassVar[int] = 3
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
+    bulky: ClassVar[tuple[str, ...]] = (
+        "[1-9]*/**/*",
+        "constant/polyMesh/**/*",
+        "postProcessing/**/*",
+    )
 
     def __post_init__(self) -> None:
         self._check_numbers()

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from orchestrator.case import is_whole
 from orchestrator.grains.pile import PileCase
 from orchestrator.report import captions, stress, style
 from orchestrator.report.figure import Figure
@@ -25,12 +26,9 @@ Window = tuple[float, float, float, float]
 
 def plan(results: Results, folder: Path) -> Iterator[Picture]:
     """One figure with a panel for each slope and height, at its least z0."""
-    chosen: dict[tuple[float, float], PileCase] = {}
-    for pile in stress.choose(results):
-        chosen.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
-    if not chosen:
+    piles = chosen(results)
+    if not piles:
         return
-    piles = list(chosen.values())
     window = _window(piles)
     names = tuple(pile.flow.name for pile in piles)
     yield Picture(
@@ -41,6 +39,15 @@ def plan(results: Results, folder: Path) -> Iterator[Picture]:
         ),
         lambda: _frame(piles, window, folder),
     )
+
+
+def chosen(results: Results) -> list[PileCase]:
+    """A pile for each panel; a flow whose files were pruned has none."""
+    found: dict[tuple[float, float], PileCase] = {}
+    for pile in stress.choose(results):
+        if is_whole(pile.flow, results.cases):
+            found.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
+    return list(found.values())
 
 
 def _window(piles: list[PileCase]) -> Window:

@@ -1,5 +1,6 @@
 """The grains of a pile when a fraction of them has moved: how far, and how under which flow."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,12 +66,16 @@ def plan(results: Results, folder: Path) -> Iterator[Picture]:
 
 
 def chosen(results: Results) -> Iterator[PileCase]:
-    """The pile that stands for all of its slope, by rising slope; of equals the study's first."""
+    """The pile that stands for all of its slope, by rising slope; of equals the study's first.
+
+    A pile whose files were pruned stands for nothing.
+    """
     for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
         order = rows.assign(valid=valid(rows)).sort_values(
             ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
-        yield results.plan.piles[str(order["scene_id"].iloc[0])]
+        piles = (results.plan.piles[str(scene_id)] for scene_id in order["scene_id"])
+        yield from itertools.islice(filter(results.has_files, piles), 1)
 
 
 def _picture(shown: Shown, cases: Path, fraction: float) -> Picture:
