@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator import __version__
+from orchestrator.benchmark import cli as benchmark
 from orchestrator.errors import InputError, OrchestratorError, of_system
 
 INTERRUPTED = 130
@@ -49,7 +50,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-VALUED = ("--out", "--workers", "--tolerance", "--roughness", *NUMBERS)
+VALUED = (
+    "--out",
+    "--workers",
+    "--tolerance",
+    "--solver",
+    "--from",
+    "--scene",
+    "--roughness",
+    *NUMBERS,
+)
 FLAGS = ("-h", "--help", "--version", "--json", "--")
 
 
@@ -85,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_threshold(commands)
     _add_directory_commands(commands)
     _add_experiments(commands)
-    _add_benchmark(commands)
+    benchmark.add(commands)
     command = commands.add_parser(
         "doctor", help="are the solvers here, can it draw; what to install"
     )
@@ -158,15 +168,6 @@ def _add_directory_commands(commands: Any) -> None:
         command.set_defaults(run=function)
 
 
-def _add_benchmark(commands: Any) -> None:
-    group = commands.add_parser("benchmark", help="exchange with a native code of the same model")
-    parts = group.add_subparsers(required=True, metavar="part")
-    command = parts.add_parser("data", help="what a finished study found, as small CSV files")
-    command.add_argument("directory", type=Path, metavar="DIR", help="of the study")
-    command.add_argument("folder", type=Path, metavar="FOLDER", help="where the files go")
-    command.set_defaults(run=_benchmark_data)
-
-
 def _workers(text: str) -> int:
     number = int(text)
     if number < 1:
@@ -217,19 +218,6 @@ def _end(page: Path, failures: dict[str, OrchestratorError]) -> int:
         print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
     print(page)
     return 3 if failures else 0
-
-
-def _benchmark_data(options: argparse.Namespace) -> int:
-    from orchestrator import tables
-    from orchestrator.benchmark import data
-    from orchestrator.case import programs
-    from orchestrator.workspace import Workspace
-
-    space = Workspace(options.directory.absolute())
-    space.description()
-    data.write(tables.read(space.tables), programs(space.cases), options.folder)
-    print(options.folder)
-    return 0
 
 
 def _status(options: argparse.Namespace) -> int:
