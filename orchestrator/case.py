@@ -123,7 +123,7 @@ def prepare(case: Case, cases: Path) -> Path:
     return directory
 
 
-def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> None:
+def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s: float) -> None:
     """Mark a case as done: the last file written, with the digests of what it vouches for."""
     results = digest_files(_matching(directory, case.results), root=directory)
     derived = digest_files(_matching(directory, case.derived), root=directory)
@@ -135,6 +135,7 @@ def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> No
         {
             "ended": "done",
             "solver_s": solver_s,
+            "cpu_s": cpu_s,
             "wall_s": wall_s,
             "results_sha256": results,
             "derived_sha256": derived,

@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 
 from orchestrator import case as case_states
-from orchestrator.agenda import Agenda
 from orchestrator import retry
+from orchestrator.agenda import Agenda
 from orchestrator.case import Case
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
 from orchestrator.solvers import process
@@ -142,7 +142,9 @@ def execute(
         began = time.monotonic()
         _check(case, directory, ended, limit_s)
         took_s = outside_s + ended.seconds + time.monotonic() - began
-        case_states.finish(case, directory, solver_s=ended.seconds, wall_s=took_s)
+        case_states.finish(
+            case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
+        )
     except SolverError as error:
         case_states.fail(directory, str(error))
         raise

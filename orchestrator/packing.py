@@ -139,7 +139,9 @@ def pile(
     row_height = float(np.sin(beta))
     points = _points(triangle, pattern, beta, surface, mobile_layers, disorder, seed)
     stray = STRAY if pattern == "disordered" else TIE
-    body = _shell(points, triangle, beta, surface, mobile_layers, stray)
+    # under a slope's level rows a grain rests on one that lies deeper below the face
+    layers = mobile_layers + (pattern == "horizontal")
+    body = _shell(points, triangle, beta, surface, layers, stray)
     buried = body[:, 1] < surface - TIE
     in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
     windward, lee = (face & ~buried for face in exposed(body, triangle, disorder))
@@ -186,16 +188,16 @@ def _shell(
     triangle: Triangle,
     beta: float,
     surface: float,
-    mobile_layers: int,
+    layers: int,
     stray: float,
 ) -> FloatArray:
     """Grains near both faces, and some below the ground.
 
-    Below the mobile layers one is enough: a grain touches no deeper one.
+    Below the layers that hold mobile grains one is enough: a grain touches no deeper one.
     """
     depths = [triangle.depth(points, face) + surface for face in (0, 1)]
     depth, level = np.minimum(*depths), points[:, 1] - surface
-    windward_shell = depths[0] < (mobile_layers + 0.5) * np.sin(beta)
+    windward_shell = depths[0] < (layers + 0.5) * np.sin(beta)
     lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
     inside = (depth >= -stray) & (windward_shell | lee_shell)
     covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))

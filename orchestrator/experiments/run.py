@@ -47,7 +47,7 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
                 {name: planned.piles[name] for name in beside},
                 planned.piles[ladder.fast(study)],
                 space.cases,
-                {name: state["solver_s"] for name, state in states.items()},
+                {name: state["cpu_s"] for name, state in states.items()},
             ),
         }
         _write(tables, space)

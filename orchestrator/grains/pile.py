@@ -64,7 +64,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 4
+    recipe: ClassVar[int] = 5
 
     @property
     def bed(self) -> PileBed:

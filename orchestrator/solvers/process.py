@@ -27,12 +27,15 @@ class Ended:
         As `subprocess` gives it: negative where a signal ended the program.
     seconds : float
         Wall time, s.
+    cpu_s : float
+        Processor time of it and all that it waited for, s; 0 if it was killed.
     timed_out : bool
         Whether it was killed at its time limit.
     """
 
     returncode: int
     seconds: float
+    cpu_s: float
     timed_out: bool
 
 
@@ -78,26 +81,31 @@ def run(
             env={**os.environ, "PWD": str(cwd), **(env or {})},
         )
         try:
-            timed_out = _wait(process, started + limit_s, stop)
+            cpu_s = _wait(process, started + limit_s, stop)
         except BaseException:
             end_group(process)
             raise
-    return Ended(process.returncode, time.monotonic() - started, timed_out)
+    seconds = time.monotonic() - started
+    return Ended(process.returncode, seconds, cpu_s or 0.0, timed_out=cpu_s is None)
 
 
 def _wait(
     process: "subprocess.Popen[bytes]", deadline: float, stop: threading.Event | None
-) -> bool:
+) -> float | None:
+    """Wait for a program's end; its processor time, or None if it had to be killed."""
+    pause = 1e-3
     while True:
-        try:
-            process.wait(POLL_S)
-            return False
-        except subprocess.TimeoutExpired:
-            if stop is not None and stop.is_set():
-                raise Interrupted("stopped", remedy="the same command continues") from None
-            if time.monotonic() > deadline:
-                end_group(process)
-                return True
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if ended:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return usage.ru_utime + usage.ru_stime
+        if stop is not None and stop.is_set():
+            raise Interrupted("stopped", remedy="the same command continues")
+        if time.monotonic() > deadline:
+            end_group(process)
+            return None
+        time.sleep(pause)
+        pause = min(2 * pause, POLL_S)
 
 
 def end_group(process: "subprocess.Popen[bytes]") -> None:

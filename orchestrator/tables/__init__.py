@@ -70,6 +70,7 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
             "case": name,
             "kind": plan.cases[name].kind,
             "solver_s": state["solver_s"],
+            "cpu_s": state["cpu_s"],
             "outside_s": state["wall_s"] - state["solver_s"],
         }
         for name, state in states.items()

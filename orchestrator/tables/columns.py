@@ -91,6 +91,7 @@ COLUMNS: dict[str, str] = {
     " the same slope, closure and fraction",
     "pivot_ustar0_m_s": "ustar0_m_s by the closed form with each grain's own stress",
     "kind": "kind of the case",
+    "cpu_s": "processor time of the solvers",
     "solver_s": "wall time of the solvers",
     "outside_s": "wall time of the case outside the solvers",
 }
