@@ -1,8 +1,9 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from orchestrator import __version__, case, engine, plan, report, tables
 from orchestrator.case import Case
@@ -76,7 +77,9 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
                 failures = engine.run(
                     todo, space.cases, workers=workers, limit_s=study.time_limit_s, report=display
                 )
-        draw(study, planned, space, failures)
+        # what was done before has been checked just now
+        states = {**done, **planned.done(space.cases, todo)}
+        draw(study, planned, space, states, failures)
         return Finished(space.page, len(todo), failures)
 
 
@@ -102,16 +105,23 @@ def redraw(out: Path) -> Finished:
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, failures)
+        draw(study, planned, space, planned.done(space.cases), failures)
     return Finished(space.page, 0, failures)
 
 
 def draw(
-    study: Study, planned: Plan, space: Workspace, failures: dict[str, OrchestratorError]
+    study: Study,
+    planned: Plan,
+    space: Workspace,
+    states: Mapping[str, Mapping[str, Any]],
+    failures: dict[str, OrchestratorError],
 ) -> None:
-    """Write tables, figures and page, and last the marker that says of which cases."""
+    """Write tables, figures and page, and last the marker that says of which cases.
+
+    The states are those of the cases that are done, by name, as `Plan.done` gives them.
+    """
     space.drawn.unlink(missing_ok=True)
-    states = planned.done(space.cases)
+    states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     tables.write(results, space.tables)
