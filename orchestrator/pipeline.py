@@ -1,8 +1,9 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from orchestrator import __version__, case, engine, plan, report, tables
 from orchestrator.case import Case
@@ -65,18 +66,20 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     with space.held():
         planned = plan.settled(study, space.cases)
         _claim(space, study, planned)
-        started, failures = 0, {}
-        while todo := missing(planned, space):
+        started, failures, states = 0, {}, planned.done(space.cases)
+        while todo := _without(planned.cases, states):
             started += len(todo)
             failures = complete(todo, space, workers=workers, limit_s=study.time_limit_s)
             settled = plan.settled(study, space.cases)
             if failures or settled.cases.keys() == planned.cases.keys():
+                states |= planned.done(space.cases, todo)
                 break
             # a check has overruled a cheap rung
             planned = settled
             _claim(space, study, planned)
+            states |= planned.done(space.cases, _without(planned.cases, states))
         if started or not _is_drawn(study, planned, space):
-            draw(study, planned, space, failures)
+            draw(study, planned, space, states, failures)
         return Finished(space.page, started, failures)
 
 
@@ -87,8 +90,11 @@ def _claim(space: Workspace, study: Study, planned: Plan) -> None:
 
 def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
     """The cases of a plan that are not done yet, by name."""
-    done = planned.done(space.cases)
-    return {name: one for name, one in planned.cases.items() if name not in done}
+    return _without(planned.cases, planned.done(space.cases))
+
+
+def _without(cases: Mapping[str, Case], done: Container[str]) -> dict[str, Case]:
+    return {name: one for name, one in cases.items() if name not in done}
 
 
 def complete(
@@ -123,7 +129,7 @@ def redraw(out: Path) -> Finished:
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, failures)
+        draw(study, planned, space, planned.done(space.cases), failures)
     return Finished(space.page, 0, failures)
 
 
@@ -148,11 +154,18 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
 
 
 def draw(
-    study: Study, planned: Plan, space: Workspace, failures: dict[str, OrchestratorError]
+    study: Study,
+    planned: Plan,
+    space: Workspace,
+    states: Mapping[str, Mapping[str, Any]],
+    failures: dict[str, OrchestratorError],
 ) -> None:
-    """Write tables, figures and page, and last the marker that says of which cases."""
+    """Write tables, figures and page, and last the marker that says of which cases.
+
+    The states are those of the cases that are done, by name, as `Plan.done` gives them.
+    """
     space.drawn.unlink(missing_ok=True)
-    states = planned.done(space.cases)
+    states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     tables.write(results, space.tables)

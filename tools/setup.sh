@@ -11,8 +11,6 @@ cd -- "$(dirname -- "$0")/.."
 solvers="openfoam liggghts"
 # What the gmsh wheel links against.
 gmsh_libraries="libgl1 libglu1-mesa libxft2 libxcursor1 libxinerama1 libgomp1"
-# What VTK draws with where there is no screen; with neither this nor EGL it crashes.
-vtk_libraries="libosmesa6"
 
 environment=.venv
 # Written last, so that a set-up cut short leaves none: the checksums of the lock files installed.
@@ -25,7 +23,7 @@ die() {
 }
 
 missing_packages() {
-    wanted="$solvers $gmsh_libraries $vtk_libraries"
+    wanted="$solvers $gmsh_libraries"
     # Any Python will do to make the environment with; Debian's comes without the means.
     if ! venv_works && ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
         wanted="python3 python3-venv $wanted"

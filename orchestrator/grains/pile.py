@@ -1,7 +1,7 @@
 """A pile of grains under the flow over it: one case of LIGGGHTS for each scene."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -56,6 +56,9 @@ class Face:
     ids: NDArray[np.int64]
     arc_length: FloatArray
     speed: FloatArray
+
+
+_packed = cache(packing.pile)
 
 
 @dataclass(frozen=True)
@@ -126,8 +129,8 @@ class PileCase(GrainCase):
 
     @cached_property
     def packing(self) -> packing.Packing:
-        """The grains' places, in diameters."""
-        return packing.pile(
+        """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        return _packed(
             self.triangle,
             entrainment_angle_deg=self.bed.entrainment_angle_deg,
             gap=self.bed.roughness / self.scene.grain.diameter,

@@ -2,7 +2,6 @@
 
 import multiprocessing
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -14,7 +13,6 @@ from orchestrator.report import (
     animation,
     flow_picture,
     grain_picture,
-    pictures,
     piles,
     single,
     stress,
@@ -24,7 +22,7 @@ from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
 Drawn = tuple[Figure, bytes]
-"""A figure without its canvas, and its image: PNG, of an animation GIF, b"" if it is missing."""
+"""A figure without its canvas, and its image: PNG, of an animation GIF."""
 
 
 def draw(results: Results, folder: Path) -> list[Drawn]:
@@ -57,18 +55,14 @@ def _section(number: int, folder: Path) -> list[Drawn]:
 
 def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:
     for figure in figures:
-        image = style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
-        yield replace(figure, canvas=None), image
+        if figure.canvas:
+            image = style.save(figure.canvas, folder, figure.name)
+            yield replace(figure, canvas=None), image
 
 
 def _pictures(results: Results, folder: Path) -> Iterator[Drawn]:
-    with tempfile.TemporaryDirectory(prefix="orchestrator-") as name:
-        scratch = Path(name)
-        planned = [*flow_picture.plan(results, scratch), *grain_picture.plan(results, scratch)]
-        cause = ""
-        if planned:
-            cause = pictures.run([job for picture in planned for job in picture.jobs], scratch)
-        yield from _saved((picture.finished(cause) for picture in planned), folder)
+    yield from _saved(flow_picture.draw(results), folder)
+    yield from _saved(grain_picture.draw(results), folder)
     yield from animation.draw(results, folder)
 
 

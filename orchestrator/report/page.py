@@ -34,7 +34,7 @@ def render(
     results : Results
         What the study gave.
     figures : sequence of (Figure, bytes)
-        The figures with their PNG; no bytes where one is missing.
+        The figures with their images, PNG or GIF.
     timings : DataFrame
         Wall times of the finished cases.
     failures : mapping of str to str
@@ -84,7 +84,7 @@ def typeset(text: str) -> Markup:
 
 def _entry(figure: Figure, png: bytes) -> dict[str, Any]:
     data = base64.b64encode(png).decode("ascii")
-    kept = ("name", "title", "caption", "cases", "missing")
+    kept = ("name", "title", "caption", "cases")
     return {"data": data, **{name: getattr(figure, name) for name in kept}}
 
 

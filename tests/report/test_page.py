@@ -125,21 +125,6 @@ def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> N
     assert first == second
 
 
-def test_page_says_why_a_picture_is_missing(
-    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    crash = tmp_path / "python"
-    crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
-    crash.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(crash))
-    (tmp_path / "cases").symlink_to(results.cases)
-    parsed = Page(write(only(results, "pile"), tmp_path, {}).read_text(encoding="utf-8"))
-    assert parsed.text.count("This picture could not be made") == 2
-    assert "SIGSEGV" in parsed.text
-    assert "apt-get install --no-install-recommends libosmesa6" in parsed.text
-    assert len(parsed.all("img", "src")) == 4
-
-
 def test_page_without_results(results: Results, tmp_path: Path) -> None:
     none = {name: pd.DataFrame() for name in results.tables}
     empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
