@@ -50,7 +50,7 @@ def execute(case: Case, cases: Path, limit_s: float, stop: threading.Event) -> N
             case, directory, solver_s=ended.seconds, wall_s=time.monotonic() - started
         )
     except SolverError as error:
-        case_states.fail(directory, str(error))
+        case_states.fail(directory, error)
         raise
 
 
