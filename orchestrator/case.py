@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator import assets
+from orchestrator.errors import SolverError
 from orchestrator.files import (
     canonical_json,
     digest_file,
@@ -143,18 +144,22 @@ def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s
     )
 
 
-def fail(directory: Path, cause: str) -> None:
-    """Leave a note of why a case failed, for `status`; the next study run tries it again."""
+def fail(directory: Path, error: SolverError) -> None:
+    """Leave a note of how and why a case failed; the next study run tries it again."""
     if directory.is_dir():
-        write_json(directory / FAILED, {"ended": "failed", "cause": cause})
+        write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
 
 
 def failure(directory: Path) -> str | None:
-    """Why the case in a directory failed, or None if it is not known to have failed."""
+    """Why the case in a directory failed, or None if it is not known to have failed.
+
+    The word for its end comes first where it says more than that it failed.
+    """
     path = directory / FAILED
     state = read_json(path)
     if isinstance(state, dict):
-        return str(state.get("cause", ""))
+        ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
+        return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
     return "its note of failure cannot be read" if path.is_file() else None
 
 

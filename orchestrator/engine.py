@@ -146,7 +146,7 @@ def execute(
             case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
         )
     except SolverError as error:
-        case_states.fail(directory, str(error))
+        case_states.fail(directory, error)
         raise
     return took_s
 

@@ -2,6 +2,7 @@
 
 import errno
 import shutil
+from typing import ClassVar
 
 
 class OrchestratorError(Exception):
@@ -41,6 +42,26 @@ class SolverError(OrchestratorError):
     """A solver is missing, or its run did not end as it must."""
 
     exit_code = 3
+    ended: ClassVar[str] = "failed"
+    """One word for the kind of end."""
+
+
+class Exploded(SolverError):  # noqa: N818 - an end, not an error
+    """A run whose numbers grow without bound."""
+
+    ended = "exploded"
+
+
+class Noisy(SolverError):  # noqa: N818
+    """A run whose grains never come to rest."""
+
+    ended = "noisy"
+
+
+class Stalled(SolverError):  # noqa: N818
+    """A run that hangs or circles without an end."""
+
+    ended = "stalled"
 
 
 class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error

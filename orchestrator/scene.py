@@ -54,7 +54,7 @@ class Grain(Part):
     """phi, Coulomb's"""
     stiffness: Annotated[float, Field(ge=1e2, le=1e9)] = 1e4
     """K d/W of the contact's spring, normal and tangential"""
-    damping: Annotated[float, Field(gt=0, lt=1)] = 0.1
+    damping: Annotated[float, Field(ge=0, le=1)] = 0.1
     """damping ratio of a collision"""
 
 
@@ -141,7 +141,7 @@ class Protocol(Part):
     """the flow is raised until this fraction should have moved"""
     fractions: tuple[Annotated[float, Field(gt=0, le=1)], ...] = (0.1, 0.3, 0.5, 0.7)
     """n/N at which the thresholds of a pile are reported"""
-    timestep: Annotated[float, Field(gt=0, le=0.3)] = 0.2
+    timestep: Annotated[float, Field(gt=0, le=2)] = 0.2
     """of the grains' integration, in sqrt(m/K)"""
 
     @field_validator("fractions", mode="before")

@@ -138,7 +138,7 @@ def test_a_solver_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "within 1 s" in _failure(tmp_path, limit_s=1)
 
 
-@pytest.mark.parametrize("name", ["passage.dump", "levels.csv"])
+@pytest.mark.parametrize("name", ["passage.dump", "levels.csv", "settling.csv"])
 def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
     one = _cells(FEW)
     _run(one, tmp_path)

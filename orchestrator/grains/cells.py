@@ -15,13 +15,14 @@ import numpy as np
 
 from orchestrator.closures import Powers
 from orchestrator.files import canonical_json
-from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.scene import Scene
 
 DIAMETER = 1e-3
 DENSITY = 2500.0
 GRAVITY = 9.81
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 """The reference grain of a deck, SI; GRAVITY is its g'."""
 LAST = 1.2
 """Flow of the last hold: a grain that still lies then contradicts the closed form by 20 %."""
@@ -80,7 +81,8 @@ class CellsCase(GrainCase):
         self.check(directory)
         grains = self._grains()
         marker = self.scenes[0].protocol.marker
-        found = motion.read(directory, grains, marker, all_rest=False)
+        rest.check(directory, grains, WEIGHT, self._grain.stiffness, all_rest=False)
+        found = motion.read(directory, grains, marker)
         found.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:
@@ -107,7 +109,7 @@ def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray, deck.FloatArr
     outward = np.array([-along[1], along[0]])
     behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
     own_threshold = scene.closed_form(scene.closure).friction_velocity
-    scale = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY / scene.weight
+    scale = WEIGHT / scene.weight
     drag, lift = (
         Powers(tuple(scale * c for c in force.coefficients), force.exponents)
         for force in scene.powers()

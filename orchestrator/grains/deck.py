@@ -69,6 +69,11 @@ class GrainTable:
         """Ids (from 1) of the grains whose motion is counted."""
         return np.flatnonzero(self.kind == COUNTED) + 1
 
+    @property
+    def mobile_count(self) -> int:
+        """How many grains may move."""
+        return int((self.kind != FIXED).sum())
+
 
 def force_table(
     drag: Powers, lift: Powers, speed: FloatArray, along: FloatArray, outward: FloatArray

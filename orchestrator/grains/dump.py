@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.errors import SolverError
+from orchestrator.errors import Exploded, SolverError
 from orchestrator.grains.deck import GrainTable
 
 FloatArray = NDArray[np.float64]
@@ -64,7 +64,9 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
     Raises
     ------
     SolverError
-        If a dump is not one of these grains and looks, or holds none of them.
+        If a dump is not one of these grains and looks.
+    Exploded
+        If it holds none of them.
     """
     path = directory / PASSAGE
     dump = read_dump(path, PASSAGE_COLUMNS)
@@ -72,11 +74,10 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
         raise SolverError("it is not of these holds", where=str(path), remedy="run the case again")
     rows = dump.rows
     if rows.empty or not rows["id"].isin(ids).all():
-        raise SolverError(
-            "every counted grain was lost" if rows.empty else "it is not of these grains",
-            where=str(path),
-            remedy="a smaller protocol.timestep, or look for grains that overlap",
-        )
+        remedy = "a smaller protocol.timestep, or look for grains that overlap"
+        if rows.empty:
+            raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
+        raise SolverError("it is not of these grains", where=str(path), remedy="run the case again")
     state = np.full((len(dump.steps), len(ids), len(PASSAGE_COLUMNS) - 1), np.nan)
     row, column = np.searchsorted(dump.steps, rows["step"]), np.searchsorted(ids, rows["id"])
     state[row, column] = rows[list(PASSAGE_COLUMNS[1:])]

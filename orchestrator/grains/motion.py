@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
 from orchestrator.grains.deck import GrainTable
-from orchestrator.grains.dump import PASSAGE, Track, read_track
+from orchestrator.grains.dump import Track, read_track
 from orchestrator.grains.protocol import SETTLE_FLOW
 
 FloatArray = NDArray[np.float64]
@@ -140,7 +140,7 @@ class Motion:
         )
 
 
-def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) -> Motion:
+def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
     """Read the deck's tables of a finished run.
 
     Parameters
@@ -151,9 +151,6 @@ def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) 
         As the deck was given them.
     marker : float
         Displacement that counts as motion, diameters.
-    all_rest : bool
-        Whether every grain must come to rest before the flow rises: those of a pile must, cells
-        are each a bed of their own and may be one that holds no grain.
 
     Raises
     ------
@@ -162,13 +159,6 @@ def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) 
     """
     looks = _looks(directory)
     track = read_track(directory, grains, looks)
-    if all_rest and not track.stayed.all():
-        raise SolverError(
-            f"{int((~track.stayed).sum())} of {len(track.stayed)} grains were lost before the flow"
-            " rose",
-            where=str(directory / PASSAGE),
-            remedy="a smaller protocol.timestep, or look for grains that overlap",
-        )
     present = ~np.isnan(track.travel)
     _reconcile(directory, looks, track, present, marker)
     fallen = ~track.stayed | (present & (track.travel <= -marker))

@@ -14,7 +14,7 @@ from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import deck, motion, peeling, protocol
+from orchestrator.grains import deck, motion, peeling, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.grains.motion import Motion
 from orchestrator.scene import PileBed, Scene
@@ -168,7 +168,9 @@ class PileCase(GrainCase):
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains(self._speed(directory.parent))
-        found = motion.read(directory, grains, self.scene.protocol.marker, all_rest=True)
+        grain = self.scene.grain
+        rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
+        found = motion.read(directory, grains, self.scene.protocol.marker)
         found.to_csv(directory, grains)
 
     def motion(self, cases: Path) -> Motion:
