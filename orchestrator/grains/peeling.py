@@ -26,7 +26,11 @@ REACH = 2.4
 """Only grains this near can touch one on its way to the marker, d."""
 MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
-HALVINGS = 60
+LEAST, MOST = 1e-6, 1e4
+"""Flows between which one is looked for."""
+ITERATIONS = 200
+CLOSE = 1e-14
+"""Of a flow: this near to the root is the root."""
 
 
 def flows(
@@ -155,16 +159,25 @@ def _lean(place: Place, neighbour: Place) -> float:
 
 def _root(coefficients: Sequence[float], goal: float) -> float:
     """The flow at which sum_p c_p flow**p reaches a goal; 0 or infinite if always or never."""
+    terms = [(c, p) for c, p in zip(coefficients, POWERS, strict=True) if c != 0]
 
-    def short(flow: float) -> bool:
-        return math.fsum(c * flow**p for c, p in zip(coefficients, POWERS, strict=True)) < goal
+    def excess(flow: float) -> float:
+        return sum([c * flow**p for c, p in terms]) - goal
 
-    low, high = 1e-6, 1e4
-    if not short(low):
+    low, high = LEAST, MOST
+    if excess(low) >= 0:
         return 0.0
-    if short(high):
+    if excess(high) < 0:
         return math.inf
-    for _ in range(HALVINGS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if short(middle) else (low, middle)
-    return high
+    flow = min(max((goal / sum(abs(c) for c, _ in terms)) ** 0.5, low), high)
+    for _ in range(ITERATIONS):
+        value = excess(flow)
+        low, high = (flow, high) if value < 0 else (low, flow)
+        # Newton in the logarithm of the flow; where it leaves what encloses the root, halving
+        slope = sum([c * p * flow**p for c, p in terms])
+        step = value / slope if slope > 0 else math.inf
+        guess = flow * math.exp(-step) if abs(step) < 20 else 0.0
+        if abs(step) < CLOSE:
+            return guess
+        flow = guess if low < guess < high else math.sqrt(low * high)
+    return flow

@@ -144,7 +144,7 @@ class PileCase(GrainCase):
         """Write the grains with their forces, and the holds of the protocol."""
         speed = self._speed(cases)
         rules = self.scene.protocol
-        thresholds = self.pivot_thresholds(speed[self.packing.windward])
+        thresholds = np.sort(self._peeled(speed))
         last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
@@ -156,6 +156,7 @@ class PileCase(GrainCase):
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
             **protocol.raising(rules, int((1 - rules.until) * self.packing.count + 1e-9)),
+            "away": max(protocol.AWAY, self._reach),
             "slope": self.bed.slope_deg,
             "ceiling_x": self.triangle.crest[0] * d,
             "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
@@ -163,6 +164,13 @@ class PileCase(GrainCase):
         first, last = protocol.START * thresholds[0], protocol.BEYOND * last
         holds = protocol.holds(first, last, rules.step)
         deck.write(directory, self._grains(speed), parameters, holds, margin=MARGIN * d)
+
+    @property
+    def _reach(self) -> float:
+        """How far behind the crest a mobile grain lies, and a place to lie on, d."""
+        return (
+            float((self.packing.centres[self.packing.mobile, 0]).max() - self.triangle.crest[0]) + 2
+        )
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
@@ -183,6 +191,10 @@ class PileCase(GrainCase):
         speed = self._speed(cases)
         if self.scene.protocol.method == "pivot":
             return Motion.of_flows(self._alone(speed[self.packing.windward]))
+        return Motion.of_flows(self._peeled(speed))
+
+    def _peeled(self, speed: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s."""
         grains = self._grains(speed)
         flows = peeling.flows(
             self.packing.centres,
@@ -192,7 +204,7 @@ class PileCase(GrainCase):
             along=self.triangle.tangent,
             marker=self.scene.protocol.marker,
         )
-        return Motion.of_flows(flows[self.packing.windward])
+        return np.asarray(flows[self.packing.windward])
 
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""
