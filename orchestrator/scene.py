@@ -104,6 +104,9 @@ class Flow(Part):
     """of the mesh on the bed, m; default: `default_first_cell_height`"""
     cells_per_face: Annotated[int, Field(ge=10)] = 40
     """of the mesh along each face of the pile"""
+    growth: Annotated[float, Field(gt=1, le=2)] = 1.1
+    """of the mesh: ratio of neighbouring cells up from the bed and away from the pile, with 40
+    along a face; it follows their number"""
     roughness: Positive | None = None
     """z0 of the solve, m, for beds of nearly the same one to share it; default: the bed's"""
     turbulence: Turbulence = "kEpsilon"

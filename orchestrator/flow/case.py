@@ -45,6 +45,9 @@ class FlowCase(Case):
         The stress depends on it: `default_first_cell_height` is the choice of the studies.
     cells_per_face : int
         Cells along each face of the pile; the others follow.
+    growth : float
+        Ratio of neighbouring cells up from the bed and away from the pile, with 40 cells on a face;
+        it follows the number of cells, so that twice of these is a mesh twice as fine.
     turbulence : str
         OpenFOAM's model of it: kEpsilon, RNGkEpsilon, realizableKE or kOmegaSST.
     convection : str
@@ -65,13 +68,14 @@ class FlowCase(Case):
     viscosity_m2_s: float
     first_cell_m: float
     cells_per_face: int = 40
+    growth: float = 1.1
     turbulence: Turbulence = "kEpsilon"
     convection: Convection = "linearUpwind"
     correctors: int = 1
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 4
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
     bulky: ClassVar[tuple[str, ...]] = (
@@ -102,6 +106,8 @@ class FlowCase(Case):
             raise InputError(
                 f"{self.cells_per_face} is not within 8 to 400", where="cells_per_face"
             )
+        if not 1.0 < self.growth <= 2.0:
+            raise InputError(f"{self.growth:g} is not within 1 to 2", where="growth")
         if self.first_cell_m > self.height_m / 4.0:
             raise InputError(
                 f"{self.first_cell_m:g} m is above h/4 = {self.height_m / 4:g} m",
@@ -131,7 +137,7 @@ class FlowCase(Case):
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
-        growth = 1.1 ** (40.0 / self.cells_per_face)
+        growth = self.growth ** (40.0 / self.cells_per_face)
         face = 1.0 / tan(radians(self.slope_deg)) if self.slope_deg else 4.0
         toe = 1.7 * face / self.cells_per_face
         beside = _grown(10.0 / toe, growth) + _grown(20.0 / toe, growth)
@@ -160,6 +166,7 @@ class FlowCase(Case):
             height=self.height_m,
             first_cell=self.first_cell_m,
             cells_per_face=self.cells_per_face,
+            growth_at_40=self.growth,
         )
         write_mesh(directory)
 

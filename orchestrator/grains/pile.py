@@ -34,6 +34,7 @@ FIELD_OF = {
     "viscosity_m2_s": "flow.viscosity",
     "first_cell_m": "flow.first_cell_height",
     "cells_per_face": "flow.cells_per_face",
+    "growth": "flow.growth",
     "correctors": "flow.correctors",
 }
 """What a study file calls the fields of a flow case."""
@@ -90,6 +91,7 @@ class PileCase(GrainCase):
                 viscosity_m2_s=self.scene.flow.viscosity,
                 first_cell_m=self.scene.first_cell_height,
                 cells_per_face=self.scene.flow.cells_per_face,
+                growth=self.scene.flow.growth,
                 turbulence=self.scene.flow.turbulence,
                 convection=self.scene.flow.convection,
                 correctors=self.scene.flow.correctors,

@@ -15,7 +15,7 @@ from orchestrator.errors import SolverError
 if TYPE_CHECKING:
     import pyvista
 
-PROGRAMS = ("gmshToFoam", "changeDictionary", "simpleFoam")
+PROGRAMS = ("gmshToFoam", "simpleFoam")
 """The programs of a case's `Allrun`, in their order."""
 TRIED = ("1912",)
 """Versions that the tests ran with."""

@@ -41,6 +41,7 @@ COLUMNS: dict[str, str] = {
     "solve_nu_m2_s": "kinematic viscosity of that solve",
     "first_cell_m": "height of the flow's cells on the bed",
     "cells_per_face": "cells of the flow along each face of the pile",
+    "growth": "ratio of neighbouring cells of the flow away from the bed, with 40 along a face",
     "turbulence": "OpenFOAM's turbulence model",
     "convection": "OpenFOAM's scheme for the convection of U",
     "correctors": "of the pressure, for cells that are not orthogonal",

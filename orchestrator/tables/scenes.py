@@ -73,6 +73,7 @@ def _choices(scene: Scene) -> Row:
         "solve_nu_m2_s": scene.flow.viscosity if pile else None,
         "first_cell_m": scene.first_cell_height if pile else None,
         "cells_per_face": scene.flow.cells_per_face if pile else None,
+        "growth": scene.flow.growth if pile else None,
         "turbulence": scene.flow.turbulence if pile else None,
         "convection": scene.flow.convection if pile else None,
         "correctors": scene.flow.correctors if pile else None,

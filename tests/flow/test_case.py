@@ -248,6 +248,7 @@ def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
         ("first_cell_m", 1e-2),
         ("cells_per_face", 2),
         ("correctors", -1),
+        ("growth", 1.0),
     ],
 )
 def test_an_unusable_field_is_named(field: str, value: Any) -> None:
