@@ -1,7 +1,7 @@
 """A pile of grains under the flow over it: one case of LIGGGHTS for each scene."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -56,6 +56,12 @@ class Face:
     speed: FloatArray
 
 
+@cache
+def _flow_case(**fields: Any) -> FlowCase:
+    """One case for all scenes that share it, checked and digested once."""
+    return FlowCase(**fields)
+
+
 @dataclass(frozen=True)
 class PileCase(GrainCase):
     """The grains of one pile."""
@@ -74,7 +80,7 @@ class PileCase(GrainCase):
     def flow(self) -> FlowCase:
         """The flow that gives the stress; scenes that differ in their grains alone share it."""
         try:
-            return FlowCase(
+            return _flow_case(
                 slope_deg=self.bed.slope_deg,
                 height_m=self.bed.height,
                 roughness_m=self.bed.roughness,
