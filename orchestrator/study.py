@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from orchestrator import assets, limits
 from orchestrator.errors import InputError
-from orchestrator.scene import PileBed, Scene, UnfitError, roughness_length
+from orchestrator.scene import PileBed, Scene, UnfitError, decide_regimes, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
@@ -187,12 +187,21 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> 
     grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
+    scenes = [make_scene(parts, where, guarded=guarded) for parts in _points(tables, grid)]
+    decide_regimes(scenes)
+    for scene in scenes:
+        yield from scene.resolved()
+
+
+def _points(
+    tables: Mapping[str, dict[str, Any]], grid: list[tuple[Any, ...]]
+) -> Iterator[dict[str, dict[str, Any]]]:
+    places = [key.partition(".")[::2] for key in tables["axes"]]
     for point in grid:
         parts = {part: dict(tables[part]) for part in PARTS}
-        for key, value in zip(axes, point, strict=True):
-            part, _, field = key.partition(".")
+        for (part, field), value in zip(places, point, strict=True):
             parts[part][field] = value
-        yield from make_scene(parts, where, guarded=guarded).resolved()
+        yield parts
 
 
 def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool = True) -> Scene:

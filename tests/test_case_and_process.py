@@ -107,6 +107,24 @@ def test_a_harmed_case_is_not_done(
     case.prepare(tiny, cases)  # and it can be made again
 
 
+def test_a_file_is_read_again_only_if_its_time_or_size_has_changed(
+    finished: tuple[Tiny, Path],
+) -> None:
+    tiny, cases = finished
+    result = cases / tiny.name / "result.txt"
+    before = result.stat()
+    os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns + 1, before.st_mtime_ns + 1))
+    result.write_text("24\n")
+    assert not case.is_done(tiny, cases)
+    os.utime(result, ns=(before.st_mtime_ns, before.st_mtime_ns))
+    assert case.is_done(tiny, cases)
+    # as old as the marker: it may have been changed after it in the same tick of the clock
+    os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns, before.st_mtime_ns))
+    assert not case.is_done(tiny, cases)
+    result.write_text("42\n")
+    assert case.is_done(tiny, cases)
+
+
 def test_output_is_logged_and_the_exit_code_known(tmp_path: Path) -> None:
     log = tmp_path / "log"
     command = ["sh", "-c", "echo out; echo err >&2; exit 3"]

@@ -5,7 +5,6 @@ grain has the reference diameter, its forces are those of its own scene times th
 weights. The flow of the deck is the friction velocity over that of the closed form.
 """
 
-import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,9 +124,11 @@ def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:
     The split depends on the study alone, never on what is left to do: a study that was interrupted
     must not differ from one that was not.
     """
-    ordered = sorted(scenes, key=_shared_key)
-    for _, group in itertools.groupby(ordered, key=_shared_key):
-        members = sorted(group, key=lambda scene: scene.id)
+    groups: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        groups.setdefault(_shared_key(scene), []).append(scene)
+    for key in sorted(groups):
+        members = sorted(groups[key], key=lambda scene: scene.id)
         for start in range(0, len(members), BLOCK):
             yield CellsCase(tuple(members[start : start + BLOCK]))
 

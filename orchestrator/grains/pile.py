@@ -62,6 +62,12 @@ class Face:
 _packed = cache(packing.pile)
 
 
+@cache
+def _flow_case(**fields: Any) -> FlowCase:
+    """One case for all scenes that share it, checked and digested once."""
+    return FlowCase(**fields)
+
+
 @dataclass(frozen=True)
 class PileCase(GrainCase):
     """The grains of one pile."""
@@ -83,7 +89,7 @@ class PileCase(GrainCase):
         Where the stress is that of a theory, its u*_0 and U_e are the theory's too.
         """
         try:
-            return FlowCase(
+            return _flow_case(
                 slope_deg=self.bed.slope_deg,
                 height_m=self.bed.height,
                 roughness_m=self.scene.solve_roughness,
