@@ -1,6 +1,7 @@
 """Run one external program: in its own session, logged, limited in time, never orphaned."""
 
 import contextlib
+import ctypes
 import os
 import shutil
 import signal
@@ -15,6 +16,8 @@ from orchestrator.errors import Interrupted
 
 GRACE_S = 2.0
 POLL_S = 0.02
+_SET_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
 
 
 @dataclass(frozen=True)
@@ -122,3 +125,12 @@ def _dies_with_its_parent() -> list[str]:
     """Without this a killed driver leaves its solver running; util-linux has it since 2.33."""
     setpriv = shutil.which("setpriv")
     return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []
+
+
+def follow(parent: int) -> None:
+    """Make this forked process end with its parent, and leave the signals of a user to that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
