@@ -98,11 +98,11 @@ def collision(scene, case):
     start = speed = 2 * scene["speed_m_s"]
     overlap = 0.0
     while True:
-        push, _ = contact.force(max(overlap, 1e-300), speed, 0.0, dt)
+        overlap += speed * dt
+        push, _ = contact.force(overlap, speed, 0.0, dt)
         if push == 0:
             return lambda quantity, at: -speed / start
         speed -= push / mass * dt
-        overlap += speed * dt
 
 
 def roll(scene, incline_deg, speed, times):

@@ -42,18 +42,28 @@ def read(path: Path, asked: pd.DataFrame, count: float | None) -> dict[Key, floa
     AnswerError
         Naming what is wrong with it.
     """
-    if not path.is_file():
-        raise AnswerError(f"it wrote no {FILE}")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise AnswerError(f"{FILE} is no text") from None
-    found = dict(_rows(text))
+    found = numbers(path)
     _check_complete(
         found, [key(q, at) for q, at in zip(asked["quantity"], asked["at"], strict=True)]
     )
     _check_counts(found, count)
     return found
+
+
+def numbers(path: Path) -> dict[Key, float]:
+    """The numbers of an answer, whatever was asked.
+
+    Raises
+    ------
+    AnswerError
+        If the file is missing or not whole.
+    """
+    if not path.is_file():
+        raise AnswerError(f"it wrote no {FILE}")
+    try:
+        return dict(_rows(path.read_text(encoding="utf-8")))
+    except UnicodeDecodeError:
+        raise AnswerError(f"{FILE} is no text") from None
 
 
 def _rows(text: str) -> list[tuple[Key, float]]:
@@ -100,9 +110,9 @@ def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
 def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     total = found.get(("count", ""), count)
     for (quantity, at), rest in found.items():
-        moved = found.get(("moved", at))
-        if quantity == "not_moved" and moved is not None and moved + rest != total:
-            lost = "are lost" if moved + rest < (total or 0) else "are too many"
+        moved = found.get(("moved", at), 0.0)
+        if quantity == "not_moved" and total is not None and moved + rest != total:
+            lost = "are lost" if moved + rest < total else "are too many"
             raise AnswerError(
                 f"grains {lost}: {moved:g} moved and {rest:g} not, at hold {at}, of {total:g}"
             )

@@ -54,8 +54,8 @@ def _panels(pack: Pack, rows: pd.DataFrame, kind: str, names: Sequence[str], pan
     for ax, name in zip(axes, chosen, strict=False):
         panel(ax, rows[rows["scene"] == name])
         told = pack.scenes[name]
-        size = f", d = {1e3 * told['d_m']:g} mm" if "d_m" in told else ""
-        ax.set_title(f"{name}: {told['alpha_deg']:g}°{size}, z₀ = {told['z0_m']:.3g} m", size=6)
+        size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
+        ax.set_title(f"{name}: {told['alpha_deg']:g}°, {size}", size=6.5)
     for ax in axes[len(chosen) :]:
         ax.remove()
     style.legends(canvas, [], _legend())
@@ -115,8 +115,12 @@ def _shields(pack: Pack, rows: pd.DataFrame) -> Figure:
         found = np.where(found > 0, found, np.nan)
         ax.plot(scale * np.sqrt(found), found, "x", color=LEVELS[one], ms=3, mew=0.8)
     ax.set(xscale="log", yscale="log", xlabel=labels.RE_AXIS, ylabel=labels.TAU_AXIS)
-    ax.set_xlim(0.5 * unit.min() * 0.1, 3 * unit.max())
-    ax.set_ylim(0.005, 1)
+    theta = here["value"].to_numpy(float)
+    reynolds = unit * np.sqrt(theta)
+    ax.set_xlim(reynolds.min() / 3, reynolds.max() * 3)
+    ax.set_ylim(min(theta.min(), 0.02) / 2, max(theta.max(), 0.2) * 2)
+    style.plain_ticks(ax.xaxis)
+    style.plain_ticks(ax.yaxis)
     samples = [style.entry(f"level {one}", LEVELS[one]) for one in sorted(set(level))]
     marks = [
         Line2D([], [], color="0.3", marker="o", mfc="none", ls="none", label="expected, interval"),
@@ -148,6 +152,7 @@ def _speed(verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Figure:
         y = [max(ours.get(one.scene, np.nan), FLOOR) for one in of]
         ax.plot(x, y, "o", color=LEVELS[level], mfc="none", ms=4.5, mew=0.7)
     ax.set(xscale="log", yscale="log", xlabel="wall time of a scene, s", ylabel="median error")
+    style.plain_ticks(ax.xaxis)
     marks = [
         Line2D([], [], color="0.3", marker="o", ls="none", label="solver"),
         Line2D([], [], color="0.3", marker="o", mfc="none", ls="none", label="ours"),

@@ -17,6 +17,8 @@ from orchestrator.files import read_json
 
 USED = "used.json"
 """What a solver took for a scene, beside its answer."""
+COUNTS = ("moved", "not_moved")
+"""Whole numbers, which may be small: they are judged, but a relative error says little of them."""
 ROUND = 1e-8
 """Relative: the digits of a pack's tables."""
 
@@ -111,7 +113,7 @@ def _rows(
         found=given, error=_relative(given, value), within=_within(given, expected)
     )
     if (ours / FILE).is_file():
-        run = answer.read(ours / FILE, expected.iloc[:0], None)
+        run = answer.numbers(ours / FILE)
         rows = rows.assign(ours=[run.get(key, math.nan) for key in keys])
     return rows, error
 
@@ -132,7 +134,7 @@ def _verdict(
 ) -> Verdict:
     judged = rows[rows["tolerance"].notna()]
     wrong = judged[~judged["within"].astype(bool)]
-    errors = judged["error"].abs()
+    errors = judged.loc[~judged["quantity"].isin(COUNTS), "error"].abs()
     message = error or (_message(told, rows, wrong) if len(wrong) else "")
     used, run = (read_json(place / USED) or {} for place in (folder, ours))
     return Verdict(
@@ -151,7 +153,9 @@ def _verdict(
 
 def _message(told: Mapping[str, Any], rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
     """The number that is furthest off, how many others are, and the likely cause."""
-    first = wrong.iloc[int(wrong["error"].abs().to_numpy().argmax())]
+    # a count is named only if nothing else is off
+    size = wrong["error"].abs().where(~wrong["quantity"].isin(COUNTS), 0.0)
+    first = wrong.iloc[int(size.to_numpy().argmax())]
     at = f" at {first['at']}" if first["at"] else ""
     said = f"{first['quantity']}{at} is {first['found']:.6g}, not {first['value']:.6g}"
     if first["low"] < first["high"]:
