@@ -1,6 +1,6 @@
 """Run an experiment in a directory of its own, to its tables and its page."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -8,11 +8,12 @@ import pandas as pd
 from orchestrator import case as case_states
 from orchestrator import pipeline
 from orchestrator.case import Case
-from orchestrator.experiments import ladder, maps, naive, ranking, stability
+from orchestrator.experiments import ladder, maps, naive, pages, ranking, stability
 from orchestrator.files import write_durably
 from orchestrator.pipeline import Finished
 from orchestrator.plan import of
 from orchestrator.report import experiment
+from orchestrator.report.experiment import Section
 from orchestrator.study import TIME_LIMIT_S, Study
 from orchestrator.workspace import Workspace
 
@@ -51,7 +52,7 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
             ),
         }
         _write(tables, space)
-        experiment.ladder(tables, study, space.root)
+        _page("Speed against accuracy", pages.of_ladder(tables), space)
     return Finished(space.page, len(todo), failures)
 
 
@@ -81,7 +82,7 @@ def run_stability(out: Path, *, workers: int) -> Finished:
         judged = {one.name: stability.judge(one, answers) for one in drawn}
         table = pd.concat(judged.values(), ignore_index=True)
         _write({"maps": table}, space)
-        experiment.stability(drawn, judged, space.root)
+        _page("Where each method fails", pages.of_stability(drawn, judged), space)
     return Finished(space.page, len(todo), {})
 
 
@@ -94,3 +95,7 @@ def _write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
     space.tables.mkdir(exist_ok=True)
     for name, table in tables.items():
         write_durably(space.tables / f"{name}.csv", table.to_csv(index=False))
+
+
+def _page(title: str, sections: Sequence[Section], space: Workspace) -> None:
+    experiment.write(title, sections, space.root, case_states.programs(space.cases))

@@ -162,7 +162,7 @@ def _root(coefficients: Sequence[float], goal: float) -> float:
     terms = [(c, p) for c, p in zip(coefficients, POWERS, strict=True) if c != 0]
 
     def excess(flow: float) -> float:
-        return sum([c * flow**p for c, p in terms]) - goal
+        return sum(c * math.pow(flow, p) for c, p in terms) - goal
 
     low, high = LEAST, MOST
     if excess(low) >= 0:
@@ -174,7 +174,7 @@ def _root(coefficients: Sequence[float], goal: float) -> float:
         value = excess(flow)
         low, high = (flow, high) if value < 0 else (low, flow)
         # Newton in the logarithm of the flow; where it leaves what encloses the root, halving
-        slope = sum([c * p * flow**p for c, p in terms])
+        slope = sum(c * p * math.pow(flow, p) for c, p in terms)
         step = value / slope if slope > 0 else math.inf
         guess = flow * math.exp(-step) if abs(step) < 20 else 0.0
         if abs(step) < CLOSE:
