@@ -93,7 +93,8 @@ def accuracy(dem: pd.DataFrame) -> str:
     return (
         "Friction velocity at the threshold by DEM over that of Eq. 3 or 5 with the same forces. "
         "Bars: between the holds without and with motion, so a threshold met exactly lies within "
-        f"its bar. Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
+        f"its bar. {'Panels differ in scale. ' if dem['step'].nunique() > 1 else ''}"
+        f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
         + (HOLLOW if not holds.all() else "")
     )
 

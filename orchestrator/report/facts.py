@@ -39,6 +39,8 @@ PARAMETERS = (
     "z0_over_d",
     "h_m",
     "packing",
+    "disorder",
+    "seed",
     "mobile_layers",
     "closure",
     "stress",
@@ -48,6 +50,7 @@ PARAMETERS = (
     "step",
     "quiet",
     "marker",
+    "timestep",
 )
 """Columns of the table of scenes that the page lists."""
 MANY = 12
@@ -164,8 +167,12 @@ def programs(results: Results) -> Sheet:
         found = identity.get("programs", {}) if isinstance(identity, dict) else {}
         for program, version in found.items():
             used.setdefault(str(program), set()).add(str(version))
-    rows = [(program, ", ".join(sorted(versions))) for program, versions in sorted(used.items())]
-    rows += [("orchestrator", __version__), ("Python", python_version())]
+    return versions({program: ", ".join(sorted(found)) for program, found in used.items()})
+
+
+def versions(solvers: Mapping[str, str]) -> Sheet:
+    """Solvers with their versions, this package, and the libraries."""
+    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
     return Sheet(("program", "version"), (*rows, *_installed(PACKAGES)))
 
 
