@@ -100,7 +100,10 @@ def _wide(known: pd.DataFrame) -> pd.DataFrame:
     table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
     table.columns = pd.Index([f"{fraction:.0%}" for fraction in table.columns])
     table = table.reset_index().rename(columns={"like": "kind of scene", "cost_core_s": "core-s"})
-    return table.sort_values(by=["part", "kind of scene", "rung"], key=lambda c: c.map(order.get) if c.name == "rung" else c)
+    return table.sort_values(
+        by=["part", "kind of scene", "rung"],
+        key=lambda c: c.map(order.get) if c.name == "rung" else c,
+    )
 
 
 def of_stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> list[Section]:

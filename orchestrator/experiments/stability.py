@@ -13,7 +13,6 @@ from typing import Any
 import pandas as pd
 
 from orchestrator import case as case_states
-from orchestrator.errors import OrchestratorError
 from orchestrator.experiments.maps import Map, Run
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
@@ -95,7 +94,8 @@ def _rows(one: Map, run: Run, answers: Answers) -> Iterator[Row]:
     for x in places:
         error = _error(one, run, answers, float(x) if one.x.is_fraction else None)
         verdict = "good" if abs(error) <= WRONG else "wrong"
-        yield _row(one, x, run, verdict=verdict, caught=False, error=error, note="")
+        note = "its reference failed" if math.isnan(error) else ""
+        yield _row(one, x, run, verdict=verdict, caught=False, error=error, note=note)
 
 
 def _row(one: Map, x: float | str, run: Run, **found: Any) -> Row:
@@ -116,7 +116,8 @@ def _pile_errors(
     scene: Scene, reference: Scene, answers: Answers, fraction: float | None
 ) -> Iterator[float]:
     if answers.failure(reference):
-        raise OrchestratorError("the reference of a map failed", where=reference.id)
+        yield math.nan
+        return
     own, other = answers.pile(scene), answers.pile(reference)
     for at in own if fraction is None else (fraction,):
         if math.isnan(own[at].tau) and math.isnan(other[at].tau):
