@@ -92,8 +92,8 @@ def _first_cell(scene: Scene) -> str | None:
     if not _solved(scene) or 4 * scene.solve_roughness <= scene.first_cell_height:
         return None
     return (
-        f"z0 = {scene.solve_roughness:g} m is above half of z_e = {scene.first_cell_height / 2:g} m,"
-        " the height of the first cell's centre"
+        f"z0 = {scene.solve_roughness:g} m is above half of z_e ="
+        f" {scene.first_cell_height / 2:g} m, the height of the first cell's centre"
     )
 
 

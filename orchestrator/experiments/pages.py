@@ -77,11 +77,16 @@ def _means(points: pd.DataFrame) -> pd.DataFrame:
     """The largest errors in %, and the mean cost, of each pair and packing."""
     keys = ["packing", "flow_rung", "grain_rung"]
     groups = points.groupby(keys, sort=False)
-    errors = groups[list(ERROR_COLUMNS)].agg(lambda values: 100 * values.abs().max(skipna=False))
+    errors = groups[list(ERROR_COLUMNS)].agg(_worst)
     table = groups["cost_core_s"].mean().to_frame("core-s").join(errors).reset_index()
     heads = {name: f"{name.removeprefix('error_')} %" for name in ERROR_COLUMNS}
     heads = {**heads, "error_curve": "curve, %", "flow_rung": "flow", "grain_rung": "grains"}
     return table.rename(columns=heads).sort_values(["packing", "core-s"])
+
+
+def _worst(values: pd.Series) -> float:
+    """In %; NaN where a fraction was not reached in one of the scenes."""
+    return 100 * float(values.abs().max(skipna=False))
 
 
 def _meanings() -> pd.DataFrame:
@@ -99,11 +104,10 @@ def _wide(known: pd.DataFrame) -> pd.DataFrame:
     index = ["part", "like", "rung", "scenes", "cost_core_s"]
     table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
     table.columns = pd.Index([f"{fraction:.0%}" for fraction in table.columns])
-    table = table.reset_index().rename(columns={"like": "kind of scene", "cost_core_s": "core-s"})
-    return table.sort_values(
-        by=["part", "kind of scene", "rung"],
-        key=lambda c: c.map(order.get) if c.name == "rung" else c,
-    )
+    table = table.reset_index()
+    table = table.assign(place=table["rung"].map(order)).sort_values(["part", "like", "place"])
+    heads = {"like": "kind of scene", "cost_core_s": "core-s"}
+    return table.drop(columns="place").rename(columns=heads)
 
 
 def of_stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> list[Section]:
