@@ -177,6 +177,18 @@ def flow(piles: list[PileCase]) -> str:
     )
 
 
+def mesh(pile: PileCase) -> str:
+    """Of the picture of the mesh."""
+    flow, z0 = pile.flow, pile.bed.roughness
+    return (
+        "After Fig. 11 of the paper, which has triangles. Hexahedra, one cell deep, by gmsh: "
+        f"{flow.cells_per_face} along each face of the pile; the first cells are "
+        f"{flow.first_cell_m / z0:.3g} z₀ high, as the log law of the rough wall needs, and grow "
+        "away from the bed and from the pile. Above: near the pile (the lid is at 10 h); below: "
+        "the crest, as boxed. To scale. No grains: the flow sees the smooth faces."
+    )
+
+
 def grains(pile: PileCase, found: Snapshot, fraction: float) -> str:
     """Of the picture of the grains."""
     return (

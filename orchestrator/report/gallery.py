@@ -17,6 +17,7 @@ from orchestrator.report import (
     animation,
     flow_picture,
     grain_picture,
+    mesh_picture,
     piles,
     single,
     stress,
@@ -84,6 +85,7 @@ def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:
 
 
 def _pictures(results: Results, folder: Path) -> Iterator[Drawn]:
+    yield from _saved(mesh_picture.draw(results), folder)
     yield from _saved(flow_picture.draw(results), folder)
     yield from _saved(grain_picture.draw(results), folder)
     yield from animation.draw(results, folder)

@@ -137,7 +137,7 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
     axes[0].set_xscale("log")
     for ax, ((step,), part) in zip(axes, panels, strict=True):
         _ratios(ax, part, colours)
-        ax.set_title(f"flow raised in steps of {float(str(step)):.3g}", loc="left")
+        ax.set_title(f"flow raised by {100 * float(str(step)):.3g}% from hold to hold", loc="left")
     for ax in axes:
         style.plain_ticks(ax.xaxis)
         shields.shade_transition(ax)

@@ -60,9 +60,9 @@ def parsed(html: str) -> Page:
 
 def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     kinds = [src.split(",")[0] for src in parsed.all("img", "src")]
-    assert kinds.count("data:image/png;base64") == 10
+    assert kinds.count("data:image/png;base64") == 11
     assert kinds.count("data:image/gif;base64") == 1
-    assert len(kinds) == 11
+    assert len(kinds) == 12
     assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     style = parsed.texts["style"]
     assert "url(" not in style
@@ -106,7 +106,7 @@ def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
 
 def test_figures_are_beside_the_page(page: Path) -> None:
     files = sorted(path.name for path in (page.parent / "figures").iterdir())
-    assert len(files) == 21
+    assert len(files) == 23
     assert {Path(name).suffix for name in files} == {".png", ".svg", ".gif"}
     assert not list(page.parent.glob(".*.tmp"))
 

@@ -7,7 +7,14 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.grains import motion
-from orchestrator.report import flow_field, flow_picture, grain_picture, snapshot, spheres
+from orchestrator.report import (
+    flow_field,
+    flow_picture,
+    grain_picture,
+    mesh_picture,
+    snapshot,
+    spheres,
+)
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.report.snapshot import Passage
@@ -52,6 +59,25 @@ def test_field_is_that_of_the_flow(results: Results) -> None:
     assert figure.canvas is not None
     image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[0].images[0].get_array()))
     assert 0.9 < float(image.max()) < 1.2
+
+
+def test_mesh_is_that_of_the_flow(results: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    edges = mesh_picture.read_edges(results.cases / pile.flow.name)
+    table = results.tables["wall_stress"]
+    faces = len(table)
+    # of a grid of quadrilaterals; its height is that of the lid
+    rows = (len(edges) - faces) // (2 * faces + 1)
+    assert len(edges) == (2 * rows + 1) * faces + rows
+    assert edges[..., 1].max() == pytest.approx(10 * pile.bed.height)
+    middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
+    bed = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
+    assert len(middles.intersection(bed)) > 0.9 * faces
+    (figure,) = mesh_picture.draw(results)
+    assert figure.canvas is not None
+    for ax in figure.canvas.axes:
+        (line,) = (line for line in ax.lines if line.get_gid() == "mesh")
+        assert 30 < len(np.asarray(line.get_xdata())) // 3 < len(edges)
 
 
 def test_a_case_without_results_is_named(tmp_path: Path) -> None:
