@@ -1,10 +1,12 @@
 """Our own answer to a scene of a pack, run anew on this machine."""
 
+import math
 import re
+import resource
 import shutil
 import threading
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +35,22 @@ SAID = {
     "spin when it rolls": ("spin_over_start", "2"),
 }
 """What the check decks print, and what a pack asks."""
-Given = tuple[pd.DataFrame, float]
-"""An answer, and the wall time of its solvers, s; NaN at level 1."""
+
+
+@dataclass(frozen=True)
+class Took:
+    """What solvers took: wall time, and CPU time of them all, s; NaN for formulas."""
+
+    seconds: float
+    cpu_s: float
+
+    def __add__(self, other: "Took") -> "Took":
+        return Took(self.seconds + other.seconds, self.cpu_s + other.cpu_s)
+
+
+NOTHING = Took(math.nan, math.nan)
+Given = tuple[pd.DataFrame, Took]
+"""An answer, and what it took."""
 
 
 class Ours:
@@ -47,6 +63,7 @@ class Ours:
         self.study = study.parse(text, name="benchmark", where=str(pack.root / STUDY))
         self.scenes = {scene.id: scene for scene in self.study.scenes}
         piles = plan.make(self.study).piles.values()
+        self.flows: dict[str, Took] = {}
         self.of_flow = {pile.flow.id[:12]: pile.scene for pile in piles}
 
     def answer(self, name: str) -> Given:
@@ -68,12 +85,12 @@ class Ours:
         planned = plan.make(asked)
         row = next(scene_rows.rows(asked, planned))
         if kind == "closed-form":
-            return _given(exact.closed_form(scene, row)), float("nan")
+            return _given(exact.closed_form(scene, row)), NOTHING
         if kind == "pivot":
-            seconds = self._run(*planned.cases.values())
+            took = self._run(*planned.cases.values())
             made = tables.make(asked, planned, self.root, planned.cases)
             ours = float(made["single_grain"]["ustar_m_s"].iloc[0])
-            return _given(exact.pivot(scene, row, ours)), seconds
+            return _given(exact.pivot(scene, row, ours)), took
         return self._bed(kind, asked, planned, row)
 
     def _scene(self, name: str, kind: str) -> Scene:
@@ -88,9 +105,11 @@ class Ours:
 
     def _bed(self, kind: str, asked: study.Study, planned: Plan, row: Mapping[str, Any]) -> Given:
         pile = next(iter(planned.piles.values()))
-        flow_s = self._once(pile.flow)
+        if pile.flow.name not in self.flows:  # scenes share them
+            self.flows[pile.flow.name] = self._run(pile.flow)
+        flow_took = self.flows[pile.flow.name]
         cases = {pile.flow.name} if kind == "flow" else set(planned.cases)
-        pile_s = 0.0 if kind == "flow" else self._run(pile)
+        pile_took = NOTHING if kind == "flow" else self._run(pile)
         made = tables.make(asked, planned, self.root, cases)
         nothing = pd.DataFrame()
         one = Answered(
@@ -102,22 +121,17 @@ class Ours:
             self.root,
         )
         if kind == "flow":
-            return _given(measured.flow(one)), flow_s
+            return _given(measured.flow(one)), flow_took
         if kind == "pile":
-            return _given(measured.pile(one)), pile_s
-        return _given(measured.line(one)), flow_s + pile_s
+            return _given(measured.pile(one)), pile_took
+        return _given(measured.line(one)), flow_took + pile_took
 
-    def _run(self, *cases: Case) -> float:
-        """Run cases anew, and give the wall time of their solvers, s."""
+    def _run(self, *cases: Case) -> Took:
+        """Run cases anew."""
+        before = _cpu_s()
         for one in cases:
             engine.execute(one, self.root, LIMIT_S, threading.Event())
-        return float(sum(_seconds(one, self.root) for one in cases))
-
-    def _once(self, case: Case) -> float:
-        """The same, unless it is done: scenes share flows."""
-        if done_state(case, self.root) is None:
-            return self._run(case)
-        return _seconds(case, self.root)
+        return Took(sum(_seconds(one, self.root) for one in cases), _cpu_s() - before)
 
     def _check(self, kind: str, told: Mapping[str, Any]) -> Given:
         """Run one of the decks for the contact law."""
@@ -133,7 +147,7 @@ class Ours:
         command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
         for name, value in variables.items():
             command += ["-var", name, repr(value)]
-        log = folder / "log.check"
+        log, before = folder / "log.check", _cpu_s()
         ended = process.run(
             command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
         )
@@ -142,11 +156,19 @@ class Ours:
             raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
         found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
         rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
-        return pd.DataFrame(rows, columns=["quantity", "at", "value"]), ended.seconds
+        return pd.DataFrame(rows, columns=["quantity", "at", "value"]), Took(
+            ended.seconds, _cpu_s() - before
+        )
 
 
 def _given(problem: Problem) -> pd.DataFrame:
     return problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
+
+
+def _cpu_s() -> float:
+    """CPU time of all processes that this one started and that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _seconds(case: Case, root: Path) -> float:

@@ -54,6 +54,7 @@ def _line(one: Verdict) -> dict[str, str]:
         "s": _said(one.seconds),
         "ours, s": _said(one.ours_seconds),
         "ratio": _said(one.ratio),
+        "CPU ratio": _said(one.cpu_ratio),
         "MiB": _said(one.peak_mib),
     }
 

@@ -44,7 +44,9 @@ def write(pack: Pack, verdicts: Sequence[Verdict], rows: pd.DataFrame, root: Pat
     from orchestrator.benchmark import page
 
     write_durably(root / NUMBERS, rows.to_csv(index=False, float_format="%.9g"))
-    table = pd.DataFrame([{**asdict(one), "ratio": one.ratio} for one in verdicts])
+    table = pd.DataFrame(
+        [{**asdict(v), "ratio": v.ratio, "cpu_ratio": v.cpu_ratio} for v in verdicts]
+    )
     write_durably(root / VERDICTS, table.to_csv(index=False, float_format="%.6g"))
     levels = summary(verdicts)
     (root / FIGURES).mkdir(exist_ok=True)
@@ -69,7 +71,6 @@ def summary(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 
 def _row(level: int, kind: str, of: Sequence[Verdict]) -> dict[str, Any]:
-    ratios = [one.ratio for one in of if math.isfinite(one.ratio)]
     errors = [one.error for one in of if math.isfinite(one.error)]
     worst = [one.worst for one in of if math.isfinite(one.worst)]
     return {
@@ -79,13 +80,19 @@ def _row(level: int, kind: str, of: Sequence[Verdict]) -> dict[str, Any]:
         "passed": sum(one.passed for one in of),
         "error, median": _percent(np.median(errors)) if errors else "",
         "error, largest": _percent(max(worst)) if worst else "",
-        "time over ours": f"{np.median(ratios):.3g}" if ratios else "",
+        "time over ours": _median([one.ratio for one in of]),
+        "CPU over ours": _median([one.cpu_ratio for one in of]),
         "peak, MiB": _largest([one.peak_mib for one in of]),
     }
 
 
 def _percent(value: float) -> str:
     return f"{100 * value:.3g} %"
+
+
+def _median(values: Sequence[float]) -> str:
+    known = [value for value in values if math.isfinite(value)]
+    return f"{np.median(known):.3g}" if known else ""
 
 
 def _largest(values: Sequence[float]) -> str:

@@ -6,7 +6,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from orchestrator.benchmark import meter, pack, report
@@ -214,8 +214,9 @@ class _Watch:
 
 
 def _answer_ours(ours: Ours, name: str, folder: Path) -> None:
-    table, seconds = ours.answer(name)
+    table, took = ours.answer(name)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     (folder / FILE).write_text(csv(table), encoding="utf-8")
-    write_json(folder / USED, {"seconds": seconds if seconds == seconds else None})
+    known = {name: value for name, value in asdict(took).items() if value == value}
+    write_json(folder / USED, known)

@@ -43,6 +43,8 @@ class Verdict:
         The largest of them.
     seconds, ours_seconds : float
         Wall time of the solver, and of ours; NaN if it is not known.
+    cpu_s, ours_cpu_s : float
+        CPU time of both.
     peak_mib : float
         Memory of the solver.
     """
@@ -56,12 +58,19 @@ class Verdict:
     worst: float
     seconds: float
     ours_seconds: float
+    cpu_s: float
+    ours_cpu_s: float
     peak_mib: float
 
     @property
     def ratio(self) -> float:
-        """The solver's time over ours."""
+        """The solver's wall time over ours."""
         return self.seconds / self.ours_seconds
+
+    @property
+    def cpu_ratio(self) -> float:
+        """The same of the CPU time, which a busy machine disturbs less."""
+        return self.cpu_s / self.ours_cpu_s
 
 
 def compared(
@@ -147,6 +156,8 @@ def _verdict(
         worst=float(errors.max()) if not error else math.nan,
         seconds=_number(used.get("seconds")),
         ours_seconds=_number(run.get("seconds")),
+        cpu_s=_number(used.get("cpu_s")),
+        ours_cpu_s=_number(run.get("cpu_s")),
         peak_mib=_number(used.get("peak_mib")),
     )
 
