@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator import __version__
+from orchestrator.cluster import SYSTEMS, Queue
 from orchestrator.errors import InputError, OrchestratorError, of_system
 
 INTERRUPTED = 130
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-VALUED = ("--out", "--workers", "--roughness", *NUMBERS)
+VALUED = ("--out", "--workers", "--cluster", "--roughness", *NUMBERS)
 FLAGS = ("-h", "--help", "--version", "--json", "--")
 
 
@@ -104,6 +105,12 @@ def _add_study(commands: Any) -> None:
     command.add_argument(
         "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
     )
+    command.add_argument(
+        "--cluster",
+        choices=sorted(SYSTEMS),
+        metavar="QUEUE",
+        help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
+    )
     command.set_defaults(run=_study)
 
 
@@ -152,7 +159,8 @@ def _study(options: argparse.Namespace) -> int:
 
     asked = study.load(options.source)
     out = options.out or Path("results") / asked.name
-    finished = pipeline.run(asked, out, workers=options.workers)
+    queue = Queue(options.cluster, asked.cluster) if options.cluster else None
+    finished = pipeline.run(asked, out, workers=options.workers, queue=queue)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     return _end(finished.page, finished.failures)

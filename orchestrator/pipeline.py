@@ -1,11 +1,11 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator import __version__, case, engine, plan, report, tables
+from orchestrator import __version__, case, cluster, engine, plan, report, tables
 from orchestrator.case import Case
+from orchestrator.cluster import Queue
 from orchestrator.errors import OrchestratorError
 from orchestrator.files import (
     canonical_json,
@@ -40,7 +40,7 @@ class Finished:
     failures: dict[str, OrchestratorError]
 
 
-def run(study: Study, out: Path, *, workers: int) -> Finished:
+def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
     """Run a study, or what is missing of it.
 
     Parameters
@@ -51,6 +51,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         Its directory; a study that is there already is continued.
     workers : int
         Cases at a time.
+    queue : Queue, optional
+        Of the cluster that runs them; without it, this machine does.
 
     Raises
     ------
@@ -69,36 +71,32 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         todo = {name: one for name, one in planned.cases.items() if name not in done}
         if not todo and _is_drawn(study, planned, space):
             return Finished(space.page, 0, {})
-        check_solvers(todo.values())
         failures = {}
         if todo:
-            failures = complete(todo, space, workers=workers, limit_s=study.time_limit_s)
+            failures = complete(
+                todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
+            )
         draw(study, planned, space, failures)
         return Finished(space.page, len(todo), failures)
 
 
 def complete(
-    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float
+    todo: dict[str, Case],
+    space: Workspace,
+    *,
+    workers: int,
+    limit_s: float,
+    queue: Queue | None = None,
 ) -> dict[str, OrchestratorError]:
     """Run cases, with a display of how far they are; the failures by the cases' names."""
-    with (
-        engine.local(space.cases, workers=workers, limit_s=limit_s) as pool,
-        Display(list(todo.values()), workers) as display,
-    ):
+    opened = (
+        cluster.pool(queue, space.cases, workers=workers, limit_s=limit_s)
+        if queue
+        else engine.local(space.cases, workers=workers, limit_s=limit_s)
+    )
+    with opened as pool, Display(list(todo.values()), workers) as display:
+        engine.check_solvers(todo.values(), pool)
         return engine.run(todo, pool, display)
-
-
-def check_solvers(cases: Iterable[Case]) -> None:
-    """See that the programs of some cases are here, before anything is started.
-
-    Raises
-    ------
-    SolverError
-        Naming what is missing, or too old, and what to install.
-    """
-    one_of_each: dict[str, Case] = {one.kind: one for one in cases}
-    for one in one_of_each.values():
-        one.versions()
 
 
 def redraw(out: Path) -> Finished:

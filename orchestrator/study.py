@@ -5,7 +5,6 @@ The tables at the top hold for every scene. Each ``[[group]]`` overrides some of
 is one group.
 """
 
-import difflib
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -16,12 +15,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from orchestrator import assets
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, unknown_key
 from orchestrator.scene import PileBed, Scene, UnfitError, decide_regimes, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "group")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "cluster", "group")
 TIME_LIMIT_S = 3600.0
 MOST_SCENES = 100_000
 
@@ -48,6 +47,8 @@ class Study:
         In the file's order; every scene has its closure decided.
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
+    cluster : dict
+        Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
         The file itself.
     """
@@ -56,6 +57,7 @@ class Study:
     title: str
     groups: tuple[Group, ...]
     time_limit_s: float
+    cluster: dict[str, Any]
     text: str
 
     @property
@@ -115,7 +117,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
     groups = tuple(_groups(data, where))
-    return Study(name, title, groups, float(limit), text)
+    return Study(name, title, groups, float(limit), _table(data, "cluster", where), text)
 
 
 def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
@@ -135,13 +137,16 @@ def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
 def _merged(
     data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
 ) -> dict[str, Any]:
-    tables = (data.get(part, {}), item.get(part, {}))
-    for table in tables:
-        if not isinstance(table, dict):
-            raise InputError(
-                f"{table!r} is not a table", where=f"{where}: {part}", remedy=f"write [{part}]"
-            )
-    return {**tables[0], **tables[1]}
+    return {**_table(data, part, where), **_table(item, part, where)}
+
+
+def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    table = data.get(name, {})
+    if not isinstance(table, dict):
+        raise InputError(
+            f"{table!r} is not a table", where=f"{where}: {name}", remedy=f"write [{name}]"
+        )
+    return table
 
 
 def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
@@ -212,7 +217,7 @@ def _explained(error: ValidationError, where: str) -> InputError:
     field = ".".join(path)
     given = first.get("input")
     if first["type"] == "extra_forbidden":
-        return _unknown(path[-1], _fields_beside(path), f"{where}: {field}")
+        return unknown_key(path[-1], _fields_beside(path), f"{where}: {field}")
     if first["type"] == "missing":
         return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
     return InputError(
@@ -234,10 +239,4 @@ def _fields_beside(path: list[str]) -> list[str]:
 def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str, prefix: str) -> None:
     for key in table:
         if key not in known:
-            raise _unknown(key, list(known), f"{where}: {prefix}{key}")
-
-
-def _unknown(key: str, known: list[str], where: str) -> InputError:
-    close = difflib.get_close_matches(key, known, n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
-    return InputError("unknown key", where=where, remedy=hint)
+            raise unknown_key(key, known, f"{where}: {prefix}{key}")
