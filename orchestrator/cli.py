@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
+from orchestrator.cluster import SYSTEMS, Queue
 from orchestrator.errors import InputError, OrchestratorError, of_system
 
 INTERRUPTED = 130
@@ -54,6 +55,7 @@ VALUED = (
     "--out",
     "--workers",
     "--tolerance",
+    "--cluster",
     "--solver",
     "--from",
     "--scene",
@@ -119,6 +121,12 @@ def _add_study(commands: Any) -> None:
         metavar="X",
         help="relative error that tau_c may have: the cheapest models known to be within it",
     )
+    command.add_argument(
+        "--cluster",
+        choices=sorted(SYSTEMS),
+        metavar="QUEUE",
+        help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
+    )
     command.set_defaults(run=_study)
 
 
@@ -183,7 +191,8 @@ def _study(options: argparse.Namespace) -> int:
         study.check_tolerance(options.tolerance, "--tolerance")
         asked = replace(asked, tolerance=options.tolerance)
     out = options.out or Path("results") / asked.name
-    finished = pipeline.run(asked, out, workers=options.workers)
+    queue = Queue(options.cluster, asked.cluster) if options.cluster else None
+    finished = pipeline.run(asked, out, workers=options.workers, queue=queue)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     return _end(finished.page, finished.failures)

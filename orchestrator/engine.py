@@ -4,7 +4,7 @@ import concurrent.futures
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -166,6 +166,22 @@ def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) ->
         )
 
 
+def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
+    """See that the programs of some cases are where a pool runs them, before any is started.
+
+    Raises
+    ------
+    SolverError
+        Naming what is missing, or too old, and what to install.
+    """
+    one_of_each = {one.kind: one for one in cases}.values()
+    for future in [pool.executor.submit(one.versions) for one in one_of_each]:
+        try:
+            future.result()
+        except pool.lost as error:
+            raise _loss(error, "the first look at the solvers") from None
+
+
 def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet.
 
@@ -217,12 +233,15 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
     except OSError as error:
         return Outcome(case, error=of_system(error, case.name))
     except pool.lost as error:
-        lost = SolverError(
-            f"the processes that ran it were lost: {error}",
-            where=case.name,
-            remedy="see the logs of their jobs: out of memory, or of time?",
-        )
-        return Outcome(case, error=lost)
+        return Outcome(case, error=_loss(error, case.name))
+
+
+def _loss(error: Exception, where: str) -> SolverError:
+    return SolverError(
+        f"the processes that ran it were lost: {error}",
+        where=where,
+        remedy="the logs of their jobs say more: out of memory, or of time?",
+    )
 
 
 def _after(outcome: Outcome, agenda: Agenda) -> Iterator[Outcome]:

@@ -1,7 +1,9 @@
 """Failures that a user can act on: each says what, where and what to do."""
 
+import difflib
 import errno
 import shutil
+from collections.abc import Sequence
 from typing import ClassVar
 
 
@@ -80,3 +82,10 @@ def of_system(error: OSError, where: str = "") -> OrchestratorError:
         where=where or str(error.filename or ""),
         remedy="make room, then the same command continues" if full else "see the file system",
     )
+
+
+def unknown_key(key: str, known: Sequence[str], where: str) -> InputError:
+    """The message of a key that nothing knows; of the known ones, the nearest is the remedy."""
+    close = difflib.get_close_matches(key, known, n=1)
+    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+    return InputError("unknown key", where=where, remedy=hint)

@@ -1,12 +1,13 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator import __version__, case, engine, plan, report, tables
+from orchestrator import __version__, case, cluster, engine, plan, report, tables
 from orchestrator.case import Case
+from orchestrator.cluster import Queue
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.files import (
     canonical_json,
@@ -41,7 +42,7 @@ class Finished:
     failures: dict[str, OrchestratorError]
 
 
-def run(study: Study, out: Path, *, workers: int) -> Finished:
+def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
     """Run a study, or what is missing of it.
 
     Parameters
@@ -52,6 +53,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         Its directory; a study that is there already is continued.
     workers : int
         Cases at a time.
+    queue : Queue, optional
+        Of the cluster that runs them; without it, this machine does.
 
     Raises
     ------
@@ -98,28 +101,22 @@ def _without(cases: Mapping[str, Case], done: Container[str]) -> dict[str, Case]
 
 
 def complete(
-    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float
+    todo: dict[str, Case],
+    space: Workspace,
+    *,
+    workers: int,
+    limit_s: float,
+    queue: Queue | None = None,
 ) -> dict[str, OrchestratorError]:
     """Run cases, with a display of how far they are; the failures by the cases' names."""
-    check_solvers(todo.values())
-    with (
-        engine.local(space.cases, workers=workers, limit_s=limit_s) as pool,
-        Display(list(todo.values()), workers) as display,
-    ):
+    opened = (
+        cluster.pool(queue, space.cases, workers=workers, limit_s=limit_s)
+        if queue
+        else engine.local(space.cases, workers=workers, limit_s=limit_s)
+    )
+    with opened as pool, Display(list(todo.values()), workers) as display:
+        engine.check_solvers(todo.values(), pool)
         return engine.run(todo, pool, display)
-
-
-def check_solvers(cases: Iterable[Case]) -> None:
-    """See that the programs of some cases are here, before anything is started.
-
-    Raises
-    ------
-    SolverError
-        Naming what is missing, or too old, and what to install.
-    """
-    one_of_each: dict[str, Case] = {one.kind: one for one in cases}
-    for one in one_of_each.values():
-        one.versions()
 
 
 def redraw(out: Path) -> Finished:

@@ -5,7 +5,6 @@ The tables at the top hold for every scene. Each ``[[group]]`` overrides some of
 is one group.
 """
 
-import difflib
 import itertools
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -16,12 +15,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from orchestrator import assets, limits
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, unknown_key
 from orchestrator.scene import PileBed, Scene, UnfitError, decide_regimes, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "group")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
 TIME_LIMIT_S = 3600.0
 MOST_SCENES = 100_000
 
@@ -50,6 +49,8 @@ class Study:
         Wall time after which one solver run counts as hung, s.
     tolerance : float or None
         Relative error that tau_c may have; None: every scene as it is asked for.
+    cluster : dict
+        Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
         The file itself.
     """
@@ -59,6 +60,7 @@ class Study:
     groups: tuple[Group, ...]
     time_limit_s: float
     tolerance: float | None
+    cluster: dict[str, Any]
     text: str
 
     @property
@@ -123,7 +125,8 @@ def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
-    return Study(name, title, groups, float(limit), tolerance, text)
+    cluster = _table(data, "cluster", where)
+    return Study(name, title, groups, float(limit), tolerance, cluster, text)
 
 
 def check_tolerance(value: Any, where: str) -> None:
@@ -159,13 +162,16 @@ def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Grou
 def _merged(
     data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
 ) -> dict[str, Any]:
-    tables = (data.get(part, {}), item.get(part, {}))
-    for table in tables:
-        if not isinstance(table, dict):
-            raise InputError(
-                f"{table!r} is not a table", where=f"{where}: {part}", remedy=f"write [{part}]"
-            )
-    return {**tables[0], **tables[1]}
+    return {**_table(data, part, where), **_table(item, part, where)}
+
+
+def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    table = data.get(name, {})
+    if not isinstance(table, dict):
+        raise InputError(
+            f"{table!r} is not a table", where=f"{where}: {name}", remedy=f"write [{name}]"
+        )
+    return table
 
 
 def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> Iterator[Scene]:
@@ -241,7 +247,7 @@ def _explained(error: ValidationError, where: str) -> InputError:
     field = ".".join(path)
     given = first.get("input")
     if first["type"] == "extra_forbidden":
-        return _unknown(path[-1], _fields_beside(path), f"{where}: {field}")
+        return unknown_key(path[-1], _fields_beside(path), f"{where}: {field}")
     if first["type"] == "missing":
         return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
     return InputError(
@@ -263,10 +269,4 @@ def _fields_beside(path: list[str]) -> list[str]:
 def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str, prefix: str) -> None:
     for key in table:
         if key not in known:
-            raise _unknown(key, list(known), f"{where}: {prefix}{key}")
-
-
-def _unknown(key: str, known: list[str], where: str) -> InputError:
-    close = difflib.get_close_matches(key, known, n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
-    return InputError("unknown key", where=where, remedy=hint)
+            raise unknown_key(key, known, f"{where}: {prefix}{key}")

@@ -1,0 +1,105 @@
+"""A Slurm of two nodes for the tests of this folder, and a study to run on it."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.cluster import slurm
+from tests.cluster.slurm import Slurm
+
+STUDY = """
+time_limit = 100
+[protocol]
+step = 0.01
+quiet = 3.0
+[grain]
+diameter = 1e-3
+stiffness = 1e3
+[bed]
+kind = "pile"
+height = 0.01
+slope_deg = 15.0
+mobile_layers = 1
+packing = "disordered"
+[flow]
+cells_per_face = 20
+[axes]
+"bed.seed" = [1, 2, 3]
+[cluster]
+cores = 1
+memory = "500MB"
+interface = "lo"
+"""
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+def _here() -> None:
+    lacking = slurm.missing()
+    if importlib.util.find_spec("dask_jobqueue") is None:
+        lacking.append("dask-jobqueue")
+    if not lacking:
+        return
+    why = f"without {', '.join(lacking)}; `sh tools/setup.sh test` installs all"
+    if os.environ.get("SKIP_NOTHING"):
+        pytest.fail(why)
+    pytest.skip(why)
+
+
+@pytest.fixture(scope="session")
+def queue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slurm]:
+    """Two nodes of one core."""
+    _here()
+    with slurm.running(tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1) as found:
+        yield found
+
+
+@pytest.fixture
+def start(tmp_path: Path, queue: Slurm) -> Iterator[Start]:
+    """Start the command line in a process of its own that finds the queue."""
+    started: list[subprocess.Popen[str]] = []
+    (tmp_path / "small.toml").write_text(STUDY)
+
+    def run(*arguments: str) -> "subprocess.Popen[str]":
+        root = Path(__file__).parent.parent.parent
+        started.append(
+            subprocess.Popen(
+                [sys.executable, "-m", "orchestrator", *arguments],
+                cwd=tmp_path,
+                env={**queue.environment, "PYTHONPATH": str(root)},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+        )
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope="session")
+def local_tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The tables of the study as this machine alone makes them."""
+    folder = tmp_path_factory.mktemp("local")
+    (folder / "small.toml").write_text(STUDY)
+    subprocess.run(
+        [sys.executable, "-m", "orchestrator", "study", "small.toml", "--out", "out"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent.parent)},
+        check=True,
+        capture_output=True,
+        timeout=300,
+    )
+    return tables(folder / "out")
+
+
+def tables(out: Path) -> dict[str, bytes]:
+    """The tables of a study, byte for byte."""
+    return {path.name: path.read_bytes() for path in (out / "tables").iterdir()}

@@ -1,0 +1,189 @@
+"""A real Slurm of a few nodes on this machine, as plain processes of the user who asks for it."""
+
+import contextlib
+import getpass
+import os
+import shutil
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "squeue", "scancel", "sinfo")
+SBIN = "/usr/sbin"
+CONFIGURATION = """\
+ClusterName=here
+SlurmctldHost=localhost(127.0.0.1)
+SlurmctldPort={controller}
+SlurmUser={user}
+SlurmdUser={user}
+StateSaveLocation={root}/state
+SlurmdSpoolDir={root}/spool-%n
+SlurmctldPidFile={root}/slurmctld.pid
+SlurmdPidFile={root}/slurmd-%n.pid
+SlurmctldLogFile={root}/slurmctld.log
+SlurmdLogFile={root}/slurmd-%n.log
+AuthType=auth/munge
+AuthInfo=socket={root}/munge.socket
+CryptoType=crypto/munge
+ProctrackType=proctrack/pgid
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+JobCompType=jobcomp/none
+MpiDefault=none
+SwitchType=switch/none
+ReturnToService=2
+SlurmdParameters=config_overrides
+MailProg=/bin/true
+KillWait=5
+SchedulerParameters=batch_sched_delay=0,sched_min_interval=10000,sched_interval=1,bf_interval=1
+NodeName=n[1-{nodes}] NodeHostname=localhost NodeAddr=127.0.0.1 Port=[{first}-{last}] CPUs={cores}\
+ RealMemory=4000
+PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+"""
+
+
+@dataclass(frozen=True)
+class Slurm:
+    """A running Slurm.
+
+    Attributes
+    ----------
+    configuration : Path
+        Its slurm.conf, for the environment of whoever uses it.
+    """
+
+    configuration: Path
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The environment in which its commands, and programs that call them, find it."""
+        return {**os.environ, "SLURM_CONF": str(self.configuration)}
+
+    def says(self, *command: str) -> str:
+        """What one of its commands prints."""
+        return subprocess.run(
+            command, env=self.environment, capture_output=True, text=True, check=True, timeout=60
+        ).stdout
+
+    def jobs(self) -> dict[str, str]:
+        """Ids of the jobs that have not ended, with their state."""
+        lines = self.says("squeue", "--noheader", "--format=%i %T").splitlines()
+        return dict(line.split() for line in lines)
+
+
+def missing() -> list[str]:
+    """Programs that a Slurm here lacks."""
+    path = os.pathsep.join([os.environ.get("PATH", ""), SBIN])
+    return [program for program in PROGRAMS if not shutil.which(program, path=path)]
+
+
+@contextlib.contextmanager
+def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
+    """Start munge, the controller and the nodes in a directory; end them with all their jobs."""
+    configuration = _configure(root, nodes, cores)
+    slurm = Slurm(configuration)
+    daemons = [
+        [
+            f"{SBIN}/munged",
+            "--foreground",
+            "--force",
+            *(f"--{name}={root}/munge.{name.removesuffix('-file')}" for name in MUNGE_FILES),
+        ],
+        [f"{SBIN}/slurmctld", "-D", "-c"],
+        *([f"{SBIN}/slurmd", "-D", "-N", f"n{node}"] for node in range(1, nodes + 1)),
+    ]
+    with contextlib.ExitStack() as stack:
+        for command in daemons:
+            stack.enter_context(_daemon(command, root, slurm.environment))
+            if command is daemons[0]:
+                _until((root / "munge.socket").exists, "munged", root)
+        _until(lambda: _idle(slurm) == nodes, "idle nodes", root)
+        try:
+            yield slurm
+        finally:
+            slurm.says("scancel", "--user", getpass.getuser())
+            _until(lambda: not slurm.jobs(), "the end of all jobs", root)
+
+
+MUNGE_FILES = ("key-file", "socket", "pid-file", "log-file", "seed-file")
+
+
+def _configure(root: Path, nodes: int, cores: int) -> Path:
+    root.mkdir(parents=True)
+    for folder in ("state", *(f"spool-n{node}" for node in range(1, nodes + 1))):
+        (root / folder).mkdir()
+    key = root / "munge.key"
+    key.write_bytes(os.urandom(128))
+    key.chmod(0o600)
+    first, controller = _free_ports(nodes), _free_ports(1)
+    path = root / "slurm.conf"
+    path.write_text(
+        CONFIGURATION.format(
+            root=root,
+            user=getpass.getuser(),
+            controller=controller,
+            nodes=nodes,
+            first=first,
+            last=first + nodes - 1,
+            cores=cores,
+        )
+    )
+    return path
+
+
+def _free_ports(count: int) -> int:
+    """The first of so many neighbouring ports that nobody listens on."""
+    while True:
+        with contextlib.ExitStack() as stack:
+            sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+            try:
+                sockets[0].bind(("127.0.0.1", 0))
+                first: int = sockets[0].getsockname()[1]
+                for place, one in enumerate(sockets[1:], 1):
+                    one.bind(("127.0.0.1", first + place))
+            except (OSError, OverflowError):
+                continue
+            return first
+
+
+@contextlib.contextmanager
+def _daemon(command: list[str], root: Path, environment: dict[str, str]) -> Iterator[None]:
+    with (root / "daemons.log").open("ab") as log:
+        # a test run that is killed leaves no daemon
+        process = subprocess.Popen(
+            ["setpriv", "--pdeathsig", "KILL", "--", *command],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+        )
+    try:
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _idle(slurm: Slurm) -> int:
+    try:
+        return slurm.says("sinfo", "--noheader", "--Node", "--format=%t").split().count("idle")
+    except subprocess.CalledProcessError:
+        return 0
+
+
+def _until(condition: Callable[[], bool], what: str, root: Path) -> None:
+    for _ in range(600):
+        if condition():
+            return
+        time.sleep(0.1)
+    raise RuntimeError(f"waited in vain for {what}; see the logs in {root}")

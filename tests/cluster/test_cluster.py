@@ -1,0 +1,119 @@
+"""A study on a real Slurm of two nodes: the same bytes, whatever happens to its jobs."""
+
+import os
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cluster.conftest import Start, tables
+from tests.cluster.slurm import Slurm
+
+ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--workers", "2")
+
+
+def _until(condition: Callable[[], object]) -> None:
+    for _ in range(1200):
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError("waited in vain")
+
+
+def _at_work(cases: Path) -> set[str]:
+    """Cases that a solver of LIGGGHTS is in the middle of."""
+    begun = {path.parent.name for path in cases.glob("pile-*/levels.csv")}
+    return begun - {path.parent.name for path in cases.glob("*/done.json")}
+
+
+def _solvers(cases: Path) -> int:
+    """Programs that run in a case directory, on any node."""
+    count = 0
+    for entry in Path("/proc").iterdir():
+        try:
+            inside = Path(os.readlink(entry / "cwd")).is_relative_to(cases)
+            count += entry.name.isdigit() and inside
+        except OSError:
+            continue
+    return count
+
+
+def _end(driver: "subprocess.Popen[str]") -> None:
+    _, said = driver.communicate(timeout=200)
+    assert driver.returncode == 0, said
+    assert "Traceback" not in said, said
+
+
+def test_two_nodes_give_the_bytes_of_one_machine(
+    start: Start, queue: Slurm, tmp_path: Path, local_tables: dict[str, bytes]
+) -> None:
+    _end(start(*ON_SLURM))
+    assert tables(tmp_path / "out") == local_tables
+    logs = "".join(path.read_text() for path in (tmp_path / "out" / "jobs").glob("*.err"))
+    assert "ON n1" in logs
+    assert "ON n2" in logs
+    assert not list((tmp_path / "out" / "cases").glob(".*"))
+    _until(lambda: not queue.jobs())
+
+
+def test_a_cancelled_job_is_made_up_for(
+    start: Start, queue: Slurm, tmp_path: Path, local_tables: dict[str, bytes]
+) -> None:
+    cases = tmp_path / "out" / "cases"
+    driver = start(*ON_SLURM)
+    _until(lambda: len(_at_work(cases)) == 2)
+    first = set(queue.jobs())
+    queue.says("scancel", *first)
+    _end(driver)
+    assert tables(tmp_path / "out") == local_tables
+    assert not _solvers(cases)
+
+
+def test_a_killed_driver_is_continued(
+    start: Start, tmp_path: Path, local_tables: dict[str, bytes]
+) -> None:
+    cases = tmp_path / "out" / "cases"
+    driver = start(*ON_SLURM)
+    _until(lambda: list(cases.glob("pile-*/done.json")) and _at_work(cases))
+    before = {path: path.stat().st_mtime_ns for path in cases.glob("*/done.json")}
+    driver.kill()
+    driver.communicate()
+    _end(start(*ON_SLURM))
+    assert tables(tmp_path / "out") == local_tables
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert not _solvers(cases)
+
+
+def _refused(driver: "subprocess.Popen[str]", *words: str) -> None:
+    _, said = driver.communicate(timeout=100)
+    assert driver.returncode not in (0, None)
+    assert "Traceback" not in said, said
+    lines = [line for line in said.splitlines() if line.startswith("orchestrator")]
+    assert len(lines) == 1, said
+    for word in words:
+        assert word in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ('memmory = "1GB"', ["cluster.memmory", "did you mean memory"]),
+        ('queue = "nowhere"', ["slurm does not take the job", "invalid partition"]),
+        ('interface = "none0"', ["none0", "[cluster]"]),
+    ],
+)
+def test_settings_that_make_no_jobs_are_refused(
+    start: Start, tmp_path: Path, settings: str, words: list[str]
+) -> None:
+    path = tmp_path / "small.toml"
+    text = path.read_text().replace('interface = "lo"', "")
+    path.write_text(text + ("" if "interface" in settings else 'interface = "lo"\n') + settings)
+    _refused(start(*ON_SLURM), *words)
+
+
+def test_a_job_without_cores_is_refused(start: Start, tmp_path: Path) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(path.read_text().replace("cores = 1", ""))
+    _refused(start(*ON_SLURM), "cores", "[cluster]")
