@@ -86,7 +86,7 @@ class PileBed(Bed):
     packing: Packing = "aligned"
     """rows along the windward slope, level rows, or rows along the slope with random gaps"""
     disorder: Annotated[float, Field(gt=0, le=0.2)] = 0.02
-    """largest gap between two grains of the row under the mobile ones, d; if disordered"""
+    """largest gap between two grains of the row under the four uppermost, d; if disordered"""
     seed: Annotated[int, Field(ge=0)] = 0
     """which of the many disordered packings"""
     mobile_layers: Annotated[int, Field(ge=1)] = 2

@@ -81,6 +81,8 @@ def _affordable(part: Part, scene: Scene) -> Iterator[Rung]:
     assert isinstance(scene.bed, PileBed)
     face = scene.bed.height / math.sin(math.radians(scene.bed.slope_deg))
     for one in rungs.LADDER[part]:
+        if one.on_lattices and scene.bed.packing == "disordered":
+            continue
         if one.most_grains is None or face / scene.grain.diameter <= one.most_grains:
             yield one
 

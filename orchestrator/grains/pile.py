@@ -74,7 +74,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 5
+    recipe: ClassVar[int] = 6
 
     @property
     def bed(self) -> PileBed:
@@ -126,7 +126,9 @@ class PileCase(GrainCase):
         """Expected wall time, s."""
         rules = self.scene.protocol
         count = self.bed.height / np.sin(np.radians(self.bed.slope_deg)) / self.scene.grain.diameter
-        grains = count * (self.bed.mobile_layers + 3)
+        # the whole pile is half its rows thick on average
+        layers = min(self.bed.mobile_layers, self.bed.height / self.scene.grain.diameter / 2)
+        grains = count * (layers + 3)
         holds = np.log(3.5) / np.log1p(rules.step)
         return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
 

@@ -18,7 +18,7 @@ COLUMNS: dict[str, str] = {
     "z0_over_d": "roughness length over diameter",
     "h_m": "height of the pile's bed line",
     "packing": "pattern of the pile's grains",
-    "disorder": "largest gap in the row under the mobile ones, d; of disordered packings",
+    "disorder": "largest gap in the row under the four uppermost, d; of disordered packings",
     "seed": "which of the many disordered packings",
     "mobile_layers": "layers of the windward face that may move",
     "closure": "low: Eqs. 2, 3; high: Eqs. 4, 5",
