@@ -67,10 +67,11 @@ class CellsCase(GrainCase):
             "gravity": GRAVITY,
             **protocol.contact(self._grain, rules),
             **protocol.raising(rules, enough=0),
-            # no face, no ceiling: the planes lie far above the box
+            # no face, no ceiling, no crest: the planes lie far outside the box
             "slope": 0.0,
             "ceiling_x": 0.0,
             "ceiling_z": 1e3 * DIAMETER,
+            "behind": 1e3 * DIAMETER,
         }
         holds = protocol.holds(protocol.START, LAST, rules.step)
         deck.write(directory, self._grains(), parameters, holds, margin=4 * DIAMETER)

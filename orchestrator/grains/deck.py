@@ -35,6 +35,7 @@ MEANING = {
     "slope": "of both faces, degrees",
     "ceiling_x": "ridge of the roof above which a grain in flight is gone, m",
     "ceiling_z": "its height, m",
+    "behind": "place along x behind which every grain is gone, m",
 }
 """Parameters of the deck, with their units."""
 
@@ -68,6 +69,11 @@ class GrainTable:
     def counted_ids(self) -> NDArray[np.int64]:
         """Ids (from 1) of the grains whose motion is counted."""
         return np.flatnonzero(self.kind == COUNTED) + 1
+
+    @property
+    def last_mobile(self) -> float:
+        """The furthest x of a grain that may move, m."""
+        return float(self.position[self.kind != FIXED, 0].max())
 
     @property
     def mobile_count(self) -> int:

@@ -158,7 +158,7 @@ class PileCase(GrainCase):
         last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-        d = self.scene.grain.diameter
+        d, grains = self.scene.grain.diameter, self._grains(speed)
         ceiling = (MARGIN + 0.5) / np.cos(np.radians(self.bed.slope_deg))
         parameters = {
             "diameter": d,
@@ -170,10 +170,11 @@ class PileCase(GrainCase):
             "slope": self.bed.slope_deg,
             "ceiling_x": self.triangle.crest[0] * d,
             "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
+            "behind": grains.last_mobile + protocol.AWAY * d,
         }
         first, last = protocol.START * thresholds[0], protocol.BEYOND * last
         holds = protocol.holds(first, last, rules.step)
-        deck.write(directory, self._grains(speed), parameters, holds, margin=MARGIN * d)
+        deck.write(directory, grains, parameters, holds, margin=MARGIN * d)
 
     @property
     def _reach(self) -> float:

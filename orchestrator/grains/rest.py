@@ -19,7 +19,7 @@ in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time ste
 thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
 DECAY = 0.5
 """The energy still falls when the last quarter of the settling has less than this part of the
-energy of the quarter before, and grows when it has more than 1/DECAY of it."""
+second quarter's, and grows when it has more than 1/DECAY of it."""
 BURST = 10.0
 """Kinetic energy per grain, over W d, that no fall of a grain can give it."""
 REMEDY = "a smaller protocol.timestep or grain.damping, or look for grains that overlap"
@@ -70,7 +70,7 @@ def check(
 
 def _judge(energy: FloatArray, where: str) -> None:
     """See that grains which are all there are at rest; energy in W^2/K at each look."""
-    before, last = (float(part.mean()) for part in np.array_split(energy, 4)[2:])
+    _, before, _, last = (float(part.mean()) for part in np.array_split(energy, 4))
     if last < NOISE or last < DECAY * before:
         return
     said = f"{last:.2g} W^2/K of kinetic energy per grain after settling"
