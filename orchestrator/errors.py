@@ -2,6 +2,7 @@
 
 import errno
 import shutil
+from typing import ClassVar
 
 
 class OrchestratorError(Exception):
@@ -41,6 +42,25 @@ class SolverError(OrchestratorError):
     """A solver is missing, or its run did not end as it must."""
 
     exit_code = 3
+    ended: ClassVar[str] = "failed"
+
+
+class Exploded(SolverError):  # noqa: N818 - an end, not an error
+    """A run that diverged or blew up."""
+
+    ended: ClassVar[str] = "exploded"
+
+
+class Noisy(SolverError):  # noqa: N818 - an end, not an error
+    """A run whose bed does not come to rest."""
+
+    ended: ClassVar[str] = "noisy"
+
+
+class Stalled(SolverError):  # noqa: N818 - an end, not an error
+    """A run that hangs or cycles instead of converging."""
+
+    ended: ClassVar[str] = "stalled"
 
 
 class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error
