@@ -176,9 +176,10 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
 
 def test_no_pile_has_more_rows_than_its_height() -> None:
     triangle = packing.Triangle(20.0, 10.0)
-    numbers = {"entrainment_angle_deg": 60.0, "gap": 1 / 30}
     most, more = (
-        packing.pile(triangle, **numbers, pattern="aligned", mobile_layers=layers)
-        for layers in (20, 1000)
+        packing.pile(
+            triangle, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=n
+        )
+        for n in (20, 1000)
     )
     np.testing.assert_array_equal(most.mobile, more.mobile)

@@ -10,13 +10,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.case import Case
-from orchestrator.errors import InputError, SolverError
+from orchestrator.errors import Exploded, InputError, SolverError
+from orchestrator.flow import diagnostics
+from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
 from orchestrator.scene import BUILDABLE_DEG, Convection, Turbulence
 from orchestrator.solvers import openfoam
 
 WALL_STRESS = "wall_stress.csv"
+DIAGNOSTICS = "diagnostics.csv"
 LID_OVER_HEIGHT = 10.0
 FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
 """Of the last iteration; epsilon or omega, as the turbulence model has it."""
@@ -77,7 +80,7 @@ class FlowCase(Case):
     template: ClassVar[str] = "openfoam/pile"
     recipe: ClassVar[int] = 4
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
-    derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
+    derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
         "[1-9]*/**/*",
         "constant/polyMesh/**/*",
@@ -171,21 +174,31 @@ class FlowCase(Case):
         write_mesh(directory)
 
     def collect(self, directory: Path) -> None:
-        """Check the run and write `wall_stress.csv`.
+        """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
 
         Raises
         ------
         SolverError
-            If the run failed or did not converge, or if the stress is not usable.
+            If the run failed or did not converge, or if the stress is not usable; as `Exploded` or
+            `Stalled` where that is how it ended.
         """
         openfoam.check_log(directory)
         stress = read_openfoam(directory)
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
+        found = diagnostics.of(
+            stress,
+            slope_deg=self.slope_deg,
+            height=self.height_m,
+            roughness=self.roughness_m,
+            reynolds=self.ustar0_m_s / self.viscosity_m2_s,
+        )
+        diagnostics.to_csv(found, directory / DIAGNOSTICS)
+        self._check_upstream(found["upstream_ustar_over_ustar0"], directory)
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
-            raise SolverError("the stress on the bed is not a number", where=str(directory))
+            raise Exploded("the stress on the bed is not a number", where=str(directory))
         low, high = stress.z_e_m.min(), stress.z_e_m.max()
         # flat parts of the bed have it larger by 1/cos(slope)
         if not 0.48 * self.first_cell_m < low <= high < 0.7 * self.first_cell_m:
@@ -193,6 +206,14 @@ class FlowCase(Case):
                 f"z_e goes from {low:g} to {high:g} m, with first cells of {self.first_cell_m:g} m",
                 where=str(directory),
                 remedy="remove the case and run it again",
+            )
+
+    def _check_upstream(self, upstream: Diagnostic, directory: Path) -> None:
+        if not upstream.sound:
+            raise SolverError(
+                f"on the undisturbed bed u* is {upstream.value:.3f} u*_0: the wall's log law fails",
+                where=str(directory),
+                remedy=f"{DIAGNOSTICS} says more; raise the first cell's height or the speed",
             )
 
 

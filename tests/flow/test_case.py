@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from orchestrator import case
-from orchestrator.errors import InputError, SolverError
-from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.errors import Exploded, InputError, SolverError, Stalled
+from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, read_openfoam
 from orchestrator.scene import Turbulence, default_first_cell_height
 from orchestrator.solvers import openfoam, process
@@ -192,7 +192,7 @@ def test_a_killed_script_takes_the_solver_with_it(tmp_path: Path) -> None:
 
 def test_a_time_limit_ends_the_solver(tmp_path: Path) -> None:
     directory = case.prepare(SLOW, tmp_path)
-    ended = allrun(directory, limit_s=1.5)
+    ended = allrun(directory, limit_s=2.5)
     assert ended.timed_out
     pid = solver_pid(directory)
     wait_for(lambda: not is_alive(pid))
@@ -208,15 +208,17 @@ def test_a_diverged_run(tmp_path: Path, trap: str, cause: str) -> None:
     directory = case.prepare(PILE, tmp_path)
     edit(directory / "system" / "fvSolution", "consistent      yes;", "consistent      no;")
     assert allrun(directory, FOAM_SIGFPE=trap).returncode != 0
-    with pytest.raises(SolverError, match=f"simpleFoam diverged: .*{cause}"):
+    with pytest.raises(Exploded, match=f"simpleFoam diverged: .*{cause}"):
         PILE.collect(directory)
 
 
 def test_a_run_that_needs_more_iterations(tmp_path: Path) -> None:
     directory = case.prepare(PILE, tmp_path)
-    edit(directory / "system" / "controlDict", "2000;", "30;")
+    edit(
+        directory / "system" / "controlDict", "endTime             1000;", "endTime             30;"
+    )
     assert allrun(directory).returncode == 1
-    with pytest.raises(SolverError, match=r"did not converge: .* after iteration 30"):
+    with pytest.raises(Stalled, match=r"did not converge: .* after iteration 30"):
         PILE.collect(directory)
 
 
@@ -280,6 +282,29 @@ def test_more_correctors_give_the_same_stress(solve: Solve) -> None:
     assert windward_mean(solve(more), more) == pytest.approx(
         windward_mean(solve(PILE), PILE), rel=1e-3
     )
+
+
+def test_a_sound_run_says_so(solve: Solve) -> None:
+    rows = (solve(PILE) / DIAGNOSTICS).read_text().splitlines()
+    assert len(rows) == 5
+    assert all(row.endswith(",yes") for row in rows[1:])
+
+
+def test_upwind_convection_reattaches_too_early(solve: Solve) -> None:
+    upwind = replace(PILE, convection="upwind", cells_per_face=40)
+    assert "reattachment_over_h,3." in (solve(upwind) / DIAGNOSTICS).read_text()
+    assert (solve(upwind) / DIAGNOSTICS).read_text().splitlines()[-1].endswith(",no")
+
+
+@pytest.mark.parametrize("change", [{"viscosity_m2_s": 1e-3}, {"first_cell_m": 5e-5}])
+def test_a_wall_function_out_of_its_range_is_seen_upstream(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    beyond = replace(PILE, **change)
+    directory = case.prepare(beyond, tmp_path)
+    assert allrun(directory).returncode == 0
+    with pytest.raises(SolverError, match=r"on the undisturbed bed u\* is (1\.|0\.9)"):
+        beyond.collect(directory)
 
 
 def test_who_a_case_is() -> None:
