@@ -23,7 +23,7 @@ MARGIN = 3.0
 class Bed:
     """The grains of a pivot or a pile, and the force on each in each hold.
 
-    The counted grains come first.
+    The counted grains come first, the fixed ones last.
     """
 
     def __init__(self, case):
@@ -32,7 +32,9 @@ class Bed:
         self.is_pivot = self.scene["kind"] == "pivot"
         if self.is_pivot:
             rows = [{**row, "kind": row["kind"].replace("mobile", "counted")} for row in rows]
-        self.grains = sorted(rows, key=lambda row: row["kind"] != "counted")
+        # LAMMPS wants the highest id never to leave
+        order = {"counted": 0, "fixed": 2}
+        self.grains = sorted(rows, key=lambda row: order.get(row["kind"], 1))
         self.holds = table(case / "holds.csv")
         self.counted = sum(row["kind"] == "counted" for row in rows)
         alpha = math.radians(self.scene["alpha_deg"])

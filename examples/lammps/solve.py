@@ -106,7 +106,11 @@ def _passed(start, now, bed, marker):
 def run(deck, *variables):
     """Run LAMMPS on a deck in the working directory."""
     command = ["lmp", "-in", deck, "-nocite", "-log", "none", *variables]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    with open("log.txt", "w") as log:
+        code = subprocess.call(command, stdout=log, stderr=log)
+    if code != 0:
+        said = Path("log.txt").read_text().splitlines()
+        sys.exit("\n".join(line for line in said if line.startswith("ERROR")))
 
 
 def check(kind, scene):
