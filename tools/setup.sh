@@ -1,9 +1,10 @@
 #!/bin/sh
 # Makes a Debian 12 machine ready.  A second call finds all in place and asks no server for anything.
 #
-#   sh tools/setup.sh run    Debian packages, and .venv with what requirements.lock pins
-#   sh tools/setup.sh test   the same, and what requirements-test.lock pins
-#   sh tools/setup.sh lock   resolve pyproject.toml anew into the two lock files
+#   sh tools/setup.sh run      Debian packages, and .venv with what requirements.lock pins
+#   sh tools/setup.sh cluster  the same, and the extra [cluster]: what requirements-cluster.lock pins
+#   sh tools/setup.sh test     the same, a Slurm to test it with, and what requirements-test.lock pins
+#   sh tools/setup.sh lock     resolve pyproject.toml anew into the three lock files
 set -eu
 unset CDPATH
 cd -- "$(dirname -- "$0")/.."
@@ -11,6 +12,8 @@ cd -- "$(dirname -- "$0")/.."
 solvers="openfoam liggghts"
 # What the gmsh wheel links against.
 gmsh_libraries="libgl1 libglu1-mesa libxft2 libxcursor1 libxinerama1 libgomp1"
+# What the tests of a cluster start nodes with; filled in for the tests alone.
+slurm=
 
 environment=.venv
 # Written last, so that a set-up cut short leaves none: the checksums of the lock files installed.
@@ -23,7 +26,7 @@ die() {
 }
 
 missing_packages() {
-    wanted="$solvers $gmsh_libraries"
+    wanted="$solvers $gmsh_libraries $slurm"
     # Any Python will do to make the environment with; Debian's comes without the means.
     if ! venv_works && ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
         wanted="python3 python3-venv $wanted"
@@ -102,7 +105,10 @@ pip_install() { pip install --no-user --only-binary :all: "$@"; }
 install_venv() {
     lacking="$*"
     if venv_holds requirements.lock; then
-        lacking=requirements-test.lock
+        lacking=
+        for file in "$@"; do
+            venv_holds "$file" || lacking="$lacking $file"
+        done
         rm -f "$stamp"
     else
         say "making $environment"
@@ -130,14 +136,19 @@ set_up() {
     exec 9<&-
 }
 
-# The dependencies that pyproject.toml names, one a line: those of the package, or those of the tests.
+# The dependencies that pyproject.toml names, one a line: the package's, its extra's or the tests'.
 dependencies() {
     "$environment/bin/python" -c '
 import sys, tomllib
 with open("pyproject.toml", "rb") as file:
     data = tomllib.load(file)
-run, test = data["project"]["dependencies"], data["dependency-groups"]["test"]
-print(*(run if sys.argv[1] == "run" else test), sep="\n")
+project = data["project"]
+wanted = {
+    "run": project["dependencies"],
+    "cluster": project["optional-dependencies"]["cluster"],
+    "test": data["dependency-groups"]["test"],
+}
+print(*wanted[sys.argv[1]], sep="\n")
 ' "$1"
 }
 
@@ -147,20 +158,29 @@ lock() {
     trap 'rm -rf "$scratch"' EXIT
     environment=$scratch/venv
     python3 -m venv "$environment"
-    dependencies run >"$scratch/run.in"
-    pip_install -r "$scratch/run.in"
-    pip freeze >"$scratch/run.lock"
-    dependencies test >"$scratch/test.in"
-    pip_install -c "$scratch/run.lock" -r "$scratch/test.in"
-    pip freeze | grep -vxFf "$scratch/run.lock" >"$scratch/test.lock"
     header="# Written by make lock with $("$environment/bin/python" -V) on $(uname -sm)."
-    { echo "$header" && cat "$scratch/run.lock"; } >requirements.lock
-    { echo "$header" && cat "$scratch/test.lock"; } >requirements-test.lock
+    : >"$scratch/pinned"
+    lock_part run requirements.lock
+    lock_part cluster requirements-cluster.lock
+    lock_part test requirements-test.lock
+}
+
+# Pins what a part needs beside the parts before it.
+lock_part() {
+    dependencies "$1" >"$scratch/$1.in"
+    pip_install -c "$scratch/pinned" -r "$scratch/$1.in"
+    pip freeze | grep -vxFf "$scratch/pinned" >"$scratch/$1.lock"
+    { echo "$header" && cat "$scratch/$1.lock"; } >"$2"
+    cat "$scratch/$1.lock" >>"$scratch/pinned"
 }
 
 case ${1-} in
 run) set_up requirements.lock ;;
-test) set_up requirements.lock requirements-test.lock ;;
+cluster) set_up requirements.lock requirements-cluster.lock ;;
+test)
+    slurm="slurmctld slurmd slurm-client munge"
+    set_up requirements.lock requirements-cluster.lock requirements-test.lock
+    ;;
 lock) lock ;;
-*) die "usage: sh tools/setup.sh run|test|lock" ;;
+*) die "usage: sh tools/setup.sh run|cluster|test|lock" ;;
 esac

@@ -15,7 +15,7 @@ from tests.cluster.slurm import Slurm
 STUDY = """
 time_limit = 100
 [protocol]
-step = 0.01
+step = 0.006
 quiet = 3.0
 [grain]
 diameter = 1e-3
