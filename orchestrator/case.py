@@ -209,6 +209,8 @@ def programs(cases: Path) -> dict[str, str]:
 def _vouched(directory: Path, state: dict[str, Any]) -> bool:
     try:
         digests = {**state["results_sha256"], **state["derived_sha256"]}
+        if not state["wall_s"] >= state["solver_s"] >= 0:
+            return False
         dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
         return bool(digests) and all(
             name in dropped or digest_file(directory / name) == digest

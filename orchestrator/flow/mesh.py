@@ -1,6 +1,7 @@
 """The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
 
 import re
+import signal
 import threading
 from math import cos, radians
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
+from orchestrator.solvers import process
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
@@ -41,8 +43,9 @@ def write_mesh(directory: Path) -> None:
 
 def _generate(directory: Path) -> None:
     gmsh = _gmsh()
-    # the default installs a signal handler, which only the main thread may
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    with process.handler_kept(signal.SIGTERM):
+        # the default installs a signal handler, which only the main thread may
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(directory / "pile.geo"))
