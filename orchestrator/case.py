@@ -225,6 +225,8 @@ def programs(cases: Path) -> dict[str, str]:
 def _vouched(directory: Path, state: dict[str, Any]) -> bool:
     try:
         digests = {**state["results_sha256"], **state["derived_sha256"]}
+        if not state["wall_s"] >= state["solver_s"] >= 0:
+            return False
         dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
         stamps, marked = state.get("stamps", {}), (directory / DONE).stat().st_mtime_ns
         return bool(digests) and all(

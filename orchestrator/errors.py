@@ -6,6 +6,9 @@ import shutil
 from collections.abc import Sequence
 from typing import ClassVar
 
+MOST = 400
+"""Characters of a message's place, cause and remedy, each."""
+
 
 class OrchestratorError(Exception):
     """A failure with a place and a remedy; the command line prints it without a traceback.
@@ -29,9 +32,15 @@ class OrchestratorError(Exception):
         super().__init__(what, where, remedy)
 
     def __str__(self) -> str:
-        place = f"{self.where}: " if self.where else ""
-        advice = f" ({self.remedy})" if self.remedy else ""
-        return f"{place}{self.what}{advice}"
+        place = f"{_line(self.where)}: " if self.where else ""
+        advice = f" ({_line(self.remedy)})" if self.remedy else ""
+        return f"{place}{_line(self.what)}{advice}"
+
+
+def _line(text: str) -> str:
+    """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
+    cut = text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)
 
 
 class InputError(OrchestratorError):

@@ -92,5 +92,5 @@ def read_json(path: Path) -> Any | None:
     """The file's value, or None where it is missing or cannot be read: unreadable is undone."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None

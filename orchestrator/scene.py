@@ -89,7 +89,7 @@ class PileBed(Bed):
     """largest gap between two grains of the row under the four uppermost, d; if disordered"""
     seed: Annotated[int, Field(ge=0)] = 0
     """which of the many disordered packings"""
-    mobile_layers: Annotated[int, Field(ge=1)] = 2
+    mobile_layers: Annotated[int, Field(ge=1, le=1000)] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
 
 
@@ -104,7 +104,7 @@ class Flow(Part):
     """nu of that solve, m2/s: the wall is rough, the fluid's own nu moves only the grain's Re*"""
     first_cell_height: Positive | None = None
     """of the mesh on the bed, m; default: `default_first_cell_height`"""
-    cells_per_face: Annotated[int, Field(ge=10)] = 40
+    cells_per_face: Annotated[int, Field(ge=10, le=400)] = 40
     """of the mesh along each face of the pile"""
     growth: Annotated[float, Field(gt=1, le=2)] = 1.1
     """of the mesh: ratio of neighbouring cells up from the bed and away from the pile, with 40

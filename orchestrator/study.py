@@ -6,6 +6,8 @@ is one group.
 """
 
 import itertools
+import os
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -84,7 +86,7 @@ def load(source: str, *, guarded: bool = True) -> Study:
     """
     preset = assets.presets() / f"{source}.toml"
     path = preset if source in preset_names() else Path(source)
-    if not path.is_file():
+    if not _is_file(path):
         known = ", ".join(preset_names())
         raise InputError(
             "there is no such study file, nor a preset of this name",
@@ -95,7 +97,18 @@ def load(source: str, *, guarded: bool = True) -> Study:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None
-    return parse(text, name=path.stem, where=source, guarded=guarded)
+    # a file's name may be bytes that are no text; the page and the tables are text
+    name = os.fsencode(path.stem).decode("utf-8", "replace")
+    if name.strip(".") == "":
+        raise InputError("a file of dots names no study", where=source, remedy="rename it")
+    return parse(text, name=name, where=source, guarded=guarded)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False
 
 
 def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
@@ -110,7 +123,9 @@ def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError("tables or lists are nested too deeply", where=where) from None
+    except ValueError as error:
         raise InputError(f"not TOML: {error}", where=where) from None
     _known(data, TOP_KEYS, where, "")
     limit = data.get("time_limit", TIME_LIMIT_S)
@@ -223,7 +238,8 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool
     bed = {"kind": "grain", **parts["bed"]}
     diameter = parts["grain"].get("diameter")
     try:
-        if isinstance(diameter, int | float):
+        # of a number beyond all floats the model says itself that it is wrong
+        if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
             bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
         scene = Scene.model_validate({**parts, "bed": bed})
         if guarded:

@@ -71,14 +71,14 @@ class Workspace:
         InputError
             If the directory holds no study.
         """
-        value = read_json(self.root / MARKER)
-        if not isinstance(value, dict) or not {"name", "cases"} <= value.keys():
+        value: Any = read_json(self.root / MARKER)
+        if not _describes(value):
             raise InputError(
                 "there is no study in this directory",
                 where=str(self.root),
                 remedy="name the directory that a study was written to",
             )
-        return value
+        return dict(value)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -117,3 +117,11 @@ class Workspace:
     def is_held(self) -> bool:
         """Whether a running process holds the study."""
         return lock.holder(self.root / LOCK) is not None
+
+
+def _describes(value: Any) -> bool:
+    try:
+        texts = [value["name"], value.get("study", ""), *value["cases"]]
+    except (AttributeError, KeyError, TypeError):
+        return False
+    return isinstance(value["cases"], list) and all(isinstance(text, str) for text in texts)

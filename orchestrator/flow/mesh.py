@@ -1,6 +1,7 @@
 """The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
 
 import re
+import signal
 import threading
 from dataclasses import dataclass
 from math import cos, radians
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
+from orchestrator.solvers import process
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
@@ -60,8 +62,9 @@ def write_mesh(directory: Path) -> None:
     """
     gmsh = _gmsh()
     with _GMSH:
-        # the default installs a signal handler, which only the main thread may
-        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        with process.handler_kept(signal.SIGTERM):
+            # the default installs a signal handler, which only the main thread may
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
         try:
             _check(_generated(gmsh, directory), directory)
             gmsh.write(str(directory / "pile.msh"))

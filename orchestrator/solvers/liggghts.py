@@ -35,7 +35,8 @@ def version() -> str:
         )
     try:
         said = subprocess.run(
-            [path, "-h"],
+            # without the option it leaves a log wherever the user happens to be
+            [path, "-h", "-log", "none"],
             capture_output=True,
             text=True,
             timeout=30,

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,8 @@ GRACE_S = 2.0
 POLL_S = 0.02
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
+_SIGACTION_BYTES = 512
+"""More than a `struct sigaction` takes on any machine."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,20 @@ def _dies_with_its_parent() -> list[str]:
     """Without this a killed driver leaves its solver running; util-linux has it since 2.33."""
     setpriv = shutil.which("setpriv")
     return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []
+
+
+@contextlib.contextmanager
+def handler_kept(number: signal.Signals) -> Iterator[None]:
+    """Undo what a library does to the handler of a signal; gmsh resets that of SIGTERM.
+
+    Python sets handlers in its main thread alone; the C library does in any.
+    """
+    c, kept = ctypes.CDLL(None), ctypes.create_string_buffer(_SIGACTION_BYTES)
+    c.sigaction(number, None, kept)
+    try:
+        yield
+    finally:
+        c.sigaction(number, kept, None)
 
 
 def follow(parent: int) -> None:
