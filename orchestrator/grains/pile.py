@@ -166,7 +166,6 @@ class PileCase(GrainCase):
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
             **protocol.raising(rules, int((1 - rules.until) * self.packing.count + 1e-9)),
-            "away": max(protocol.AWAY, self._reach),
             "slope": self.bed.slope_deg,
             "ceiling_x": self.triangle.crest[0] * d,
             "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
@@ -175,13 +174,6 @@ class PileCase(GrainCase):
         first, last = protocol.START * thresholds[0], protocol.BEYOND * last
         holds = protocol.holds(first, last, rules.step)
         deck.write(directory, grains, parameters, holds, margin=MARGIN * d)
-
-    @property
-    def _reach(self) -> float:
-        """How far behind the crest a mobile grain lies, and a place to lie on, d."""
-        return (
-            float((self.packing.centres[self.packing.mobile, 0]).max() - self.triangle.crest[0]) + 2
-        )
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
