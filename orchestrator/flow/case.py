@@ -131,12 +131,12 @@ class FlowCase(Case):
 
     @property
     def cost_s(self) -> float:
-        """Wall time on one core, s: 0.3 for the start, then 6e5 cell-iterations a second.
+        """Wall time on one core, s: 0.2 for the start, then 8e5 cell-iterations a second.
 
-        Measured on 5 to 40 degrees: 140 iterations at small slopes to 300 at the steepest.
+        Measured on 5 to 40 degrees: 100 iterations at small slopes to 160 at the steepest.
         """
-        iterations = (140.0 + 0.08 * self.slope_deg**2) * self.cells_per_face / 40.0
-        return 0.3 + iterations * self._cells() / 6e5
+        iterations = (100.0 + 0.04 * self.slope_deg**2) * self.cells_per_face / 40.0
+        return 0.2 + iterations * self._cells() / 8e5
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
