@@ -1,11 +1,10 @@
 """A solver on the scenes of a pack: each in a process of its own, watched, ours in turn."""
 
-import contextlib
 import fnmatch
 import shlex
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -91,14 +90,16 @@ def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> 
     words = split(command)
     out = out.absolute()
     _claim(out, chosen)
-    ours = Ours(chosen, out / OURS / "cases")
+    ours, watch = Ours(chosen, out / OURS / "cases"), _Watch(chosen, out)
     ours.root.mkdir(parents=True, exist_ok=True)
     for number, name in enumerate(names, 1):
         print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
-        harm = _attempt(chosen, name, words, out, limit_s)
-        if harm:
-            raise InputError(f"{name}: {harm}", where=str(root), remedy="export it again")
+        watch.forget(out / name / FILE)
+        watch.forget(out / OURS / name / FILE)
+        _attempt(chosen, name, words, out, limit_s, watch)
         _answer_ours(ours, name, out / OURS / name)
+        watch.keep(out / name / FILE)
+        watch.keep(out / OURS / name / FILE)
     chosen.verify()
     return report.write(chosen, *compared(chosen, names, out, out / OURS), out)
 
@@ -135,37 +136,39 @@ def _claim(out: Path, chosen: Pack) -> None:
     out.mkdir(parents=True, exist_ok=True)
 
 
-def _attempt(chosen: Pack, name: str, words: Sequence[str], out: Path, limit_s: float) -> str:
+def _attempt(
+    chosen: Pack, name: str, words: Sequence[str], out: Path, limit_s: float, watch: "_Watch"
+) -> None:
     """Run the solver on one scene; what it took, or why it failed, is in its directory.
 
-    Returns how it changed the pack, or nothing.
+    Raises
+    ------
+    InputError
+        If it changed the pack.
     """
     folder = out / name
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
     case = folder / "case"
     shutil.copytree(chosen.directory(name), case)
     given = [w.replace("{case}", str(case)).replace("{out}", str(folder / FILE)) for w in words]
-    watch = _Watch(chosen, out, name)
-    error = ""
     metered = [sys.executable, "-I", "-S", meter.__file__, str(folder / USED), *given]
     ended = process.run(metered, cwd=folder, log=folder / LOG, limit_s=limit_s)
     used = read_json(folder / USED) or {"seconds": ended.seconds}
+    error = ""
     if ended.timed_out:
         error = f"it did not end within {limit_s:g} s and was killed"
     elif used.get("returncode") != 0:
         error = f"it ended with {used.get('returncode')}{_last_words(folder / LOG)}"
-    elif digest_files(_all(case), root=case) != digest_files(
-        _all(chosen.directory(name)), root=chosen.directory(name)
-    ):
+    elif _digests(case) != _digests(chosen.directory(name)):
         error = "it changed the files of its case"
-    harm, other = watch.changes()
+    harm, other = watch.harm(), watch.restored()
     write_json(folder / USED, {**used, "error": harm or other or error})
-    return harm
+    if harm:
+        raise InputError(f"{name}: {harm}", where=str(chosen.root), remedy="export it again")
 
 
-def _all(folder: Path) -> list[Path]:
-    return [path for path in folder.rglob("*") if path.is_file()]
+def _digests(folder: Path) -> dict[str, str]:
+    return digest_files((path for path in folder.rglob("*") if path.is_file()), root=folder)
 
 
 def _last_words(log: Path) -> str:
@@ -173,44 +176,55 @@ def _last_words(log: Path) -> str:
     return f": {said[-1][-LAST_LINES:]}" if said else ""
 
 
+Mark = tuple[int, int] | None
+"""When a file was written and how long it is; None where there is none."""
+
+
 class _Watch:
-    """The pack and the answers of other scenes: no solver may touch them."""
+    """The pack, and the answers that are there: no solver may touch them."""
 
-    def __init__(self, chosen: Pack, out: Path, name: str) -> None:
-        self.pack, self.out, self.name = chosen, out, name
-        self.before = self._marks()
-        self.answers = {path: path.read_bytes() for path in self._others()}
+    def __init__(self, chosen: Pack, out: Path) -> None:
+        self.pack = chosen
+        self.given = {path: _mark(path) for path in chosen.files()}
+        self.answers: dict[Path, tuple[Mark, bytes]] = {}
+        for path in (*out.glob(f"*/{FILE}"), *out.glob(f"{OURS}/*/{FILE}")):
+            self.keep(path)
 
-    def changes(self) -> tuple[str, str]:
-        """How the pack was changed, and how an answer was; the answer is put back."""
-        after = self._marks()
-        harm = ""
-        if after != self.before:
-            differing = {p for p, _ in set(after.items()) ^ set(self.before.items())}
-            first = min(differing).relative_to(self.pack.root)
-            harm = f"it changed {first} of the pack: the pack is not used further"
-        changed = [
-            path
-            for path, content in self.answers.items()
-            if not path.is_file() or path.read_bytes() != content
-        ]
+    def keep(self, answer: Path) -> None:
+        """Watch over an answer from now on."""
+        if answer.is_file():
+            self.answers[answer] = _mark(answer), answer.read_bytes()
+
+    def forget(self, answer: Path) -> None:
+        """Let an answer be written anew."""
+        self.answers.pop(answer, None)
+
+    def harm(self) -> str:
+        """How the pack was changed, or nothing."""
+        now = {path: _mark(path) for path in (*self.given, *self.pack.files())}
+        changed = {path for path, _ in set(now.items()) ^ set(self.given.items())}
+        if not changed:
+            return ""
+        first = min(changed).relative_to(self.pack.root)
+        return f"it changed {first} of the pack: the pack is not used further"
+
+    def restored(self) -> str:
+        """Put answers back that were changed; says which, or nothing."""
+        changed = [path for path, (mark, _) in self.answers.items() if _mark(path) != mark]
         for path in changed:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(self.answers[path])
+            path.write_bytes(self.answers[path][1])
+            self.keep(path)
         names = ", ".join(path.parent.name for path in changed)
-        return harm, f"it changed the answer of {names}, which was put back" if changed else ""
+        return f"it changed the answer of {names}, which was put back" if changed else ""
 
-    def _others(self) -> Iterator[Path]:
-        found = (*self.out.glob(f"*/{FILE}"), *self.out.glob(f"{OURS}/*/{FILE}"))
-        return (path for path in found if path.parent != self.out / self.name)
 
-    def _marks(self) -> dict[Path, tuple[int, int]]:
-        marks: dict[Path, tuple[int, int]] = {}
-        for path in self.pack.files():
-            with contextlib.suppress(FileNotFoundError):
-                state = path.stat()
-                marks[path] = (state.st_mtime_ns, state.st_size)
-        return marks
+def _mark(path: Path) -> Mark:
+    try:
+        state = path.stat()
+    except OSError:
+        return None
+    return state.st_mtime_ns, state.st_size
 
 
 def _answer_ours(ours: Ours, name: str, folder: Path) -> None:
