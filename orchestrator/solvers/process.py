@@ -2,19 +2,20 @@
 
 import contextlib
 import os
+import select
 import shutil
 import signal
 import subprocess
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import Interrupted
 
 GRACE_S = 2.0
-POLL_S = 0.02
+POLL_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -88,16 +89,27 @@ def run(
 def _wait(
     process: "subprocess.Popen[bytes]", deadline: float, stop: threading.Event | None
 ) -> bool:
-    while True:
-        try:
-            process.wait(POLL_S)
-            return False
-        except subprocess.TimeoutExpired:
+    # asking again and again whether it has ended would take a core from it, and see it late
+    with _end_of(process) as end:
+        while not end.poll(1000 * POLL_S):
             if stop is not None and stop.is_set():
-                raise Interrupted("stopped", remedy="the same command continues") from None
+                raise Interrupted("stopped", remedy="the same command continues")
             if time.monotonic() > deadline:
                 end_group(process)
                 return True
+    process.wait()
+    return False
+
+
+@contextlib.contextmanager
+def _end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
+    handle = os.pidfd_open(process.pid)
+    end = select.poll()
+    end.register(handle, select.POLLIN)
+    try:
+        yield end
+    finally:
+        os.close(handle)
 
 
 def end_group(process: "subprocess.Popen[bytes]") -> None:
