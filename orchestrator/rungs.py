@@ -72,8 +72,9 @@ def _dem(layers: int, *, slow: bool = False, **fields: Any) -> Callable[[Scene],
     return _with(**{"bed__mobile_layers": layers, "protocol__method": "dem", **rules, **fields})
 
 
-def _solve(cells: int, **fields: Any) -> Callable[[Scene], Scene]:
-    return _with(flow__model="solve", flow__roughness=None, flow__cells_per_face=cells, **fields)
+def _solve(cells: int, growth: float, **fields: Any) -> Callable[[Scene], Scene]:
+    mesh = {"flow__cells_per_face": cells, "flow__growth": growth}
+    return _with(flow__model="solve", flow__roughness=None, **mesh, **fields)
 
 
 def _shared(scene: Scene) -> Scene:
@@ -81,7 +82,7 @@ def _shared(scene: Scene) -> Scene:
     assert isinstance(scene.bed, PileBed)
     octave = round(math.log(scene.bed.roughness / scene.bed.height, OCTAVES))
     nearest = float(f"{scene.bed.height * OCTAVES**octave:.6g}")
-    return changed(_solve(20)(scene), {"flow.roughness": nearest})
+    return changed(_solve(40, 1.4)(scene), {"flow.roughness": nearest})
 
 
 def _own_speed(scene: Scene) -> Scene:
@@ -90,7 +91,7 @@ def _own_speed(scene: Scene) -> Scene:
     ustar = float(scene.closed_form(scene.closure).friction_velocity)
     lid = 10 * scene.bed.height
     speed = ustar / 0.41 * math.log1p(lid / scene.bed.roughness)
-    return changed(_solve(40)(scene), {"flow.speed": float(f"{speed:.6g}")})
+    return changed(_solve(40, 1.1)(scene), {"flow.speed": float(f"{speed:.6g}")})
 
 
 def _paper_stiffness(scene: Scene) -> Scene:
@@ -119,14 +120,21 @@ FULL = 1000
 FLOW = (
     Rung("flat", "log law on a flat bed: u*_0 everywhere", _with(flow__model="flat")),
     Rung("hill", "linear theory of the flow over a low hill", _with(flow__model="hill")),
-    Rung("shared", "20 cells on a face; one solve for each octave of z0/h", _shared),
-    Rung("coarse", "20 cells on a face", _solve(20)),
-    Rung("standard", "40 cells on a face", _solve(40)),
+    Rung("shared", "coarse; one solve for each octave of z0/h", _shared),
+    Rung("coarse", "40 cells on a face, growing by 1.4 away from it", _solve(40, 1.4)),
+    Rung("short", "20 cells on a face, growing by 1.1", _solve(20, 1.1)),
+    Rung("medium", "40 cells on a face, growing by 1.2", _solve(40, 1.2)),
+    Rung("standard", "40 cells on a face, growing by 1.1", _solve(40, 1.1)),
     Rung("own speed", "standard, solved at the scene's own U_e", _own_speed),
-    Rung("fine", "80 cells on a face", _solve(80)),
-    Rung("finest", "160 cells on a face", _solve(160), most_grains=50),
-    Rung("RNG k-epsilon", MODEL, _solve(40, flow__turbulence="RNGkEpsilon"), same_model=False),
-    Rung("realizable k-eps.", MODEL, _solve(40, flow__turbulence="realizableKE"), same_model=False),
+    Rung("fine", "80 cells on a face", _solve(80, 1.1)),
+    Rung("finest", "160 cells on a face", _solve(160, 1.1), most_grains=50),
+    Rung("RNG k-epsilon", MODEL, _solve(40, 1.1, flow__turbulence="RNGkEpsilon"), same_model=False),
+    Rung(
+        "realizable k-eps.",
+        MODEL,
+        _solve(40, 1.1, flow__turbulence="realizableKE"),
+        same_model=False,
+    ),
 )
 """Rungs of the flow; they keep the height of the first cell, which is a part of the model."""
 

@@ -74,7 +74,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 6
+    recipe: ClassVar[int] = 7
 
     @property
     def bed(self) -> PileBed:

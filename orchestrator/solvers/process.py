@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import os
+import select
 import shutil
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from pathlib import Path
 from orchestrator.errors import Interrupted
 
 GRACE_S = 2.0
-POLL_S = 0.02
+POLL_S = 0.1
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _SIGACTION_BYTES = 512
@@ -98,19 +99,28 @@ def _wait(
     process: "subprocess.Popen[bytes]", deadline: float, stop: threading.Event | None
 ) -> float | None:
     """Wait for a program's end; its processor time, or None if it had to be killed."""
-    pause = 1e-3
-    while True:
-        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
-        if ended:
-            process.returncode = os.waitstatus_to_exitcode(status)
-            return usage.ru_utime + usage.ru_stime
-        if stop is not None and stop.is_set():
-            raise Interrupted("stopped", remedy="the same command continues")
-        if time.monotonic() > deadline:
-            end_group(process)
-            return None
-        time.sleep(pause)
-        pause = min(2 * pause, POLL_S)
+    # asking again and again whether it has ended would take a core from it, and see it late
+    with _end_of(process) as end:
+        while not end.poll(1000 * POLL_S):
+            if stop is not None and stop.is_set():
+                raise Interrupted("stopped", remedy="the same command continues")
+            if time.monotonic() > deadline:
+                end_group(process)
+                return None
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
+
+
+@contextlib.contextmanager
+def _end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
+    handle = os.pidfd_open(process.pid)
+    end = select.poll()
+    end.register(handle, select.POLLIN)
+    try:
+        yield end
+    finally:
+        os.close(handle)
 
 
 def end_group(process: "subprocess.Popen[bytes]") -> None:

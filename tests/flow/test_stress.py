@@ -2,14 +2,18 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from orchestrator.errors import InputError, SolverError
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
+
+FloatArray = NDArray[np.float64]
 
 
 @pytest.fixture
@@ -53,6 +57,41 @@ def test_mean_of_eq10_is_that_of_its_signed_square(stress: WallStress) -> None:
 def test_mean_within_one_face_is_its_value(stress: WallStress) -> None:
     within = stress.mean_over(stress.s_m, 0.9 * stress.length_m)
     np.testing.assert_allclose(within, stress.tau_wall, rtol=1e-9)
+
+
+def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStress:
+    """A flat bed, then a slope from s = 0 on, of 20 faces each 1 mm long; tau of each from s."""
+    s = np.arange(-19.5, 20) * 1e-3
+    up = np.where(s > 0, np.radians(slope_deg), 0.0)
+    return WallStress(
+        s_m=s,
+        x_m=s * np.cos(up),
+        z_m=s * np.sin(up),
+        length_m=np.full(40, 1e-3),
+        z_e_m=np.full(40, 5e-4),
+        tau_wall=tau(s),
+        ustar_over_ustar0_eq10=tau(s),
+        ustar_over_ustar0_eq10_printed=tau(s),
+    )
+
+
+@pytest.mark.parametrize("slope_deg", [0.0, 10.0, 35.0])
+def test_a_stress_that_is_linear_is_read_exactly(slope_deg: float) -> None:
+    stress = _bent(slope_deg, lambda s: 1.0 + 30.0 * s)
+    places = np.linspace(-19e-3, 19e-3, 77)
+    np.testing.assert_allclose(stress.mean_over(places, 2e-4), 1.0 + 30.0 * places, rtol=1e-9)
+
+
+def test_a_jump_at_a_bend_is_not_smeared() -> None:
+    stress = _bent(15.0, lambda s: np.where(s > 0, 2.0, 0.5))
+    np.testing.assert_allclose(stress.mean_over([-2e-4, 2e-4], 2e-4), [0.5, 2.0], rtol=1e-9)
+
+
+def test_no_face_reaches_beyond_its_neighbours() -> None:
+    stress = _bent(0.0, lambda s: np.where(s > 0.0101, 2.0, np.where(s > 0, 0.5, 0.4)))
+    read = stress.mean_over(np.linspace(-19e-3, 19e-3, 400), 1e-5)
+    assert read.min() >= 0.4 - 1e-9
+    assert read.max() <= 2.0 + 1e-9
 
 
 def test_mean_over_the_whole_bed(stress: WallStress) -> None:
