@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from orchestrator import curves
 from orchestrator.benchmark.pack import Pack
-from orchestrator.benchmark.verdict import Verdict
+from orchestrator.benchmark.verdict import COUNTS, Verdict
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
 
@@ -34,7 +34,7 @@ def draw(pack: Pack, verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Iterato
             yield _panels(pack, answered, kind, drawn, panel)
     if (answered["quantity"] == "shields").any():
         yield _shields(pack, answered)
-    if any(v.seconds > 0 and v.error == v.error for v in verdicts):
+    if any(v.seconds > 0 and v.worst == v.worst for v in verdicts):
         yield _speed(verdicts, rows)
 
 
@@ -146,12 +146,12 @@ def _speed(verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Figure:
     for level in used:
         of = [one for one in verdicts if one.level == level]
         x = [one.seconds for one in of]
-        y = [max(one.error, FLOOR) if one.error == one.error else np.nan for one in of]
+        y = [max(one.worst, FLOOR) if one.worst == one.worst else np.nan for one in of]
         ax.plot(x, y, "o", color=LEVELS[level], ms=3.5)
         x = [one.ours_seconds for one in of]
         y = [max(ours.get(one.scene, np.nan), FLOOR) for one in of]
         ax.plot(x, y, "o", color=LEVELS[level], mfc="none", ms=4.5, mew=0.7)
-    ax.set(xscale="log", yscale="log", xlabel="wall time of a scene, s", ylabel="median error")
+    ax.set(xscale="log", yscale="log", xlabel="wall time of a scene, s", ylabel="largest error")
     style.plain_ticks(ax.xaxis)
     marks = [
         Line2D([], [], color="0.3", marker="o", ls="none", label="solver"),
@@ -159,7 +159,7 @@ def _speed(verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Figure:
     ]
     style.legends(canvas, [style.entry(f"level {n}", LEVELS[n]) for n in used], marks)
     caption = (
-        "Each point is a scene: wall time, and median relative error of its judged numbers. Errors"
+        "Each point is a scene: wall time, and largest relative error of its judged numbers. Errors"
         f" below {FLOOR:g} are drawn there: at levels 3 to 5 the expected answer is our own run."
     )
     return Figure("speed-accuracy", "Time and error", caption, (), canvas)
@@ -167,6 +167,7 @@ def _speed(verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Figure:
 
 def _our_errors(rows: pd.DataFrame) -> dict[str, float]:
     judged = rows[rows["tolerance"].notna() & rows["ours"].notna()]
+    judged = judged[~judged["quantity"].isin(COUNTS)]
     value = judged["value"].replace(0, 1)
     error = ((judged["ours"] - judged["value"]) / value).abs()
-    return {str(name): float(e) for name, e in error.groupby(judged["scene"]).median().items()}
+    return {str(name): float(e) for name, e in error.groupby(judged["scene"]).max().items()}

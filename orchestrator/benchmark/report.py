@@ -71,23 +71,23 @@ def summary(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 
 def _row(level: int, kind: str, of: Sequence[Verdict]) -> dict[str, Any]:
-    errors = [one.error for one in of if math.isfinite(one.error)]
-    worst = [one.worst for one in of if math.isfinite(one.worst)]
+    answered = [one for one in of if math.isfinite(one.worst)]
     return {
         "level": f"{level} {ABOUT[level]}",
         "kind": kind,
         "scenes": len(of),
         "passed": sum(one.passed for one in of),
-        "error, median": _percent(np.median(errors)) if errors else "",
-        "error, largest": _percent(max(worst)) if worst else "",
+        "error, median": _percent([one.error for one in answered]),
+        "bias": _percent([one.bias for one in answered]),
+        "error, largest": f"{100 * max(v.worst for v in answered):.3g} %" if answered else "",
         "time over ours": _median([one.ratio for one in of]),
         "CPU over ours": _median([one.cpu_ratio for one in of]),
         "peak, MiB": _largest([one.peak_mib for one in of]),
     }
 
 
-def _percent(value: float) -> str:
-    return f"{100 * value:.3g} %"
+def _percent(values: Sequence[float]) -> str:
+    return f"{100 * float(np.median(values)):.3g} %" if values else ""
 
 
 def _median(values: Sequence[float]) -> str:

@@ -41,6 +41,8 @@ class Verdict:
         Median relative error of the judged numbers; NaN without an answer.
     worst : float
         The largest of them.
+    bias : float
+        Their median with its sign: above zero for answers that are too large.
     seconds, ours_seconds : float
         Wall time of the solver, and of ours; NaN if it is not known.
     cpu_s, ours_cpu_s : float
@@ -56,6 +58,7 @@ class Verdict:
     message: str
     error: float
     worst: float
+    bias: float
     seconds: float
     ours_seconds: float
     cpu_s: float
@@ -143,7 +146,8 @@ def _verdict(
 ) -> Verdict:
     judged = rows[rows["tolerance"].notna()]
     wrong = judged[~judged["within"].astype(bool)]
-    errors = judged.loc[~judged["quantity"].isin(COUNTS), "error"].abs()
+    signed = judged.loc[~judged["quantity"].isin(COUNTS), "error"]
+    errors = signed.abs()
     message = error or (_message(told, rows, wrong) if len(wrong) else "")
     used, run = (read_json(place / USED) or {} for place in (folder, ours))
     return Verdict(
@@ -154,6 +158,7 @@ def _verdict(
         message=message,
         error=float(errors.median()) if not error else math.nan,
         worst=float(errors.max()) if not error else math.nan,
+        bias=float(signed.median()) if not error else math.nan,
         seconds=_number(used.get("seconds")),
         ours_seconds=_number(run.get("seconds")),
         cpu_s=_number(used.get("cpu_s")),
