@@ -1,8 +1,9 @@
-"""Measure the flow cases: flat bed, mesh, first cell, similarity; prints the tables of flow.md.
+"""Measure the flow cases and the theories beside them; prints the tables of flow.md.
 
 ``python docs/measure_flow.py DIRECTORY`` keeps its cases there; a second call runs none again.
 """
 
+import re
 import sys
 import threading
 from dataclasses import replace
@@ -11,13 +12,31 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator import case, engine
+from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
-from orchestrator.flow.stress import Measure, WallStress
+from orchestrator.flow.stress import Array, Measure, WallStress
 from orchestrator.scene import default_first_cell_height
 
 HEIGHT = 0.02
 ROUGHNESS = (3.3e-6, 3.333e-5, 1e-4)
 SLOPES = (10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
+GRAIN = 1e-3
+RUNGS = {
+    "80 cells a face": {"cells_per_face": 80},
+    "40, the standard": {},
+    "growth 1.15": {"growth": 1.15},
+    "growth 1.2": {"growth": 1.2},
+    "growth 1.4": {"growth": 1.4},
+    "20 cells a face": {"cells_per_face": 20},
+}
+MODELS = (
+    {},
+    {"turbulence": "RNGkEpsilon"},
+    {"turbulence": "realizableKE"},
+    {"turbulence": "kOmegaSST"},
+    {"convection": "upwind"},
+    {"correctors": 0},
+)
 
 
 def flow(slope: float, roughness: float) -> FlowCase:
@@ -95,8 +114,84 @@ def similarity(cases: Path) -> None:
             print(f"| {slope:g} | {roughness:g} | {speed:g} | {mean} | {most} |", flush=True)
 
 
+def rungs(cases: Path) -> None:
+    """Cost of coarser and finer meshes, and what they do to u*^2 on grains of 1 mm."""
+    print("\n| mesh | slope | z0, m | cells | iterations | solver, core s | mean | worst grain |")
+    print("|---|---|---|---|---|---|---|---|")
+    for name, change_of in RUNGS.items():
+        for slope in (15.0, 30.0):
+            for roughness in ROUGHNESS:
+                standard = flow(slope, roughness)
+                one = replace(standard, **change_of)
+                new, old = (on_grains(each, solved(each, cases)) for each in (one, standard))
+                worst = f"{100 * np.abs(new / old - 1).max():.1f} %"
+                cost = " | ".join(spent(cases / one.name))
+                mean = change(new.mean(), old.mean())
+                print(f"| {name} | {slope:g} | {roughness:g} | {cost} | {mean} | {worst} |")
+
+
+def on_grains(one: FlowCase, stress: WallStress) -> Array:
+    """Stress on touching grains of 1 mm along the windward face."""
+    face = one.height_m / np.sin(np.radians(one.slope_deg))
+    return stress.mean_over(np.arange(GRAIN / 2, face, GRAIN), GRAIN)
+
+
+def spent(directory: Path) -> tuple[str, str, str]:
+    """Cells, iterations and processor time of a case."""
+    log = (directory / "log.simpleFoam").read_text()
+    mesh = (directory / "constant" / "polyMesh" / "owner").read_text()
+    cells = re.findall(r"nCells: *(\d+)", mesh)[0]
+    return (
+        cells,
+        re.findall(r"^Time = (\d+)", log, re.M)[-1],
+        re.findall(r"ExecutionTime = (\S+)", log)[-1],
+    )
+
+
+def models(cases: Path) -> None:
+    """What turbulence models and schemes give."""
+    print("\n| changed | flat bed | 15 deg | 30 deg | separated, 15 and 30 deg, h |")
+    print("|---|---|---|---|---|")
+    for changed in MODELS:
+        flat, *piles = (replace(flow(slope, 3.333e-5), **changed) for slope in (0.0, 15.0, 30.0))
+        bed = solved(flat, cases)
+        flat_mean = bed.ustar_over_ustar0_wall[np.abs(bed.s_m) < 5 * HEIGHT].mean()
+        means = " | ".join(f"{windward_mean(one, solved(one, cases)):.3f}" for one in piles)
+        lengths = (diagnostics.reattachment(solved(one, cases), HEIGHT) for one in piles)
+        name = ", ".join(f"{key} = {value}" for key, value in changed.items()) or "nothing"
+        print(f"| {name} | {flat_mean:.3f} | {means} | {', '.join(f'{x:.1f}' for x in lengths)} |")
+
+
+def hills(cases: Path) -> None:
+    """The theory against the solved flow: mean over the face and at parts of it."""
+    at = np.array([0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])
+    print("\n| slope | z0, m | solved | theory | without the bubble |", end="")
+    print(" | ".join(f" at {part:g}" for part in at), "|\n|" + "---|" * (5 + len(at)))
+    for slope in SLOPES[:-1]:
+        for roughness in ROUGHNESS:
+            one = flow(slope, roughness)
+            stress, found = solved(one, cases), theory.hill(slope, HEIGHT, roughness)
+            places = at * HEIGHT / np.sin(np.radians(slope))
+            theirs, ours = (np.sqrt(s.mean_over(places, HEIGHT / 40)) for s in (stress, found))
+            mean = windward_mean(one, stress)
+            means = [windward_mean(one, found), bare_triangle(slope, roughness)]
+            errors = [f"{100 * (value / mean - 1):+.0f} %" for value in means]
+            errors += [f"{100 * (a / b - 1):+.0f} %" for a, b in zip(ours, theirs, strict=True)]
+            print(f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(errors)} |", flush=True)
+
+
+def bare_triangle(slope: float, roughness: float) -> float:
+    """Mean u*/u*_0 on the windward face by the theory of the triangle without a bubble."""
+    rise, half = np.tan(np.radians(slope)), HEIGHT / np.tan(np.radians(slope))
+    edges = np.linspace(0, half, 400)
+    strength, asymmetry = theory.coefficients(half / 2 / roughness)
+    integral = theory.hilbert(edges, np.array([0, half, 2 * half]), np.array([0, HEIGHT, 0]))
+    tau = 1 + strength * (integral + asymmetry * rise)
+    return float(np.mean(np.sqrt(np.maximum(tau, 0))))
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1]).absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    for measure in (flat_bed, similarity, meshes):
+    for measure in (flat_bed, similarity, rungs, models, hills, meshes):
         measure(folder)

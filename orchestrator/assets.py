@@ -21,9 +21,14 @@ def presets() -> Path:
     return PACKAGE / "presets"
 
 
+def known() -> Path:
+    """The folder of what the ladder and the maps found."""
+    return PACKAGE / "known"
+
+
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
-    *("log.*", "postProcessing", "polyMesh", "levels.csv", "*.dump"),
+    *("log.*", "postProcessing", "polyMesh", "settling.csv", "levels.csv", "*.dump"),
 )
 """What a run by hand in the template's own folder leaves there; it is no part of the template."""
 

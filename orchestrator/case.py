@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator import assets
+from orchestrator.errors import SolverError
 from orchestrator.files import (
     canonical_json,
     digest_file,
     digest_files,
     digest_text,
     read_json,
+    remove_empty_folders,
     write_durably,
     write_json,
 )
@@ -40,6 +42,8 @@ class Case(ABC):
     """Glob patterns of the files that a rerun by hand must reproduce byte for byte."""
     derived: ClassVar[tuple[str, ...]] = ()
     """Tables that `collect` makes of the results; not the solver's own."""
+    bulky: ClassVar[tuple[str, ...]] = ()
+    """Large files that the run leaves and no table is made of: `prune` drops them."""
 
     @property
     @abstractmethod
@@ -120,7 +124,7 @@ def prepare(case: Case, cases: Path) -> Path:
     return directory
 
 
-def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> None:
+def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s: float) -> None:
     """Mark a case as done: the last file written, with digests of all that it vouches for."""
     results = digest_files(_matching(directory, case.results), root=directory)
     derived = digest_files(_matching(directory, case.derived), root=directory)
@@ -133,6 +137,7 @@ def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> No
         {
             "ended": "done",
             "solver_s": solver_s,
+            "cpu_s": cpu_s,
             "wall_s": wall_s,
             "results_sha256": results,
             "derived_sha256": derived,
@@ -141,19 +146,31 @@ def finish(case: Case, directory: Path, *, solver_s: float, wall_s: float) -> No
     )
 
 
-def fail(directory: Path, cause: str) -> None:
-    """Leave a note of why a case failed, for `status`; the next study run tries it again."""
+def fail(directory: Path, error: SolverError) -> None:
+    """Leave a note of how and why a case failed; the next study run tries it again."""
     if directory.is_dir():
-        write_json(directory / FAILED, {"ended": "failed", "cause": cause})
+        write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
 
 
 def failure(directory: Path) -> str | None:
-    """Why the case in a directory failed, or None if it is not known to have failed."""
+    """Why the case in a directory failed, or None if it is not known to have failed.
+
+    The word for its end comes first where it says more than that it failed.
+    """
     path = directory / FAILED
     state = read_json(path)
     if isinstance(state, dict):
-        return str(state.get("cause", ""))
+        ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
+        return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
     return "its note of failure cannot be read" if path.is_file() else None
+
+
+def ended(directory: Path) -> tuple[str, str]:
+    """In which way the case in a directory failed, and why; empty where it is not known to have."""
+    state = read_json(directory / FAILED)
+    if not isinstance(state, dict):
+        return "", ""
+    return str(state.get("ended", "")), str(state.get("cause", ""))
 
 
 def is_done(case: Case, cases: Path) -> bool:
@@ -170,6 +187,32 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     return state if isinstance(state, dict) and _vouched(directory, state) else None
 
 
+def prune(case: Case, cases: Path) -> None:
+    """Drop the bulky files of a case that is done.
+
+    Their digests stay in the marker, beside a list of what was dropped, and in `CHECKSUMS`: a
+    rerun by hand is still compared with the run that the tables were made of.
+    """
+    directory, state = cases / case.name, done_state(case, cases)
+    if state is None:
+        return
+    files = _matching(directory, case.bulky)
+    names = {path.relative_to(directory).as_posix() for path in files}
+    # first what makes up for the files: killed in between, the case is still done
+    pruned = sorted(names.union(state.get("pruned", [])))
+    write_json(directory / DONE, {**state, "pruned": pruned})
+    for path in files:
+        path.unlink()
+    remove_empty_folders(directory, (path.parent for path in files))
+
+
+def is_whole(case: Case, cases: Path) -> bool:
+    """Whether a finished case has all of its files: nothing was pruned, or a rerun made it anew."""
+    state = read_json(cases / case.name / DONE)
+    pruned = state.get("pruned", []) if isinstance(state, dict) else []
+    return all((cases / case.name / name).is_file() for name in pruned)
+
+
 def programs(cases: Path) -> dict[str, str]:
     """The programs, with versions, that the cases in a directory were made with."""
     found: dict[str, str] = {}
@@ -182,9 +225,13 @@ def programs(cases: Path) -> dict[str, str]:
 def _vouched(directory: Path, state: dict[str, Any]) -> bool:
     try:
         digests = {**state["results_sha256"], **state["derived_sha256"]}
+        if not state["wall_s"] >= state["solver_s"] >= 0:
+            return False
+        dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
         stamps, marked = state.get("stamps", {}), (directory / DONE).stat().st_mtime_ns
         return bool(digests) and all(
-            _untouched(directory / name, stamps.get(name), marked)
+            name in dropped
+            or _untouched(directory / name, stamps.get(name), marked)
             or digest_file(directory / name) == digest
             for name, digest in digests.items()
         )

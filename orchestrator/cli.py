@@ -7,10 +7,13 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator import __version__
+from orchestrator.benchmark import cli as benchmark
 from orchestrator.cluster import SYSTEMS, Queue
 from orchestrator.errors import InputError, OrchestratorError, of_system
 
@@ -31,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
     signal.signal(signal.SIGTERM, _as_interrupt)
     warnings.showwarning = _show_warning
+    if isinstance(sys.stdout, TextIOWrapper):
+        # the page's path is given as it is, even if it is no text
+        sys.stdout.reconfigure(errors="surrogateescape")
     options = _parser().parse_args(_plain(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.run(options))
@@ -49,7 +55,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-VALUED = ("--out", "--workers", "--cluster", "--roughness", *NUMBERS)
+VALUED = (
+    "--out",
+    "--workers",
+    "--tolerance",
+    "--cluster",
+    "--solver",
+    "--from",
+    "--scene",
+    "--roughness",
+    *NUMBERS,
+)
 FLAGS = ("-h", "--help", "--version", "--json", "--")
 
 
@@ -84,7 +100,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_study(commands)
     _add_threshold(commands)
     _add_directory_commands(commands)
-    _add_benchmark(commands)
+    _add_experiments(commands)
+    benchmark.add(commands)
     command = commands.add_parser(
         "doctor", help="are the solvers here, can it draw; what to install"
     )
@@ -101,9 +118,12 @@ def _add_study(commands: Any) -> None:
         metavar="FILE|PRESET",
         help="default: %(default)s",
     )
-    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
+    _add_run_options(command)
     command.add_argument(
-        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
+        "--tolerance",
+        type=float,
+        metavar="X",
+        help="relative error that tau_c may have: the cheapest models known to be within it",
     )
     command.add_argument(
         "--cluster",
@@ -112,6 +132,27 @@ def _add_study(commands: Any) -> None:
         help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
     )
     command.set_defaults(run=_study)
+
+
+def _add_run_options(command: Any) -> None:
+    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
+    command.add_argument(
+        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
+    )
+
+
+def _add_experiments(commands: Any) -> None:
+    command = commands.add_parser(
+        "ladder", help="what each model costs and how far it is off: speed against accuracy"
+    )
+    command.add_argument(
+        "source", nargs="?", default="ladder", metavar="FILE|PRESET", help="default: %(default)s"
+    )
+    _add_run_options(command)
+    command.set_defaults(run=_ladder)
+    command = commands.add_parser("stability", help="maps of where each method fails")
+    _add_run_options(command)
+    command.set_defaults(run=_stability)
 
 
 def _add_threshold(commands: Any) -> None:
@@ -132,19 +173,11 @@ def _add_directory_commands(commands: Any) -> None:
     for name, function, text in (
         ("status", _status, "what of a study is done, running, failed and why"),
         ("report", _report, "draw tables, figures and page of a study again"),
+        ("prune", _prune, "drop the large files of finished cases; a rerun makes them anew"),
     ):
         command = commands.add_parser(name, help=text)
         command.add_argument("directory", type=Path, metavar="DIR")
         command.set_defaults(run=function)
-
-
-def _add_benchmark(commands: Any) -> None:
-    group = commands.add_parser("benchmark", help="exchange with a native code of the same model")
-    parts = group.add_subparsers(required=True, metavar="part")
-    command = parts.add_parser("data", help="what a finished study found, as small CSV files")
-    command.add_argument("directory", type=Path, metavar="DIR", help="of the study")
-    command.add_argument("folder", type=Path, metavar="FOLDER", help="where the files go")
-    command.set_defaults(run=_benchmark_data)
 
 
 def _workers(text: str) -> int:
@@ -158,12 +191,32 @@ def _study(options: argparse.Namespace) -> int:
     from orchestrator import pipeline, study
 
     asked = study.load(options.source)
+    if options.tolerance is not None:
+        study.check_tolerance(options.tolerance, "--tolerance")
+        asked = replace(asked, tolerance=options.tolerance)
     out = options.out or Path("results") / asked.name
     queue = Queue(options.cluster, asked.cluster) if options.cluster else None
     finished = pipeline.run(asked, out, workers=options.workers, queue=queue)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     return _end(finished.page, finished.failures)
+
+
+def _ladder(options: argparse.Namespace) -> int:
+    from orchestrator import study
+    from orchestrator.experiments import run
+
+    asked = study.load(options.source)
+    out = options.out or Path("results") / "ladder"
+    finished = run.run_ladder(asked, out, workers=options.workers)
+    return _end(finished.page, finished.failures)
+
+
+def _stability(options: argparse.Namespace) -> int:
+    from orchestrator.experiments import run
+
+    out = options.out or Path("results") / "stability"
+    return _end(run.run_stability(out, workers=options.workers).page, {})
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -180,25 +233,19 @@ def _end(page: Path, failures: dict[str, OrchestratorError]) -> int:
     return 3 if failures else 0
 
 
-def _benchmark_data(options: argparse.Namespace) -> int:
-    from orchestrator import tables
-    from orchestrator.benchmark import data
-    from orchestrator.case import programs
-    from orchestrator.workspace import Workspace
-
-    space = Workspace(options.directory.absolute())
-    space.description()
-    data.write(tables.read(space.tables), programs(space.cases), options.folder)
-    print(options.folder)
-    return 0
-
-
 def _status(options: argparse.Namespace) -> int:
     from orchestrator import status
 
     found = status.read(options.directory)
     print(status.text(found))
     return 3 if found.failed else 0
+
+
+def _prune(options: argparse.Namespace) -> int:
+    from orchestrator import prune
+
+    print(prune.text(prune.prune(options.directory)))
+    return 0
 
 
 def _doctor(options: argparse.Namespace) -> int:

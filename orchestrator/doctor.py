@@ -36,16 +36,13 @@ class Finding:
 
 
 def examine() -> list[Finding]:
-    """Look at the solvers, the libraries, the tools and whether pictures can be drawn."""
-    from orchestrator.report.pictures import can_render
-
+    """Look at the solvers, the libraries, the tools and the disk."""
     return [
         Finding("Python", sys.version_info >= (3, 11), sys.version.split()[0]),
         *(_solver(name, ask) for name, ask in _SOLVERS.items()),
         *(_library(name) for name in LIBRARIES),
         *(_tool(name) for name in TOOLS),
         _gmsh(),
-        _rendering(can_render),
         _disk(Path.cwd()),
     ]
 
@@ -85,12 +82,6 @@ def _gmsh() -> Finding:
         libraries = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
         return Finding("meshing", False, f"{error}: apt-get install {libraries}")
     return Finding("meshing", True, "gmsh loads")
-
-
-def _rendering(can_render: Callable[[], bool]) -> Finding:
-    good = can_render()
-    advice = "no off-screen rendering: apt-get install libosmesa6 libgl1 libx11-6 libxcursor1"
-    return Finding("pictures", good, "drawn off screen" if good else advice)
 
 
 def _disk(folder: Path) -> Finding:

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from orchestrator import case as case_states
+from orchestrator import retry
 from orchestrator.agenda import Agenda
 from orchestrator.case import Case
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
@@ -130,7 +131,7 @@ def execute(
     outside_s = time.monotonic() - began
     try:
         with turn:
-            ended = process.run(
+            ended = retry.run(
                 ["./Allrun"],
                 cwd=directory,
                 log=directory / LOG,
@@ -141,9 +142,11 @@ def execute(
         began = time.monotonic()
         _check(case, directory, ended, limit_s)
         took_s = outside_s + ended.seconds + time.monotonic() - began
-        case_states.finish(case, directory, solver_s=ended.seconds, wall_s=took_s)
+        case_states.finish(
+            case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
+        )
     except SolverError as error:
-        case_states.fail(directory, str(error))
+        case_states.fail(directory, error)
         raise
     return took_s
 

@@ -4,6 +4,10 @@ import difflib
 import errno
 import shutil
 from collections.abc import Sequence
+from typing import ClassVar
+
+MOST = 400
+"""Characters of a message's place, cause and remedy, each."""
 
 
 class OrchestratorError(Exception):
@@ -28,9 +32,15 @@ class OrchestratorError(Exception):
         super().__init__(what, where, remedy)
 
     def __str__(self) -> str:
-        place = f"{self.where}: " if self.where else ""
-        advice = f" ({self.remedy})" if self.remedy else ""
-        return f"{place}{self.what}{advice}"
+        place = f"{_line(self.where)}: " if self.where else ""
+        advice = f" ({_line(self.remedy)})" if self.remedy else ""
+        return f"{place}{_line(self.what)}{advice}"
+
+
+def _line(text: str) -> str:
+    """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
+    cut = text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)
 
 
 class InputError(OrchestratorError):
@@ -43,6 +53,26 @@ class SolverError(OrchestratorError):
     """A solver is missing, or its run did not end as it must."""
 
     exit_code = 3
+    ended: ClassVar[str] = "failed"
+    """One word for the kind of end."""
+
+
+class Exploded(SolverError):  # noqa: N818 - an end, not an error
+    """A run whose numbers grow without bound."""
+
+    ended = "exploded"
+
+
+class Noisy(SolverError):  # noqa: N818
+    """A run whose grains never come to rest."""
+
+    ended = "noisy"
+
+
+class Stalled(SolverError):  # noqa: N818
+    """A run that hangs or circles without an end."""
+
+    ended = "stalled"
 
 
 class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error

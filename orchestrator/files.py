@@ -32,12 +32,46 @@ def digest_files(paths: Iterable[Path], *, root: Path) -> dict[str, str]:
 def write_durably(path: Path, content: str | bytes) -> None:
     """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    with temporary.open("wb") as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.replace(temporary, path)
+    try:
+        with temporary.open("wb") as stream:
+            stream.write(content.encode() if isinstance(content, str) else content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        remove_empty_directory(path)
+        os.replace(temporary, path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise
     sync_directory(path.parent)
+
+
+def remove_empty_directory(path: Path) -> None:
+    """Clear the way for a file where something has put a directory; one that holds files stays."""
+    if path.is_dir() and not path.is_symlink():
+        path.rmdir()
+
+
+def remove_empty_folders(root: Path, folders: Iterable[Path]) -> None:
+    """Remove those of some folders below `root` that are empty, and their parents if they are."""
+    for folder in sorted({*folders}, reverse=True):
+        while folder != root and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+            folder = folder.parent
+
+
+def size_of(directory: Path) -> int:
+    """Size of all files below a directory, bytes; what vanishes meanwhile does not count."""
+    total = 0
+    try:
+        with os.scandir(directory) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    total += size_of(Path(entry.path))
+                else:
+                    total += entry.stat(follow_symlinks=False).st_size
+    except OSError:
+        pass
+    return total
 
 
 def sync_directory(directory: Path) -> None:
@@ -58,5 +92,5 @@ def read_json(path: Path) -> Any | None:
     """The file's value, or None where it is missing or cannot be read: unreadable is undone."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None

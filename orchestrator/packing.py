@@ -24,6 +24,9 @@ APRON = 10.0
 STRAY = 0.1
 """Rows of a disordered bed are straight within this, diameters: no neighbour of a row covers
 another, and none stands out too far."""
+DISORDERED = 4
+"""Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
+is the same for any number of mobile layers up to it."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
 
@@ -137,9 +140,14 @@ def pile(
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap
     row_height = float(np.sin(beta))
-    points = _points(triangle, pattern, beta, surface, mobile_layers, disorder, seed)
+    most = int(np.ceil(triangle.height / np.cos(np.radians(triangle.slope_deg)) / row_height)) + 1
+    mobile_layers = min(mobile_layers, most)
+    uneven = max(mobile_layers, DISORDERED)
+    points = _points(triangle, pattern, beta, surface, uneven, disorder, seed)
     stray = STRAY if pattern == "disordered" else TIE
-    body = _shell(points, triangle, beta, surface, mobile_layers, stray)
+    # under a slope's level rows a grain rests on one that lies deeper below the face
+    layers = mobile_layers + (pattern == "horizontal")
+    body = _shell(points, triangle, beta, surface, layers, stray)
     buried = body[:, 1] < surface - TIE
     in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
     windward, lee = (face & ~buried for face in exposed(body, triangle, disorder))
@@ -163,7 +171,7 @@ def _points(
     pattern: Pattern,
     beta: float,
     surface: float,
-    mobile_layers: int,
+    uneven: int,
     disorder: float,
     seed: int,
 ) -> FloatArray:
@@ -173,11 +181,11 @@ def _points(
     lattice = _lattice(triangle, apex, direction, beta)
     if pattern != "disordered":
         return lattice
-    columns = int(np.ceil(np.linalg.norm(triangle.crest) / np.cos(beta) / 2)) + mobile_layers + 4
-    rows = disorder_rows(columns, mobile_layers, beta=beta, size=disorder, seed=seed)
+    columns = int(np.ceil(np.linalg.norm(triangle.crest) / np.cos(beta) / 2)) + uneven + 4
+    rows = disorder_rows(columns, uneven, beta=beta, size=disorder, seed=seed)
     normal = triangle.normals[0]
     upper = apex + np.vstack(rows) @ np.vstack([direction, normal])
-    below = (apex - lattice) @ normal > (mobile_layers + 0.5) * np.sin(beta)
+    below = (apex - lattice) @ normal > (uneven + 0.5) * np.sin(beta)
     return np.vstack([upper, lattice[below]])
 
 
@@ -186,16 +194,16 @@ def _shell(
     triangle: Triangle,
     beta: float,
     surface: float,
-    mobile_layers: int,
+    layers: int,
     stray: float,
 ) -> FloatArray:
     """Grains near both faces, and some below the ground.
 
-    Below the mobile layers one is enough: a grain touches no deeper one.
+    Below the layers that hold mobile grains one is enough: a grain touches no deeper one.
     """
     depths = [triangle.depth(points, face) + surface for face in (0, 1)]
     depth, level = np.minimum(*depths), points[:, 1] - surface
-    windward_shell = depths[0] < (mobile_layers + 0.5) * np.sin(beta)
+    windward_shell = depths[0] < (layers + 0.5) * np.sin(beta)
     lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
     inside = (depth >= -stray) & (windward_shell | lee_shell)
     covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))

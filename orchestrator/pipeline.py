@@ -1,12 +1,14 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from dataclasses import dataclass
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from orchestrator import __version__, case, cluster, engine, plan, report, tables
 from orchestrator.case import Case
 from orchestrator.cluster import Queue
-from orchestrator.errors import OrchestratorError
+from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.files import (
     canonical_json,
     digest_file,
@@ -63,21 +65,41 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
     Interrupted
         If the user stopped it; every child has ended.
     """
-    planned = plan.make(study)
     space = Workspace(out.absolute())
-    space.claim(study.name, study.text, list(planned.cases))
     with space.held():
-        done = planned.done(space.cases)
-        todo = {name: one for name, one in planned.cases.items() if name not in done}
-        if not todo and _is_drawn(study, planned, space):
-            return Finished(space.page, 0, {})
-        failures = {}
-        if todo:
+        planned = plan.settled(study, space.cases)
+        _claim(space, study, planned)
+        started, failures, states = 0, {}, planned.done(space.cases)
+        while todo := _without(planned.cases, states):
+            started += len(todo)
             failures = complete(
                 todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
             )
-        draw(study, planned, space, failures)
-        return Finished(space.page, len(todo), failures)
+            settled = plan.settled(study, space.cases)
+            if failures or settled.cases.keys() == planned.cases.keys():
+                states |= planned.done(space.cases, todo)
+                break
+            # a check has overruled a cheap rung
+            planned = settled
+            _claim(space, study, planned)
+            states |= planned.done(space.cases, _without(planned.cases, states))
+        if started or not _is_drawn(study, planned, space):
+            draw(study, planned, space, states, failures)
+        return Finished(space.page, started, failures)
+
+
+def _claim(space: Workspace, study: Study, planned: Plan) -> None:
+    about = {"study": study.text, "tolerance": study.tolerance}
+    space.claim(study.name, list(planned.cases), **about)
+
+
+def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
+    """The cases of a plan that are not done yet, by name."""
+    return _without(planned.cases, planned.done(space.cases))
+
+
+def _without(cases: Mapping[str, Case], done: Container[str]) -> dict[str, Case]:
+    return {name: one for name, one in cases.items() if name not in done}
 
 
 def complete(
@@ -102,22 +124,47 @@ def complete(
 def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
-    about = space.description()
-    study = parse(about["study"], name=about["name"], where=str(out))
-    planned = plan.make(study)
+    study, planned = reopen(space)
     with space.held():
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, failures)
+        draw(study, planned, space, planned.done(space.cases), failures)
     return Finished(space.page, 0, failures)
 
 
+def reopen(space: Workspace) -> tuple[Study, Plan]:
+    """The study that a directory was made for, and its plan.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no study.
+    """
+    about = space.description()
+    if "study" not in about:
+        raise InputError(
+            f"this is no study but an experiment, {about['name']}",
+            where=str(space.root),
+            remedy=f"`orchestrator {about['name']} --out {space.root}` draws it again",
+        )
+    study = parse(about["study"], name=about["name"], where=str(space.root))
+    study = replace(study, tolerance=about.get("tolerance"))
+    return study, plan.settled(study, space.cases)
+
+
 def draw(
-    study: Study, planned: Plan, space: Workspace, failures: dict[str, OrchestratorError]
+    study: Study,
+    planned: Plan,
+    space: Workspace,
+    states: Mapping[str, Mapping[str, Any]],
+    failures: dict[str, OrchestratorError],
 ) -> None:
-    """Write tables, figures and page, and last the marker that says of which cases."""
+    """Write tables, figures and page, and last the marker that says of which cases.
+
+    The states are those of the cases that are done, by name, as `Plan.done` gives them.
+    """
     space.drawn.unlink(missing_ok=True)
-    states = planned.done(space.cases)
+    states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     tables.write(results, space.tables)
@@ -133,7 +180,7 @@ def draw(
 def _origin(study: Study, planned: Plan) -> str:
     """Digest of all that the tables and figures are made of."""
     cases = [one.id for one in planned.cases.values()]
-    return digest_text(canonical_json([__version__, study.text, cases]))
+    return digest_text(canonical_json([__version__, study.text, study.tolerance, cases]))
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:

@@ -1,54 +1,117 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from orchestrator import checks, rungs
 from orchestrator.case import Case, done_state
 from orchestrator.errors import InputError
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import PileCase
-from orchestrator.scene import PileBed
+from orchestrator.scene import PileBed, Scene
 from orchestrator.study import Study
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The cases of a study.
+    """How the scenes of a study are answered, and by which cases.
 
     Attributes
     ----------
+    answers : dict of str to Scene
+        By the id of the scene that was asked for: the scene as it is answered.
     piles : dict of str to PileCase
-        By the id of the scene that each answers.
+        By the same id.
     cells : tuple of CellsCase
         Each answers all of its scenes.
+    checks : dict of str to PileCase
+        Piles by DEM that check answers without it, by the id of the scene asked for.
     cases : dict of str to Case
-        Every case once, by name, a case after those whose results it needs.
+        Every run once, by name, a case after those whose results it needs.
     """
 
+    answers: dict[str, Scene]
     piles: dict[str, PileCase]
     cells: tuple[CellsCase, ...]
+    checks: dict[str, PileCase]
     cases: dict[str, Case]
 
-    def done(self, directory: Path) -> dict[str, dict[str, Any]]:
-        """The markers of the cases that are done, by name; their results are checked."""
-        found = {name: done_state(one, directory) for name, one in self.cases.items()}
-        return {name: state for name, state in found.items() if state is not None}
+    def done(
+        self, directory: Path, names: Iterable[str] | None = None
+    ) -> dict[str, dict[str, Any]]:
+        """The markers of the cases that are done, by name; their results are checked.
+
+        Only some of the cases are looked at if their names are given.
+        """
+        asked = [self.cases[name] for name in (self.cases if names is None else names)]
+        with ThreadPoolExecutor() as pool:  # gigabytes of results are read
+            states = pool.map(lambda one: done_state(one, directory), asked)
+        return {one.name: state for one, state in zip(asked, states, strict=True) if state}
 
 
-def make(study: Study) -> Plan:
+def make(study: Study, escalated: Mapping[str, Mapping[rungs.Part, str]] | None = None) -> Plan:
     """The cases that a study needs.
+
+    Parameters
+    ----------
+    study : Study
+        With a tolerance, each scene is answered on the cheapest rungs that are known to meet it.
+    escalated : mapping, optional
+        By scene id: rungs that turned out to be not good enough.
 
     Raises
     ------
     InputError
         If a scene asks for a flow that cannot be solved; with the study and the field.
     """
-    piles = {s.id: PileCase(s) for s in study.scenes if isinstance(s.bed, PileBed)}
-    cells = tuple(batches(s for s in study.scenes if not isinstance(s.bed, PileBed)))
+    tolerance, above = study.tolerance, escalated or {}
+    if tolerance is None:
+        return of({scene.id: scene for scene in study.scenes}, study.name)
+    chosen = {
+        scene.id: rungs.choose(scene, tolerance, above=above.get(scene.id))
+        for scene in study.scenes
+    }
+    return of(chosen, study.name, tolerance)
+
+
+def of(answers: Mapping[str, Scene], name: str, tolerance: float | None = None) -> Plan:
+    """The cases that answer some scenes; `name` names the study in messages.
+
+    With a tolerance, answers without DEM are checked by it.
+    """
+    piles = {
+        asked: PileCase(scene) for asked, scene in answers.items() if isinstance(scene.bed, PileBed)
+    }
+    grains = (scene for scene in answers.values() if not isinstance(scene.bed, PileBed))
+    cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
+    checked = checks.plan(piles, tolerance) if tolerance else {}
     try:
-        ordered: list[Case] = [need for pile in piles.values() for need in pile.needs]
+        ordered = [run for pile in (*piles.values(), *checked.values()) for run in pile.runs]
     except InputError as error:
-        place = f"{study.name}: {error.where}"
+        place = f"{name}: {error.where}"
         raise InputError(error.what, where=place, remedy=error.remedy) from None
-    return Plan(piles, cells, {case.name: case for case in (*ordered, *cells, *piles.values())})
+    return Plan(dict(answers), piles, cells, checked, _in_order([*ordered, *cells]))
+
+
+def settled(study: Study, directory: Path) -> Plan:
+    """The plan after what the finished checks say: where they overrule a rung, a dearer one."""
+    escalated: dict[str, checks.Above] = {}
+    while True:
+        planned = make(study, escalated)
+        if study.tolerance is None or not planned.checks:
+            return planned
+        done = planned.done(directory)
+        more = checks.overruled(planned.piles, planned.checks, study.tolerance, directory, done)
+        if not more:
+            return planned
+        escalated |= more
+
+
+def _in_order(cases: Iterable[Case]) -> dict[str, Case]:
+    """Every case once, those that others need first."""
+    listed = {case.name: case for case in cases}
+    first = {name: case for name, case in listed.items() if not case.needs}
+    return {**first, **listed}

@@ -19,6 +19,13 @@ from orchestrator.files import canonical_json, digest_text
 Positive = Annotated[float, Field(gt=0)]
 Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
+Method = Literal["dem", "peeling", "pivot"]
+Model = Literal["solve", "hill", "flat"]
+Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
+Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
+Forced = Literal["exposed", "all but crest", "all but toe"]
+BUILDABLE_DEG = (2.0, 60.0)
+"""Slopes of piles that can be meshed and packed."""
 
 
 class Part(BaseModel):
@@ -49,7 +56,7 @@ class Grain(Part):
     """phi, Coulomb's"""
     stiffness: Annotated[float, Field(ge=1e2, le=1e9)] = 1e4
     """K d/W of the contact's spring, normal and tangential"""
-    damping: Annotated[float, Field(gt=0, lt=1)] = 0.1
+    damping: Annotated[float, Field(ge=0, le=1)] = 0.1
     """damping ratio of a collision"""
 
 
@@ -79,35 +86,56 @@ class PileBed(Bed):
     packing: Packing = "aligned"
     """rows along the windward slope, level rows, or rows along the slope with random gaps"""
     disorder: Annotated[float, Field(gt=0, le=0.2)] = 0.02
-    """largest gap between two grains of the row under the mobile ones, d; if disordered"""
+    """largest gap between two grains of the row under the four uppermost, d; if disordered"""
     seed: Annotated[int, Field(ge=0)] = 0
     """which of the many disordered packings"""
-    mobile_layers: Annotated[int, Field(ge=1)] = 2
+    mobile_layers: Annotated[int, Field(ge=1, le=1000)] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
 
 
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
+    model: Model = "solve"
+    """of a pile's flow: OpenFOAM; linear theory of a low hill; or u* = u*_0 as on a flat bed"""
     speed: Positive = 10.0
     """U_e at which the flow over a pile is solved, m/s; it is then scaled"""
     viscosity: Positive = 1e-5
     """nu of that solve, m2/s: the wall is rough, the fluid's own nu moves only the grain's Re*"""
     first_cell_height: Positive | None = None
     """of the mesh on the bed, m; default: `default_first_cell_height`"""
-    cells_per_face: Annotated[int, Field(ge=10)] = 40
+    cells_per_face: Annotated[int, Field(ge=10, le=400)] = 40
     """of the mesh along each face of the pile"""
+    growth: Annotated[float, Field(gt=1, le=2)] = 1.1
+    """of the mesh: ratio of neighbouring cells up from the bed and away from the pile, with 40
+    along a face; it follows their number"""
+    roughness: Positive | None = None
+    """z0 of the solve, m, for beds of nearly the same one to share it; default: the bed's"""
+    turbulence: Turbulence = "kEpsilon"
+    """OpenFOAM's model of it"""
+    convection: Convection = "linearUpwind"
+    """OpenFOAM's scheme for the convection of U"""
+    correctors: Annotated[int, Field(ge=0, le=5)] = 1
+    """of the pressure for cells that are not orthogonal, in each iteration"""
     closure: Literal["auto", "low", "high"] = "auto"
     """which of Eqs. 2 and 4 gives the forces; auto: the valid one, or both in the transition"""
     lift_coefficient: Annotated[float, Field(ge=0)] = closures.LIFT_COEFFICIENT
     """alpha_s"""
     stress: Stress = "wall"
     """the flow's wall stress, or Eq. 10 at the first cell"""
+    average: Positive = 1 / 40
+    """least bed length, over h, that a grain's stress is averaged on: the crest's own value never
+    converges with the mesh"""
+    forced: Forced = "exposed"
+    """exposed grains of a pile that carry the flow's force: all, or without the topmost one, or
+    without those on the lowest 5 % of the windward face"""
 
 
 class Protocol(Part):
-    """How the threshold is found: the flow is raised in steps and held at each."""
+    """How the threshold is found; by DEM the flow is raised in steps and held at each."""
 
+    method: Method = "dem"
+    """dem; peeling, without dynamics; or pivot, each grain by itself (Eq. 3 or 5)"""
     step: Annotated[float, Field(gt=0, le=0.2)] = 0.02
     """relative rise of u* from one hold to the next"""
     quiet: Annotated[float, Field(ge=1)] = 10.0
@@ -118,7 +146,7 @@ class Protocol(Part):
     """the flow is raised until this fraction should have moved"""
     fractions: tuple[Annotated[float, Field(gt=0, le=1)], ...] = (0.1, 0.3, 0.5, 0.7)
     """n/N at which the thresholds of a pile are reported"""
-    timestep: Annotated[float, Field(gt=0, le=0.3)] = 0.2
+    timestep: Annotated[float, Field(gt=0, le=2)] = 0.2
     """of the grains' integration, in sqrt(m/K)"""
 
     @field_validator("fractions", mode="before")
@@ -145,12 +173,9 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
-        check_slope(
-            self.bed.slope_deg, self.bed.entrainment_angle_deg, self.grain.friction_angle_deg
-        )
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
-            check_first_cell(self.bed.roughness, self.first_cell_height)
+            check_mesh(self.bed.height, self.first_cell_height)
         elif self.bed.roughness >= self.grain.diameter:
             raise UnfitError(
                 "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
@@ -180,12 +205,17 @@ class Scene(Part):
         )
 
     @property
+    def solve_roughness(self) -> float:
+        """z0 at which the flow over a pile is solved, m."""
+        return self.flow.roughness or self.bed.roughness
+
+    @property
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
-        return default_first_cell_height(self.bed.height, self.bed.roughness)
+        return default_first_cell_height(self.bed.height, self.solve_roughness)
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
@@ -266,29 +296,28 @@ def check_density(density: float, fluid_density: float) -> None:
         )
 
 
-def check_slope(slope_deg: float, entrainment_angle_deg: float, friction_angle_deg: float) -> None:
-    """Beyond these limits a grain rolls or slides back without any flow."""
-    limit = min(friction_angle_deg, 90 - entrainment_angle_deg)
-    if slope_deg > limit + 1e-9:
-        raise UnfitError(
-            "bed.slope_deg",
-            f"{slope_deg:g} deg is beyond min(friction angle, 90 deg - entrainment angle)"
-            f" = {limit:g} deg",
-            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
-        )
-
-
 def check_pile(bed: PileBed, diameter: float) -> None:
-    """What the meshes and packings of piles can be built for."""
-    if not 10 <= bed.slope_deg <= 35:
+    """What meshes and packings of piles can be built at all."""
+    low, high = BUILDABLE_DEG
+    if not low <= bed.slope_deg <= high:
         raise UnfitError(
-            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", "choose 10 ... 35 deg"
+            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
         )
     if bed.height < 5 * diameter:
         raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
+        )
+
+
+def check_mesh(height: float, first_cell_height: float) -> None:
+    """The mesh must resolve the pile."""
+    if first_cell_height > height / 4:
+        raise UnfitError(
+            "flow.first_cell_height",
+            f"{first_cell_height:g} m is above a quarter of the pile's {height:g} m",
+            "lower it, or raise bed.height",
         )
 
 
@@ -301,17 +330,6 @@ def default_first_cell_height(height: float, roughness: float) -> float:
     """
     rough = min(30 * roughness, max(height / 20, 20 * roughness))
     return min(max(height / 40, rough), height / 4)
-
-
-def check_first_cell(roughness: float, first_cell_height: float) -> None:
-    """The rough wall's log law fails where the first cell's centre is near the roughness."""
-    if 4 * roughness > first_cell_height:
-        raise UnfitError(
-            "bed.roughness",
-            f"z0 = {roughness:g} m is above half of z_e = {first_cell_height / 2:g} m, the height"
-            " of the first cell's centre",
-            "lower it, or raise flow.first_cell_height or bed.height; z_e of 10 z0 is sound",
-        )
 
 
 def roughness_length(value: Any, diameter: float) -> Any:

@@ -1,10 +1,11 @@
 """How far a study came, read from its directory alone."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.case import DONE, failure
-from orchestrator.files import read_json
+from orchestrator.files import read_json, size_of
 from orchestrator.workspace import Workspace
 
 
@@ -24,6 +25,8 @@ class Status:
         Cases that failed, with the cause.
     page : Path or None
         The page, once it is drawn.
+    sizes : dict of str to int
+        Bytes on disk by what they belong to: a kind of case, or tables, figures and page.
     """
 
     name: str
@@ -33,6 +36,7 @@ class Status:
     waiting: tuple[str, ...]
     failed: dict[str, str]
     page: Path | None
+    sizes: dict[str, int]
 
 
 def read(directory: Path) -> Status:
@@ -54,7 +58,18 @@ def read(directory: Path) -> Status:
         waiting=_with(states, "waiting"),
         failed={name: failure(space.cases / name) or "" for name in _with(states, "failed")},
         page=space.page if space.drawn.is_file() and space.page.is_file() else None,
+        sizes=sizes(space),
     )
+
+
+def sizes(space: Workspace) -> dict[str, int]:
+    """Bytes on disk, by the kind of case, and of tables, figures and page together."""
+    found: dict[str, int] = {}
+    for directory in sorted(space.cases.iterdir()) if space.cases.is_dir() else ():
+        kind = f"{directory.name.partition('-')[0]} cases"
+        found[kind] = found.get(kind, 0) + size_of(directory)
+    found["tables, figures and page"] = size_of(space.root) - sum(found.values())
+    return found
 
 
 def _with(states: dict[str, str], wanted: str) -> tuple[str, ...]:
@@ -82,8 +97,24 @@ def text(status: Status) -> str:
     begun = "running" if status.running else "unfinished"
     lines += [f"  {begun}: {name}" for name in status.unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in status.failed.items()]
+    lines.append(f"size: {size_text(status.sizes)}")
     if status.page:
         lines.append(f"page: {status.page}")
     elif not status.running:
         lines.append("the same study command continues it")
     return "\n".join(lines)
+
+
+def size_text(sizes: Mapping[str, int]) -> str:
+    """Sizes for people: the total, then its parts, the largest first."""
+    parts = sorted(sizes.items(), key=lambda item: -item[1])
+    named = ", ".join(f"{_human(size)} {name}" for name, size in parts if size)
+    return f"{_human(sum(sizes.values()))} ({named})"
+
+
+def _human(size: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} GB"

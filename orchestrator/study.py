@@ -6,6 +6,8 @@ is one group.
 """
 
 import itertools
+import os
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,13 +16,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from orchestrator import assets
+from orchestrator import assets, limits
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.scene import PileBed, Scene, UnfitError, decide_regimes, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "cluster", "group")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
 TIME_LIMIT_S = 3600.0
 MOST_SCENES = 100_000
 
@@ -47,6 +49,8 @@ class Study:
         In the file's order; every scene has its closure decided.
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
+    tolerance : float or None
+        Relative error that tau_c may have; None: every scene as it is asked for.
     cluster : dict
         Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
@@ -57,6 +61,7 @@ class Study:
     title: str
     groups: tuple[Group, ...]
     time_limit_s: float
+    tolerance: float | None
     cluster: dict[str, Any]
     text: str
 
@@ -71,8 +76,8 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in assets.presets().glob("*.toml"))
 
 
-def load(source: str) -> Study:
-    """Read a study file, or a preset by its name.
+def load(source: str, *, guarded: bool = True) -> Study:
+    """Read a study file, or a preset by its name; `guarded` as in `parse`.
 
     Raises
     ------
@@ -81,7 +86,7 @@ def load(source: str) -> Study:
     """
     preset = assets.presets() / f"{source}.toml"
     path = preset if source in preset_names() else Path(source)
-    if not path.is_file():
+    if not _is_file(path):
         known = ", ".join(preset_names())
         raise InputError(
             "there is no such study file, nor a preset of this name",
@@ -92,11 +97,24 @@ def load(source: str) -> Study:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None
-    return parse(text, name=path.stem, where=source)
+    # a file's name may be bytes that are no text; the page and the tables are text
+    name = os.fsencode(path.stem).decode("utf-8", "replace")
+    if name.strip(".") == "":
+        raise InputError("a file of dots names no study", where=source, remedy="rename it")
+    return parse(text, name=name, where=source, guarded=guarded)
 
 
-def parse(text: str, *, name: str, where: str) -> Study:
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False
+
+
+def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
     """Make a study of a TOML file's text; `where` names the file in messages.
+
+    A guarded study refuses scenes beyond `limits`; an unguarded one what cannot be built.
 
     Raises
     ------
@@ -105,7 +123,9 @@ def parse(text: str, *, name: str, where: str) -> Study:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError("tables or lists are nested too deeply", where=where) from None
+    except ValueError as error:
         raise InputError(f"not TOML: {error}", where=where) from None
     _known(data, TOP_KEYS, where, "")
     limit = data.get("time_limit", TIME_LIMIT_S)
@@ -116,11 +136,31 @@ def parse(text: str, *, name: str, where: str) -> Study:
     title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    groups = tuple(_groups(data, where))
-    return Study(name, title, groups, float(limit), _table(data, "cluster", where), text)
+    groups = tuple(_groups(data, where, guarded))
+    tolerance = data.get("tolerance")
+    if tolerance is not None:
+        check_tolerance(tolerance, f"{where}: tolerance")
+    cluster = _table(data, "cluster", where)
+    return Study(name, title, groups, float(limit), tolerance, cluster, text)
 
 
-def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
+def check_tolerance(value: Any, where: str) -> None:
+    """A tolerance is a relative error between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value < 1:
+        raise InputError(
+            f"{value!r} is not a relative error between 0 and 1",
+            where=where,
+            remedy="0.05 allows tau_c to be 5 % off",
+        )
+
+
+def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Group]:
     listed = data.get("group", [{}])
     if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
         raise InputError(
@@ -130,7 +170,7 @@ def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
         place = f"{where}: group {number}" if "group" in data else where
         _known(item, GROUP_KEYS, place, "")
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
-        scenes = tuple(_scenes(merged, place))
+        scenes = tuple(_scenes(merged, place, guarded))
         yield Group(str(item.get("name", f"group {number}")), scenes)
 
 
@@ -149,7 +189,7 @@ def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> Iterator[Scene]:
     axes = tables["axes"]
     for key, values in axes.items():
         part, dot, field = key.partition(".")
@@ -168,7 +208,7 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]
     grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
-    scenes = [make_scene(parts, where) for parts in _points(tables, grid)]
+    scenes = [make_scene(parts, where, guarded=guarded) for parts in _points(tables, grid)]
     decide_regimes(scenes)
     for scene in scenes:
         yield from scene.resolved()
@@ -185,8 +225,10 @@ def _points(
         yield parts
 
 
-def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
+def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool = True) -> Scene:
     """Validate the tables of one scene; `where` names the file in messages.
+
+    A guarded scene is within `limits` too.
 
     Raises
     ------
@@ -196,9 +238,13 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
     bed = {"kind": "grain", **parts["bed"]}
     diameter = parts["grain"].get("diameter")
     try:
-        if isinstance(diameter, int | float):
+        # of a number beyond all floats the model says itself that it is wrong
+        if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
             bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
-        return Scene.model_validate({**parts, "bed": bed})
+        scene = Scene.model_validate({**parts, "bed": bed})
+        if guarded:
+            limits.check(scene)
+        return scene
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:

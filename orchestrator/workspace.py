@@ -1,16 +1,14 @@
 """A study's directory on disk: whose it is, who holds it, what it is called inside."""
 
 import contextlib
-import fcntl
-import os
-import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator import __version__
-from orchestrator.errors import InputError, OrchestratorError
+from orchestrator import __version__, lock
+from orchestrator.case import IDENTITY
+from orchestrator.errors import InputError
 from orchestrator.files import read_json, write_json
 
 MARKER = "study.json"
@@ -43,41 +41,27 @@ class Workspace:
         """Marker that tables, figures and page were finished, and of which cases."""
         return self.root / "report.json"
 
-    def claim(self, name: str, text: str, cases: list[str]) -> None:
-        """Make the directory this study's own, or take it up again.
+    def claim(self, name: str, cases: list[str], **about: Any) -> None:
+        """Say which study this is, and of which cases; only who holds the directory may.
 
-        Raises
-        ------
-        InputError
-            If it holds something else or cannot be written.
+        `about` is kept with it.
         """
-        try:
-            self.root.mkdir(parents=True, exist_ok=True)
-            strange = any(self.root.iterdir()) and not self.is_study()
-            if not strange:
-                self.cases.mkdir(exist_ok=True)
-                write_json(
-                    self.root / MARKER,
-                    {"orchestrator": __version__, "name": name, "study": text, "cases": cases},
-                )
-        except OSError as error:
-            raise InputError(
-                f"the output directory cannot be used: {error.strerror or error}",
-                where=str(self.root),
-                remedy="choose another with --out",
-            ) from None
-        if strange:
-            raise InputError(
-                "the output directory holds something that is not a study",
-                where=str(self.root),
-                remedy="choose an empty or a new one with --out",
-            )
+        # what a killed process was about to write
+        for path in self.root.glob(".*.tmp"):
+            path.unlink(missing_ok=True)
+        write_json(
+            self.root / MARKER,
+            {"orchestrator": __version__, "name": name, **about, "cases": cases},
+        )
 
     def is_study(self) -> bool:
-        """Whether the directory was made by `claim`, even if it was killed while it did."""
-        known = {MARKER, LOCK, "cases"}
+        """Whether the directory was made by `held`, whatever was lost of it since then."""
         names = {path.name for path in self.root.iterdir() if not path.name.endswith(".tmp")}
-        return (self.root / MARKER).is_file() or names <= known
+        return (
+            MARKER in names
+            or names <= {LOCK, "cases"}
+            or any(self.cases.glob(f"*-{'[0-9a-f]' * 12}/{IDENTITY}"))
+        )
 
     def description(self) -> dict[str, Any]:
         """What `claim` wrote.
@@ -87,46 +71,57 @@ class Workspace:
         InputError
             If the directory holds no study.
         """
-        value = read_json(self.root / MARKER)
-        if not isinstance(value, dict) or not {"name", "study", "cases"} <= value.keys():
+        value: Any = read_json(self.root / MARKER)
+        if not _describes(value):
             raise InputError(
                 "there is no study in this directory",
                 where=str(self.root),
                 remedy="name the directory that a study was written to",
             )
-        return value
+        return dict(value)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold the study while it runs; the system lets go of it however this process ends.
+        """Make the directory, or take it up again, and hold it while its study runs.
 
         Raises
         ------
+        InputError
+            If it holds something else or cannot be written.
         OrchestratorError
             If another process holds it.
         """
-        with (self.root / LOCK).open("a+", encoding="utf-8") as stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                stream.seek(0)
-                holder = stream.read().strip() or "another process"
-                raise OrchestratorError(
-                    f"the study is being run by {holder}",
-                    where=str(self.root),
-                    remedy="wait for its end, or choose another directory with --out",
-                ) from None
-            stream.truncate(0)
-            stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
-            stream.flush()
+        self._enter()
+        with lock.held(self.root / LOCK):
             yield
+
+    def _enter(self) -> None:
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+            ours = self.is_study()
+            if ours:
+                self.cases.mkdir(exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"the output directory cannot be used: {error.strerror or error}",
+                where=str(self.root),
+                remedy="choose another with --out",
+            ) from None
+        if not ours:
+            raise InputError(
+                "the output directory holds something that is not a study",
+                where=str(self.root),
+                remedy="choose an empty or a new one with --out",
+            )
 
     def is_held(self) -> bool:
         """Whether a running process holds the study."""
-        try:
-            with self.held():
-                return False
-        except OrchestratorError:
-            return True
-        except OSError:
-            return False
+        return lock.holder(self.root / LOCK) is not None
+
+
+def _describes(value: Any) -> bool:
+    try:
+        texts = [value["name"], value.get("study", ""), *value["cases"]]
+    except (AttributeError, KeyError, TypeError):
+        return False
+    return isinstance(value["cases"], list) and all(isinstance(text, str) for text in texts)

@@ -52,7 +52,7 @@ def finished(tmp_path: Path) -> tuple[Tiny, Path]:
     tiny = Tiny(1.0)
     directory = case.prepare(tiny, tmp_path)
     (directory / "result.txt").write_text("42\n")
-    case.finish(tiny, directory, solver_s=1.0, wall_s=1.5)
+    case.finish(tiny, directory, solver_s=1.0, cpu_s=1.0, wall_s=1.5)
     return tiny, tmp_path
 
 

@@ -53,7 +53,8 @@ def _table(count: int = 3) -> deck.GrainTable:
 
 def test_files_hold_every_digit(tmp_path: Path) -> None:
     grains = _table()
-    deck.write(tmp_path, grains, {"diameter": np.float64(1e-3), "levels": 7}, margin=0.1)
+    holds = np.array([1 / 3, 0.5])
+    deck.write(tmp_path, grains, {"diameter": np.float64(1e-3), "enough": 7}, holds, margin=0.1)
     lines = (tmp_path / "grains.data").read_text().splitlines()
     rows = [line.split() for line in lines[lines.index("Atoms") + 2 :]]
     np.testing.assert_array_equal([[float(v) for v in row[4:]] for row in rows], grains.position)
@@ -64,13 +65,15 @@ def test_files_hold_every_digit(tmp_path: Path) -> None:
     parameters = (tmp_path / "parameters.liggghts").read_text()
     assert [line.split()[:4] for line in parameters.splitlines()] == [
         ["variable", "diameter", "equal", "0.001"],
-        ["variable", "levels", "equal", "7"],
+        ["variable", "enough", "equal", "7"],
     ]
+    flows = (tmp_path / "holds.txt").read_text().splitlines()
+    assert [float(line) for line in flows] == holds.tolist()
 
 
 def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
     grains = _table()
-    deck.write(tmp_path, grains, {}, margin=0.1)
+    deck.write(tmp_path, grains, {}, np.ones(1), margin=0.1)
     bounds = [
         [float(v) for v in line.split()[:2]]
         for line in (tmp_path / "grains.data").read_text().splitlines()

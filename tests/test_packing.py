@@ -154,3 +154,32 @@ def test_a_seed_is_one_packing() -> None:
     same = _disordered(20.0, 3).centres
     np.testing.assert_array_equal(same, _disordered(20.0, 3).centres)
     assert not np.array_equal(same, _disordered(20.0, 4).centres)
+
+
+@pytest.mark.parametrize("pattern", ["aligned", "horizontal", "disordered"])
+def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(pattern: Pattern) -> None:
+    faces = []
+    for layers in (1, 2, 4):
+        found = packing.pile(
+            packing.Triangle(20.0, 15.0),
+            entrainment_angle_deg=60.0,
+            gap=1 / 30,
+            pattern=pattern,
+            mobile_layers=layers,
+            disorder=0.05,
+            seed=3,
+        )
+        faces.append(found.centres[found.windward])
+    np.testing.assert_array_equal(faces[0], faces[1])
+    np.testing.assert_array_equal(faces[0], faces[2])
+
+
+def test_no_pile_has_more_rows_than_its_height() -> None:
+    triangle = packing.Triangle(20.0, 10.0)
+    most, more = (
+        packing.pile(
+            triangle, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=n
+        )
+        for n in (20, 1000)
+    )
+    np.testing.assert_array_equal(most.mobile, more.mobile)

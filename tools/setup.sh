@@ -12,8 +12,6 @@ cd -- "$(dirname -- "$0")/.."
 solvers="openfoam liggghts"
 # What the gmsh wheel links against.
 gmsh_libraries="libgl1 libglu1-mesa libxft2 libxcursor1 libxinerama1 libgomp1"
-# What VTK draws with where there is no screen; with neither this nor EGL it crashes.
-vtk_libraries="libosmesa6"
 # What the tests of a cluster start nodes with; filled in for the tests alone.
 slurm=
 
@@ -28,7 +26,7 @@ die() {
 }
 
 missing_packages() {
-    wanted="$solvers $gmsh_libraries $vtk_libraries $slurm"
+    wanted="$solvers $gmsh_libraries $slurm"
     # Any Python will do to make the environment with; Debian's comes without the means.
     if ! venv_works && ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
         wanted="python3 python3-venv $wanted"

@@ -10,15 +10,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.case import Case
-from orchestrator.closures import KARMAN
-from orchestrator.errors import InputError, SolverError
+from orchestrator.errors import Exploded, InputError, SolverError
+from orchestrator.flow import diagnostics
+from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
-from orchestrator.scene import default_first_cell_height
+from orchestrator.scene import BUILDABLE_DEG, Convection, Turbulence
 from orchestrator.solvers import openfoam
 
 WALL_STRESS = "wall_stress.csv"
+DIAGNOSTICS = "diagnostics.csv"
 LID_OVER_HEIGHT = 10.0
+FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
+"""Of the last iteration; epsilon or omega, as the turbulence model has it."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +48,20 @@ class FlowCase(Case):
         The stress depends on it: `default_first_cell_height` is the choice of the studies.
     cells_per_face : int
         Cells along each face of the pile; the others follow.
+    growth : float
+        Ratio of neighbouring cells up from the bed and away from the pile, with 40 cells on a face;
+        it follows the number of cells, so that twice of these is a mesh twice as fine.
+    turbulence : str
+        OpenFOAM's model of it: kEpsilon, RNGkEpsilon, realizableKE or kOmegaSST.
+    convection : str
+        Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
+    correctors : int
+        Of the pressure for cells that are not orthogonal, in each iteration.
 
     Raises
     ------
     InputError
-        If a field is out of the range in which the model holds.
+        If the case cannot be built.
     """
 
     slope_deg: float
@@ -58,59 +71,58 @@ class FlowCase(Case):
     viscosity_m2_s: float
     first_cell_m: float
     cells_per_face: int = 40
+    growth: float = 1.1
+    turbulence: Turbulence = "kEpsilon"
+    convection: Convection = "linearUpwind"
+    correctors: int = 1
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 2
-    results: ClassVar[tuple[str, ...]] = tuple(
-        f"[1-9]*/{field}" for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress")
+    recipe: ClassVar[int] = 4
+    results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
+    derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
+    bulky: ClassVar[tuple[str, ...]] = (
+        "[1-9]*/**/*",
+        "constant/polyMesh/**/*",
+        "postProcessing/**/*",
     )
-    derived: ClassVar[tuple[str, ...]] = (WALL_STRESS,)
 
     def __post_init__(self) -> None:
         self._check_numbers()
-        self._check_scales()
+        self._check_mesh()
 
     def _check_numbers(self) -> None:
         for name, value in self.parameters.items():
-            if not isfinite(value) or (value <= 0.0 and name != "slope_deg"):
+            if isinstance(value, str) or (value == 0 and name in ("slope_deg", "correctors")):
+                continue
+            if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
-        if self.slope_deg != 0.0 and not 5.0 <= self.slope_deg <= 40.0:
+
+    def _check_mesh(self) -> None:
+        low, high = BUILDABLE_DEG
+        if self.slope_deg != 0.0 and not low <= self.slope_deg <= high:
             raise InputError(
-                f"{self.slope_deg:g} is neither 0 nor within 5 to 40 degrees", where="slope_deg"
+                f"{self.slope_deg:g} is neither 0 nor within {low:g} to {high:g} degrees",
+                where="slope_deg",
             )
         if not 8 <= self.cells_per_face <= 400:
             raise InputError(
                 f"{self.cells_per_face} is not within 8 to 400", where="cells_per_face"
             )
-
-    def _check_scales(self) -> None:
-        default = default_first_cell_height(self.height_m, self.roughness_m)
-        if not 4.0 * self.roughness_m <= self.first_cell_m <= self.height_m / 4.0:
+        if not 1.0 < self.growth <= 2.0:
+            raise InputError(f"{self.growth:g} is not within 1 to 2", where="growth")
+        if self.first_cell_m > self.height_m / 4.0:
             raise InputError(
-                f"{self.first_cell_m:g} m is not between 4 z0 = {4 * self.roughness_m:g} m, below "
-                f"which the log law fails, and h/4 = {self.height_m / 4:g} m",
+                f"{self.first_cell_m:g} m is above h/4 = {self.height_m / 4:g} m",
                 where="first_cell_m",
-                remedy=f"the default is {default:g}; if that is too high, z0 is too large",
-            )
-        eddy_over_molecular = (
-            KARMAN * self.ustar0_m_s * self.first_cell_m / 2.0 / self.viscosity_m2_s
-        )
-        if eddy_over_molecular < 1.0:
-            raise InputError(
-                "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
-                f"{eddy_over_molecular:.2g} of the molecular one",
-                where="viscosity_m2_s",
-                remedy="take the field of a lower viscosity or a higher speed: u*/U_e is the same",
             )
 
     @property
     def parameters(self) -> dict[str, Any]:
         """The fields, as JSON; SI units, degrees."""
-        cells = int(self.cells_per_face)
-        return {name: float(value) for name, value in asdict(self).items()} | {
-            "cells_per_face": cells
-        }
+        whole = {name: int(getattr(self, name)) for name in ("cells_per_face", "correctors")}
+        fields = asdict(self).items()
+        return {n: v if isinstance(v, str) else float(v) for n, v in fields} | whole
 
     @property
     def ustar0_m_s(self) -> float:
@@ -128,7 +140,7 @@ class FlowCase(Case):
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
-        growth = 1.1 ** (40.0 / self.cells_per_face)
+        growth = self.growth ** (40.0 / self.cells_per_face)
         face = 1.0 / tan(radians(self.slope_deg)) if self.slope_deg else 4.0
         toe = 1.7 * face / self.cells_per_face
         beside = _grown(10.0 / toe, growth) + _grown(20.0 / toe, growth)
@@ -147,6 +159,9 @@ class FlowCase(Case):
             lidHeight=LID_OVER_HEIGHT * self.height_m,
             roughnessLength=self.roughness_m,
             viscosity=self.viscosity_m2_s,
+            turbulence=self.turbulence,
+            convection=self.convection,
+            correctors=self.correctors,
         )
         _set_values(
             directory / "parameters.geo",
@@ -154,25 +169,36 @@ class FlowCase(Case):
             height=self.height_m,
             first_cell=self.first_cell_m,
             cells_per_face=self.cells_per_face,
+            growth_at_40=self.growth,
         )
         write_mesh(directory)
 
     def collect(self, directory: Path) -> None:
-        """Check the run and write `wall_stress.csv`.
+        """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
 
         Raises
         ------
         SolverError
-            If the run failed or did not converge, or if the stress is not usable.
+            If the run failed or did not converge, or if the stress is not usable; as `Exploded` or
+            `Stalled` where that is how it ended.
         """
         openfoam.check_log(directory)
         stress = read_openfoam(directory)
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
+        found = diagnostics.of(
+            stress,
+            slope_deg=self.slope_deg,
+            height=self.height_m,
+            roughness=self.roughness_m,
+            reynolds=self.ustar0_m_s / self.viscosity_m2_s,
+        )
+        diagnostics.to_csv(found, directory / DIAGNOSTICS)
+        self._check_upstream(found["upstream_ustar_over_ustar0"], directory)
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
-            raise SolverError("the stress on the bed is not a number", where=str(directory))
+            raise Exploded("the stress on the bed is not a number", where=str(directory))
         low, high = stress.z_e_m.min(), stress.z_e_m.max()
         # flat parts of the bed have it larger by 1/cos(slope)
         if not 0.48 * self.first_cell_m < low <= high < 0.7 * self.first_cell_m:
@@ -182,17 +208,25 @@ class FlowCase(Case):
                 remedy="remove the case and run it again",
             )
 
+    def _check_upstream(self, upstream: Diagnostic, directory: Path) -> None:
+        if not upstream.sound:
+            raise SolverError(
+                f"on the undisturbed bed u* is {upstream.value:.3f} u*_0: the wall's log law fails",
+                where=str(directory),
+                remedy=f"{DIAGNOSTICS} says more; raise the first cell's height or the speed",
+            )
+
 
 def _grown(length_over_first: float, growth: float) -> float:
     """How many cells that grow by `growth` fill a length."""
     return log(1.0 + length_over_first * (growth - 1.0)) / log(growth)
 
 
-def _set_values(path: Path, **values: float) -> None:
-    """Replace the values in a template's list of numbers; its comments stay."""
+def _set_values(path: Path, **values: float | str) -> None:
+    """Replace the values in a template's list; its comments stay."""
     text = path.read_text(encoding="utf-8")
     for name, value in values.items():
-        text, found = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{value!r};", text)
+        text, found = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{value};", text)
         if found != 1:
             raise ValueError(f"{path.name} has {found} entries named {name}")
     path.write_text(text, encoding="utf-8")

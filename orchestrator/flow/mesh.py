@@ -1,7 +1,9 @@
 """The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
 
 import re
+import signal
 import threading
+from dataclasses import dataclass
 from math import cos, radians
 from pathlib import Path
 from typing import Any
@@ -10,19 +12,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
+from orchestrator.solvers import process
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
 
 _GMSH = threading.Lock()  # gmsh has one global state
 _TOLERANCE = 0.01
+_QUAD, _HEXAHEDRON = 3, 5  # gmsh's element types
 
 Points = NDArray[np.float64]
 Cells = NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class Mesh:
+    """The mesh of a pile.
+
+    Attributes
+    ----------
+    points : (P, 3) array
+        Nodes, m.
+    cells : (C, 8) array
+        Nodes of each hexahedron, in the order of VTK.
+    bed : (F, 4) array
+        Nodes of the faces of the bed.
+    """
+
+    points: Points
+    cells: Cells
+    bed: Cells
+
+
 def write_mesh(directory: Path) -> None:
     """Mesh a case: `pile.geo` with its `parameters.geo` becomes `pile.msh`, ASCII 2.2.
+
+    The mesh must hold hexahedra only, none of them inverted, the physical groups in `GROUPS`, and
+    first cells of the height `first_cell` (normal to the faces of the pile) within 1 %.
 
     Parameters
     ----------
@@ -34,24 +60,16 @@ def write_mesh(directory: Path) -> None:
     SolverError
         If gmsh fails, or the mesh is not the one asked for.
     """
-    with _GMSH:
-        _generate(directory)
-    check_mesh(directory)
-
-
-def _generate(directory: Path) -> None:
     gmsh = _gmsh()
-    # the default installs a signal handler, which only the main thread may
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(directory / "pile.geo"))
-        gmsh.model.mesh.generate(3)
-        gmsh.write(str(directory / "pile.msh"))
-    except Exception as error:  # gmsh raises nothing narrower
-        raise _unusable(f"gmsh failed: {error}", directory) from error
-    finally:
-        gmsh.finalize()
+    with _GMSH:
+        with process.handler_kept(signal.SIGTERM):
+            # the default installs a signal handler, which only the main thread may
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
+        try:
+            _check(_generated(gmsh, directory), directory)
+            gmsh.write(str(directory / "pile.msh"))
+        finally:
+            gmsh.finalize()
 
 
 def _gmsh() -> Any:
@@ -65,39 +83,40 @@ def _gmsh() -> Any:
     return gmsh
 
 
-def check_mesh(directory: Path) -> None:
-    """Check that `pile.msh` is what `parameters.geo` asks for.
-
-    It must hold hexahedra only, none of them inverted, the physical groups in `GROUPS`, and
-    first cells of the height `first_cell` (normal to the faces of the pile) within 1 %.
-
-    Raises
-    ------
-    SolverError
-        If it is not.
-    """
-    mesh = _read(directory)
-    missing = GROUPS - mesh.field_data.keys()
+def _generated(gmsh: Any, directory: Path) -> Mesh:
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(directory / "pile.geo"))
+        gmsh.model.mesh.generate(3)
+    except Exception as error:  # gmsh raises nothing narrower
+        raise _unusable(f"gmsh failed: {error}", directory) from error
+    groups = {gmsh.model.getPhysicalName(*group): group for group in gmsh.model.getPhysicalGroups()}
+    missing = GROUPS - groups.keys()
     if missing:
         raise _unusable(f"without the physical groups {sorted(missing)}", directory)
-    solids = {block.type for block in mesh.cells if block.dim == 3}
-    if solids != {"hexahedron"}:
-        raise _unusable(f"of {sorted(solids)}, not of hexahedra only", directory)
-    cells = mesh.cells_dict["hexahedron"]
-    inverted = int(np.count_nonzero(smallest_jacobian(mesh.points, cells) <= 0.0))
+    if list(gmsh.model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
+        raise _unusable("not of hexahedra only", directory)
+    return _arrays(gmsh, groups["bed"])
+
+
+def _arrays(gmsh: Any, bed: tuple[int, int]) -> Mesh:
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    place[tags] = np.arange(len(tags))
+    surfaces = gmsh.model.getEntitiesForPhysicalGroup(*bed)
+    quads = [gmsh.model.mesh.getElementsByType(_QUAD, int(surface))[1] for surface in surfaces]
+    return Mesh(
+        points=coordinates.reshape(-1, 3),
+        cells=place[gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[1]].reshape(-1, 8),
+        bed=place[np.concatenate(quads)].reshape(-1, 4),
+    )
+
+
+def _check(mesh: Mesh, directory: Path) -> None:
+    inverted = int(np.count_nonzero(smallest_jacobian(mesh.points, mesh.cells) <= 0.0))
     if inverted:
         raise _unusable(f"with {inverted} inverted cells", directory)
     _check_first_cells(first_cell_heights(mesh), directory)
-
-
-def _read(directory: Path) -> Any:
-    import meshio
-
-    try:
-        # not meshio.read, which ends the program where it cannot read
-        return meshio.gmsh.read(directory / "pile.msh")
-    except (meshio.ReadError, OSError, ValueError, LookupError) as error:
-        raise _unusable(f"not readable: {error}", directory) from error
 
 
 def smallest_jacobian(points: Points, cells: Cells) -> NDArray[np.float64]:
@@ -124,16 +143,13 @@ def smallest_jacobian(points: Points, cells: Cells) -> NDArray[np.float64]:
     return np.asarray(determinants.min(axis=1), dtype=np.float64)
 
 
-def first_cell_heights(mesh: Any) -> NDArray[np.float64]:
+def first_cell_heights(mesh: Mesh) -> NDArray[np.float64]:
     """Vertical extent of the cells on the bed, m; shape (faces of the bed,)."""
-    tag = mesh.field_data["bed"][0]
-    quads = mesh.cells_dict["quad"][mesh.cell_data_dict["gmsh:physical"]["quad"] == tag]
     on_bed = np.zeros(len(mesh.points), dtype=bool)
-    on_bed[quads] = True
-    cells = mesh.cells_dict["hexahedron"]
-    below = on_bed[cells]
+    on_bed[mesh.bed] = True
+    below = on_bed[mesh.cells]
     lowest = below.sum(axis=1) == 4
-    heights = np.where(below[lowest], -1.0, 1.0) * mesh.points[cells[lowest], 2]
+    heights = np.where(below[lowest], -1.0, 1.0) * mesh.points[mesh.cells[lowest], 2]
     return np.asarray(heights.sum(axis=1) / 4.0, dtype=np.float64)
 
 

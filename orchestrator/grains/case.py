@@ -11,8 +11,9 @@ class GrainCase(Case):
     """A case that runs the deck ``in.bed``."""
 
     template: ClassVar[str] = "liggghts/bed"
-    results: ClassVar[tuple[str, ...]] = ("levels.csv", "passage.dump", "bed.dump")
+    results: ClassVar[tuple[str, ...]] = ("settling.csv", "levels.csv", "passage.dump", "bed.dump")
     derived: ClassVar[tuple[str, ...]] = ("holds.csv", "motion.csv")
+    bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""

@@ -14,13 +14,14 @@ import numpy as np
 
 from orchestrator.closures import Powers
 from orchestrator.files import canonical_json
-from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.scene import Scene
 
 DIAMETER = 1e-3
 DENSITY = 2500.0
 GRAVITY = 9.81
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 """The reference grain of a deck, SI; GRAVITY is its g'."""
 LAST = 1.2
 """Flow of the last hold: a grain that still lies then contradicts the closed form by 20 %."""
@@ -38,7 +39,7 @@ class CellsCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 4
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -65,20 +66,23 @@ class CellsCase(GrainCase):
             "density": DENSITY,
             "gravity": GRAVITY,
             **protocol.contact(self._grain, rules),
-            **protocol.holds(rules, first=protocol.START, last=LAST, enough=0),
-            # no face, no ceiling: the planes lie far above the box
+            **protocol.raising(rules, enough=0),
+            # no face, no ceiling, no crest: the planes lie far outside the box
             "slope": 0.0,
             "ceiling_x": 0.0,
             "ceiling_z": 1e3 * DIAMETER,
+            "behind": 1e3 * DIAMETER,
         }
-        deck.write(directory, self._grains(), parameters, margin=4 * DIAMETER)
+        holds = protocol.holds(protocol.START, LAST, rules.step)
+        deck.write(directory, self._grains(), parameters, holds, margin=4 * DIAMETER)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains()
         marker = self.scenes[0].protocol.marker
-        found = motion.read(directory, grains, marker, all_rest=False)
+        rest.check(directory, grains, WEIGHT, self._grain.stiffness, all_rest=False)
+        found = motion.read(directory, grains, marker)
         found.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:
@@ -105,7 +109,7 @@ def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray, deck.FloatArr
     outward = np.array([-along[1], along[0]])
     behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
     own_threshold = scene.closed_form(scene.closure).friction_velocity
-    scale = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY / scene.weight
+    scale = WEIGHT / scene.weight
     drag, lift = (
         Powers(tuple(scale * c for c in force.coefficients), force.exponents)
         for force in scene.powers()

@@ -24,18 +24,18 @@ MEANING = {
     "stiffness": "K d/W, normal and tangential",
     "damping": "ratio of a collision",
     "timestep": "sqrt(m/K)",
-    "first": "flow of the first hold",
-    "rise": "flow of a hold over that of the one before",
-    "levels": "most holds",
     "quiet": "a hold ends when nothing has passed for this long, sqrt(d/g')",
     "look": "time between two looks at the grains, sqrt(d/g')",
     "settle": "time before the first hold, sqrt(d/g')",
     "settle_flow": "flow meanwhile, over that of the first hold",
     "marker": "displacement along the bed that counts as motion, d",
+    "stir": "displacement from which on passage.dump lists a grain, d",
+    "away": "displacement along the bed from which on a counted grain is gone, d",
     "enough": "the end: no more counted grains than this still lie",
     "slope": "of both faces, degrees",
     "ceiling_x": "ridge of the roof above which a grain in flight is gone, m",
     "ceiling_z": "its height, m",
+    "behind": "place along x behind which every grain is gone, m",
 }
 """Parameters of the deck, with their units."""
 
@@ -70,6 +70,16 @@ class GrainTable:
         """Ids (from 1) of the grains whose motion is counted."""
         return np.flatnonzero(self.kind == COUNTED) + 1
 
+    @property
+    def last_mobile(self) -> float:
+        """The furthest x of a grain that may move, m."""
+        return float(self.position[self.kind != FIXED, 0].max())
+
+    @property
+    def mobile_count(self) -> int:
+        """How many grains may move."""
+        return int((self.kind != FIXED).sum())
+
 
 def force_table(
     drag: Powers, lift: Powers, speed: FloatArray, along: FloatArray, outward: FloatArray
@@ -95,9 +105,13 @@ def force_table(
 
 
 def write(
-    directory: Path, grains: GrainTable, parameters: Mapping[str, float | int], margin: float
+    directory: Path,
+    grains: GrainTable,
+    parameters: Mapping[str, float | int],
+    holds: FloatArray,
+    margin: float,
 ) -> None:
-    """Write the grains and parameters of a deck.
+    """Write the grains, parameters and holds of a deck.
 
     Parameters
     ----------
@@ -107,6 +121,8 @@ def write(
         The grains; ids are their places, from 1.
     parameters : mapping
         Each becomes a variable of the deck.
+    holds : ndarray
+        The flow of each hold, in turn.
     margin : float
         Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
     """
@@ -118,6 +134,7 @@ def write(
         for name, value in numbers.items()
     )
     (directory / "parameters.liggghts").write_text("".join(lines))
+    (directory / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in holds.tolist()))
     for power, vectors in zip(POWERS, grains.force, strict=True):
         _write_vectors(directory / "force", f"{power}.", vectors)
     _write_vectors(directory / "along", "", grains.along)

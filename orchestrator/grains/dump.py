@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.errors import SolverError
+from orchestrator.errors import Exploded, SolverError
 from orchestrator.grains.deck import GrainTable
 
 FloatArray = NDArray[np.float64]
@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 PASSAGE = "passage.dump"
 BED = "bed.dump"
 PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay")
+BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 
 
 @dataclass(frozen=True)
@@ -38,37 +39,78 @@ class Track:
     roll: FloatArray
 
 
-def read_track(path: Path, grains: GrainTable, steps: NDArray[np.int64]) -> Track:
-    """Read ``passage.dump``, which begins with the places after settling.
+def read_track(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> Track:
+    """Read what the counted grains did at each look; arguments as in `read_passage`."""
+    ids = grains.counted_ids
+    state = read_passage(directory, ids, looks)
+    return _track(state, grains.along[ids - 1], grains.diameter)
+
+
+def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> FloatArray:
+    """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (T + 1, N, 5).
+
+    First after settling, then at each look. NaN of a grain that is gone; one that the deck does
+    not list and that ``bed.dump`` has at the end of the hold is at rest where it had settled.
 
     Parameters
     ----------
-    path : Path
-        The dump.
-    grains : GrainTable
-        As the deck was given them.
-    steps : ndarray, shape (T,)
-        Time step of each look.
+    directory : Path
+        The case.
+    ids : ndarray of int, shape (N,)
+        Ids of the counted grains, rising.
+    looks : DataFrame
+        The deck's table of looks, T rows.
 
     Raises
     ------
     SolverError
-        If the dump is not one of these grains and looks, or holds none of them.
+        If a dump is not one of these grains and looks.
+    Exploded
+        If it holds none of them.
     """
+    path = directory / PASSAGE
     dump = read_dump(path, PASSAGE_COLUMNS)
-    ids, rows = grains.counted_ids, dump.rows
-    if not np.array_equal(dump.steps[1:], steps):
+    if not np.array_equal(dump.steps[1:], looks["step"]):
         raise SolverError("it is not of these holds", where=str(path), remedy="run the case again")
+    rows = dump.rows
     if rows.empty or not rows["id"].isin(ids).all():
-        raise SolverError(
-            "every counted grain was lost" if rows.empty else "it is not of these grains",
-            where=str(path),
-            remedy="a smaller protocol.timestep, or look for grains that overlap",
-        )
+        remedy = "a smaller protocol.timestep, or look for grains that overlap"
+        if rows.empty:
+            raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
+        raise SolverError("it is not of these grains", where=str(path), remedy="run the case again")
     state = np.full((len(dump.steps), len(ids), len(PASSAGE_COLUMNS) - 1), np.nan)
     row, column = np.searchsorted(dump.steps, rows["step"]), np.searchsorted(ids, rows["id"])
     state[row, column] = rows[list(PASSAGE_COLUMNS[1:])]
-    return _track(state, grains.along[ids - 1], grains.diameter)
+    listed = ~np.isnan(state[1:, :, 0])
+    resting = ~listed & _there(listed, _left(directory, ids, looks), looks)
+    at_rest = np.pad(state[0, :, :2], ((0, 0), (0, 3)))
+    state[1:] = np.where(resting[:, :, None], at_rest, state[1:])
+    return state
+
+
+def _left(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> NDArray[np.bool_]:
+    """Which counted grains there were at the end of each hold, shape (holds, N)."""
+    bed = read_dump(directory / BED, BED_COLUMNS)
+    ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
+    if not np.array_equal(bed.steps, ends):
+        raise SolverError(
+            "it is not of these holds", where=str(directory / BED), remedy="run the case again"
+        )
+    rows = bed.rows[bed.rows["id"].isin(ids)]
+    found = np.zeros((len(ends), len(ids)), bool)
+    found[np.searchsorted(ends, rows["step"]), np.searchsorted(ids, rows["id"])] = True
+    return found
+
+
+def _there(
+    listed: NDArray[np.bool_], left: NDArray[np.bool_], looks: pd.DataFrame
+) -> NDArray[np.bool_]:
+    """Which grains were there at each look: those that are listed, or seen later in the hold."""
+    found = np.empty_like(listed)
+    for left_then, (_, one) in zip(left, looks.reset_index().groupby("level"), strict=True):
+        rows = one.index
+        found[rows] = np.logical_or.accumulate(listed[rows][::-1])[::-1] | left_then
+    return found
 
 
 def _track(state: FloatArray, along: FloatArray, diameter: float) -> Track:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
 from orchestrator.grains.deck import GrainTable
-from orchestrator.grains.dump import PASSAGE, Track, read_track
+from orchestrator.grains.dump import Track, read_track
 from orchestrator.grains.protocol import SETTLE_FLOW
 
 FloatArray = NDArray[np.float64]
@@ -47,12 +47,38 @@ class Motion:
         unless it had passed the marker before.
     mode : ndarray of int, shape (N,)
         How it moved: index into `MODES`.
+    exact : bool
+        Whether a grain moves at its level's very flow, as by a formula; else between the hold
+        before and that one.
     """
 
     flow: FloatArray
     level: IntArray
     fallen: IntArray
     mode: IntArray
+    exact: bool = False
+
+    @classmethod
+    def of_flows(cls, flows: FloatArray) -> "Motion":
+        """The motion of grains that roll at known flows, shape (N,); infinite for never."""
+        moves = np.isfinite(flows)
+        levels = np.unique(flows[moves])
+        # before the first level nothing moves
+        flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
+        level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
+        none, rolled = MODES.index("none"), MODES.index("rolled")
+        return cls(
+            flow=flow,
+            level=level,
+            fallen=np.zeros_like(level),
+            mode=np.where(moves, rolled, none),
+            exact=True,
+        )
+
+    @property
+    def low(self) -> FloatArray:
+        """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
+        return self.flow if self.exact else self.flow[np.maximum(np.arange(len(self.flow)), 1) - 1]
 
     def moved_by(self, level: int) -> NDArray[np.bool_]:
         """Which grains have moved by the end of a hold."""
@@ -114,7 +140,7 @@ class Motion:
         )
 
 
-def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) -> Motion:
+def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
     """Read the deck's tables of a finished run.
 
     Parameters
@@ -125,9 +151,6 @@ def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) 
         As the deck was given them.
     marker : float
         Displacement that counts as motion, diameters.
-    all_rest : bool
-        Whether every grain must come to rest before the flow rises: those of a pile must, cells
-        are each a bed of their own and may be one that holds no grain.
 
     Raises
     ------
@@ -135,14 +158,7 @@ def read(directory: Path, grains: GrainTable, marker: float, *, all_rest: bool) 
         If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
     """
     looks = _looks(directory)
-    track = read_track(directory / PASSAGE, grains, looks["step"].to_numpy(np.int64))
-    if all_rest and not track.stayed.all():
-        raise SolverError(
-            f"{int((~track.stayed).sum())} of {len(track.stayed)} grains were lost before the flow"
-            " rose",
-            where=str(directory / PASSAGE),
-            remedy="a smaller protocol.timestep, or look for grains that overlap",
-        )
+    track = read_track(directory, grains, looks)
     present = ~np.isnan(track.travel)
     _reconcile(directory, looks, track, present, marker)
     fallen = ~track.stayed | (present & (track.travel <= -marker))

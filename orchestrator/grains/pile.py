@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from orchestrator import packing
 from orchestrator.case import Case
 from orchestrator.errors import InputError
-from orchestrator.flow.case import FlowCase
+from orchestrator.flow import theory
+from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import deck, motion, protocol
+from orchestrator.grains import deck, motion, peeling, protocol, rest
 from orchestrator.grains.case import GrainCase
+from orchestrator.grains.motion import Motion
 from orchestrator.scene import PileBed, Scene
 
 FloatArray = NDArray[np.float64]
@@ -22,9 +24,8 @@ FloatArray = NDArray[np.float64]
 MARGIN = 3.0
 """From the outermost grains to the walls of the box, and from a face to the height at which a
 grain in flight is gone, diameters."""
-AVERAGE_OVER_HEIGHT = 1 / 40
-"""Least bed length, over h, that a grain's stress is averaged on: the crest's own value never
-converges with the mesh."""
+TOE = 0.05
+"""Of the windward face: its lowest part, of the knob `flow.forced`."""
 
 FIELD_OF = {
     "height_m": "bed.height",
@@ -33,6 +34,8 @@ FIELD_OF = {
     "viscosity_m2_s": "flow.viscosity",
     "first_cell_m": "flow.first_cell_height",
     "cells_per_face": "flow.cells_per_face",
+    "growth": "flow.growth",
+    "correctors": "flow.correctors",
 }
 """What a study file calls the fields of a flow case."""
 
@@ -56,6 +59,9 @@ class Face:
     speed: FloatArray
 
 
+_packed = cache(packing.pile)
+
+
 @cache
 def _flow_case(**fields: Any) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
@@ -68,7 +74,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 6
 
     @property
     def bed(self) -> PileBed:
@@ -78,16 +84,23 @@ class PileCase(GrainCase):
 
     @cached_property
     def flow(self) -> FlowCase:
-        """The flow that gives the stress; scenes that differ in their grains alone share it."""
+        """The solved flow that gives the stress; scenes that differ in their grains alone share it.
+
+        Where the stress is that of a theory, its u*_0 and U_e are the theory's too.
+        """
         try:
             return _flow_case(
                 slope_deg=self.bed.slope_deg,
                 height_m=self.bed.height,
-                roughness_m=self.bed.roughness,
+                roughness_m=self.scene.solve_roughness,
                 speed_m_s=self.scene.flow.speed,
                 viscosity_m2_s=self.scene.flow.viscosity,
                 first_cell_m=self.scene.first_cell_height,
                 cells_per_face=self.scene.flow.cells_per_face,
+                growth=self.scene.flow.growth,
+                turbulence=self.scene.flow.turbulence,
+                convection=self.scene.flow.convection,
+                correctors=self.scene.flow.correctors,
             )
         except InputError as error:
             field = FIELD_OF.get(error.where, error.where)
@@ -95,8 +108,13 @@ class PileCase(GrainCase):
 
     @property
     def needs(self) -> tuple[Case, ...]:
-        """The flow."""
-        return (self.flow,)
+        """The flow, where it is solved."""
+        return (self.flow,) if self.scene.flow.model == "solve" else ()
+
+    @property
+    def runs(self) -> tuple[Case, ...]:
+        """The cases that its answer is read from: the flow's and, by DEM, its own."""
+        return (*self.needs, self) if self.scene.protocol.method == "dem" else self.needs
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -108,7 +126,9 @@ class PileCase(GrainCase):
         """Expected wall time, s."""
         rules = self.scene.protocol
         count = self.bed.height / np.sin(np.radians(self.bed.slope_deg)) / self.scene.grain.diameter
-        grains = count * (self.bed.mobile_layers + 3)
+        # the whole pile is half its rows thick on average
+        layers = min(self.bed.mobile_layers, self.bed.height / self.scene.grain.diameter / 2)
+        grains = count * (layers + 3)
         holds = np.log(3.5) / np.log1p(rules.step)
         return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
 
@@ -119,8 +139,8 @@ class PileCase(GrainCase):
 
     @cached_property
     def packing(self) -> packing.Packing:
-        """The grains' places, in diameters."""
-        return packing.pile(
+        """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        return _packed(
             self.triangle,
             entrainment_angle_deg=self.bed.entrainment_angle_deg,
             gap=self.bed.roughness / self.scene.grain.diameter,
@@ -134,35 +154,60 @@ class PileCase(GrainCase):
         """Write the grains with their forces, and the holds of the protocol."""
         speed = self._speed(cases)
         rules = self.scene.protocol
-        thresholds = self.pivot_thresholds(speed[self.packing.windward])
+        thresholds = np.sort(self._peeled(speed))
         last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-        d = self.scene.grain.diameter
+        d, grains = self.scene.grain.diameter, self._grains(speed)
         ceiling = (MARGIN + 0.5) / np.cos(np.radians(self.bed.slope_deg))
         parameters = {
             "diameter": d,
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
-            **protocol.holds(
-                rules,
-                first=protocol.START * thresholds[0],
-                last=protocol.BEYOND * last,
-                enough=int((1 - rules.until) * self.packing.count + 1e-9),
-            ),
+            **protocol.raising(rules, int((1 - rules.until) * self.packing.count + 1e-9)),
             "slope": self.bed.slope_deg,
             "ceiling_x": self.triangle.crest[0] * d,
             "ceiling_z": (self.triangle.crest[1] + ceiling) * d,
+            "behind": grains.last_mobile + protocol.AWAY * d,
         }
-        deck.write(directory, self._grains(speed), parameters, margin=MARGIN * d)
+        first, last = protocol.START * thresholds[0], protocol.BEYOND * last
+        holds = protocol.holds(first, last, rules.step)
+        deck.write(directory, grains, parameters, holds, margin=MARGIN * d)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains(self._speed(directory.parent))
-        found = motion.read(directory, grains, self.scene.protocol.marker, all_rest=True)
+        grain = self.scene.grain
+        rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
+        found = motion.read(directory, grains, self.scene.protocol.marker)
         found.to_csv(directory, grains)
+
+    def motion(self, cases: Path) -> Motion:
+        """What the windward grains do, by the scene's method; from the finished cases.
+
+        Only the deck shows how a grain moves: without it, all roll.
+        """
+        if self.scene.protocol.method == "dem":
+            return Motion.from_csv(cases / self.name)
+        speed = self._speed(cases)
+        if self.scene.protocol.method == "pivot":
+            return Motion.of_flows(self._alone(speed[self.packing.windward]))
+        return Motion.of_flows(self._peeled(speed))
+
+    def _peeled(self, speed: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s."""
+        grains = self._grains(speed)
+        flows = peeling.flows(
+            self.packing.centres,
+            grains.kind >= deck.COUNTED,
+            grains.force,
+            weight=self.scene.weight,
+            along=self.triangle.tangent,
+            marker=self.scene.protocol.marker,
+        )
+        return np.asarray(flows[self.packing.windward])
 
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""
@@ -178,22 +223,45 @@ class PileCase(GrainCase):
 
         Sorted, shape (N,); infinite for grains in flow that runs back.
         """
-        alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
         if not np.any(speed > 0):
             raise InputError(
                 "no grain of the windward face feels a flow up the slope",
                 where=f"scene {self.scene.id}: flow",
                 remedy="look at the flow case; the mesh or the stress is wrong",
             )
-        return np.sort(np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf))
+        return np.sort(self._alone(speed))
+
+    def _alone(self, speed: FloatArray) -> FloatArray:
+        alone = float(self.scene.closed_form(self.scene.closure).friction_velocity)
+        return np.where(speed > 0, alone / np.where(speed > 0, speed, 1), np.inf)
+
+    def stress(self, cases: Path) -> WallStress:
+        """The flow's stress along the bed: of the finished flow case, or of the scene's theory."""
+        bed = self.bed
+        match self.scene.flow.model:
+            case "flat":
+                return theory.flat(bed.slope_deg, bed.height)
+            case "hill":
+                return theory.hill(bed.slope_deg, bed.height, self.scene.solve_roughness)
+            case "solve":
+                return WallStress.from_csv(cases / self.flow.name / WALL_STRESS)
 
     def _speed(self, cases: Path) -> FloatArray:
-        """Signed friction velocity at each grain over the undisturbed one."""
-        stress = WallStress.from_csv(cases / self.flow.name / "wall_stress.csv")
-        d = self.scene.grain.diameter
-        length = max(d, AVERAGE_OVER_HEIGHT * self.bed.height)
-        tau = stress.mean_over(self.packing.arc_length * d, length, self.scene.flow.stress)
-        return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+        """Signed friction velocity that drives each grain over the undisturbed one."""
+        flow, d = self.scene.flow, self.scene.grain.diameter
+        length = max(d, flow.average * self.bed.height)
+        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)
+        return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
+
+    @property
+    def _forgotten(self) -> NDArray[np.bool_]:
+        """Grains that go without the flow's force though they are exposed."""
+        windward, s = self.packing.windward, self.packing.arc_length
+        if self.scene.flow.forced == "all but crest":
+            return np.asarray(windward & (s == s[windward].max()))
+        if self.scene.flow.forced == "all but toe":
+            return np.asarray(windward & (s < TOE * np.linalg.norm(self.triangle.crest)))
+        return np.zeros_like(windward)
 
     def _grains(self, speed: FloatArray) -> deck.GrainTable:
         bed, d = self.packing, self.scene.grain.diameter

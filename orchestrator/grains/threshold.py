@@ -31,7 +31,7 @@ class Thresholds:
 def of_grains(motion: Motion) -> Thresholds:
     """The deck's flow at which each counted grain moved, shape (N,)."""
     moved = motion.level > 0
-    low = np.where(moved, motion.flow[np.maximum(motion.level, 1) - 1], np.nan)
+    low = np.where(moved, motion.low[motion.level], np.nan)
     high = np.where(moved, motion.flow[motion.level], np.nan)
     return Thresholds(np.sqrt(low * high), low, high)
 
@@ -104,7 +104,7 @@ def of_pile(
     below = _first_level(motion, fraction - half_a_grain) or level
     # where half a grain more was not reached, the interval is open: it ends at the last hold
     above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
-    flow = math.sqrt(motion.flow[level - 1] * motion.flow[level])
+    flow = math.sqrt(motion.low[level] * motion.flow[level])
 
     def stress(at: int, ustar0: float) -> float:
         return fluid_density * float(ustar0) ** 2 * _mean_stress(motion, speed, at)
@@ -113,7 +113,7 @@ def of_pile(
         fraction=fraction,
         ustar0=flow,
         tau=stress(level, flow),
-        tau_low=stress(below, motion.flow[below - 1]),
+        tau_low=stress(below, motion.low[below]),
         tau_high=stress(above, motion.flow[above]),
     )
 

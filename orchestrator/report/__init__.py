@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
+    from orchestrator.case import Case
     from orchestrator.plan import Plan
     from orchestrator.study import Study
     from orchestrator.tables import Tables
@@ -55,3 +56,15 @@ def write(
     write_durably(out / CLAIMS, claims.frame(judged).to_csv(index=False))
     write_durably(out / PAGE, page.render(results, figures, timings, failures, judged))
     return out / PAGE
+
+
+def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
+    """The cases whose bulky files the page's pictures are drawn from."""
+    from orchestrator.report import flow_picture, grain_picture
+    from orchestrator.report.results import Results
+
+    results = Results(study, plan, tables, cases)
+    if "pile_threshold" not in tables:
+        return []
+    grains = [one for pile in grain_picture.chosen(results) for one in (pile, pile.flow)]
+    return [*grains, *(pile.flow for pile in flow_picture.chosen(results))]

@@ -93,7 +93,8 @@ def accuracy(dem: pd.DataFrame) -> str:
     return (
         "Friction velocity at the threshold by DEM over that of Eq. 3 or 5 with the same forces. "
         "Bars: between the holds without and with motion, so a threshold met exactly lies within "
-        f"its bar. Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
+        f"its bar. {'Panels differ in scale. ' if dem['step'].nunique() > 1 else ''}"
+        f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
         + (HOLLOW if not holds.all() else "")
     )
 
@@ -173,6 +174,18 @@ def flow(piles: list[PileCase]) -> str:
         f"{speeds} m/s; the fields of other speeds are taken to be similar. White: streamlines, "
         "the closed ones around the flow that runs back, at arbitrary spacing. Only the part near "
         "the pile is shown: the lid is at 10 h. To scale."
+    )
+
+
+def mesh(pile: PileCase) -> str:
+    """Of the picture of the mesh."""
+    flow, z0 = pile.flow, pile.bed.roughness
+    return (
+        "After Fig. 11 of the paper, which has triangles. Hexahedra, one cell deep, by gmsh: "
+        f"{flow.cells_per_face} along each face of the pile; the first cells are "
+        f"{flow.first_cell_m / z0:.3g} z₀ high, as the log law of the rough wall needs, and grow "
+        "away from the bed and from the pile. Above: near the pile (the lid is at 10 h); below: "
+        "the crest, as boxed. To scale. No grains: the flow sees the smooth faces."
     )
 
 

@@ -8,6 +8,7 @@ from platform import python_version
 import pandas as pd
 
 from orchestrator import __version__
+from orchestrator import rungs as ladder
 from orchestrator.case import IDENTITY
 from orchestrator.files import read_json
 from orchestrator.report import labels
@@ -38,6 +39,8 @@ PARAMETERS = (
     "z0_over_d",
     "h_m",
     "packing",
+    "disorder",
+    "seed",
     "mobile_layers",
     "closure",
     "stress",
@@ -47,6 +50,7 @@ PARAMETERS = (
     "step",
     "quiet",
     "marker",
+    "timestep",
 )
 """Columns of the table of scenes that the page lists."""
 MANY = 12
@@ -163,8 +167,12 @@ def programs(results: Results) -> Sheet:
         found = identity.get("programs", {}) if isinstance(identity, dict) else {}
         for program, version in found.items():
             used.setdefault(str(program), set()).add(str(version))
-    rows = [(program, ", ".join(sorted(versions))) for program, versions in sorted(used.items())]
-    rows += [("orchestrator", __version__), ("Python", python_version())]
+    return versions({program: ", ".join(sorted(found)) for program, found in used.items()})
+
+
+def versions(solvers: Mapping[str, str]) -> Sheet:
+    """Solvers with their versions, this package, and the libraries."""
+    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
     return Sheet(("program", "version"), (*rows, *_installed(PACKAGES)))
 
 
@@ -236,3 +244,52 @@ def _stray_grains(results: Results) -> list[str]:
     if silent.any():
         found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
     return found
+
+
+def rungs(results: Results) -> Sheet | None:
+    """On which rungs of the ladder the piles were answered, and what is known of them."""
+    table = results.tables.get("pile_threshold", pd.DataFrame())
+    if table.empty:
+        return None
+    rows = []
+    for (flow, grains), own in split(table, "flow_rung", "grain_rung"):
+        known = own["error_estimate"].max()
+        rows.append(
+            (
+                f"{flow} | {grains}",
+                _meaning(str(flow), str(grains)),
+                str(own["scene_id"].nunique()),
+                "not known" if pd.isna(known) else f"{100 * known:.1f} %",
+            )
+        )
+    return Sheet(
+        ("flow | grains", "what they are", "piles", "known error of τ_c, up to"), tuple(rows)
+    )
+
+
+def _meaning(flow: str, grains: str) -> str:
+    meanings = (ladder.meaning("flow", flow), ladder.meaning("grains", grains))
+    return "; ".join(text for text in meanings if text)
+
+
+def checks(results: Results) -> Sheet | None:
+    """The piles that DEM answered as well: how far the cheap answers are from it."""
+    table = results.tables.get("check", pd.DataFrame())
+    if table.empty:
+        return None
+    rows = [
+        (
+            f"{one['alpha_deg']:g}°, {one['packing']}, {one['closure']}",
+            f"{1e3 * one['d_m']:g} mm",
+            f"{one['fraction']:.0%}",
+            f"{one['shields']:.4g}",
+            f"{one['shields_dem']:.4g} "
+            f"({one['shields_dem_low']:.4g} … {one['shields_dem_high']:.4g})",
+            f"{100 * one['difference']:+.1f} %",
+            "yes" if one["agree"] else "no",
+            str(one["case"]),
+        )
+        for one in table.to_dict("records")
+    ]
+    head = ("piles", "d", "n/N", "τ_c", "by DEM", "difference", "agree", "case")
+    return Sheet(head, tuple(rows))

@@ -18,9 +18,7 @@ class Figure:
     cases : tuple of str
         Directories of the cases behind it.
     canvas : matplotlib.figure.Figure or None
-        The drawing; None where it could not be made.
-    missing : str
-        Why it could not.
+        The drawing; None once its files are written.
     """
 
     name: str
@@ -28,4 +26,3 @@ class Figure:
     caption: str
     cases: tuple[str, ...]
     canvas: Canvas | None
-    missing: str = ""

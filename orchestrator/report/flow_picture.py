@@ -9,38 +9,37 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from orchestrator.case import is_whole
 from orchestrator.grains.pile import PileCase
-from orchestrator.report import captions, stress, style
+from orchestrator.report import captions, flow_field, stress, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.picture import Picture
+from orchestrator.report.flow_field import Window
 from orchestrator.report.results import Results
 
 FloatArray = NDArray[np.float64]
 
 BEFORE, BEHIND, ABOVE = 2.0, 8.0, 3.0
 """Flow shown before the windward toe, behind the lee toe, and above the flat bed, h."""
-COLUMNS = 1400
-Window = tuple[float, float, float, float]
+COLUMNS = 1000
 
 
-def plan(results: Results, folder: Path) -> Iterator[Picture]:
+def draw(results: Results) -> Iterator[Figure]:
     """One figure with a panel for each slope and height, at its least z0."""
-    chosen: dict[tuple[float, float], PileCase] = {}
-    for pile in stress.choose(results):
-        chosen.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
-    if not chosen:
+    piles = chosen(results)
+    if not piles:
         return
-    piles = list(chosen.values())
-    window = _window(piles)
     names = tuple(pile.flow.name for pile in piles)
-    yield Picture(
-        Figure("flow", "Flow over the pile", captions.flow(piles), names, None),
-        tuple(
-            sampling(results.cases, pile, window, pile.bed.height, _file(folder, pile))
-            for pile in piles
-        ),
-        lambda: _frame(piles, window, folder),
-    )
+    canvas = _frame(piles, results.cases)
+    yield Figure("flow", "Flow over the pile", captions.flow(piles), names, canvas)
+
+
+def chosen(results: Results) -> list[PileCase]:
+    """A pile for each panel; a flow whose files were pruned has none."""
+    found: dict[tuple[float, float], PileCase] = {}
+    for pile in stress.choose(results):
+        if is_whole(pile.flow, results.cases):
+            found.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
+    return list(found.values())
 
 
 def _window(piles: list[PileCase]) -> Window:
@@ -49,30 +48,21 @@ def _window(piles: list[PileCase]) -> Window:
     return -BEFORE, toe + BEHIND, 0.0, ABOVE
 
 
-def sampling(
-    cases: Path, pile: PileCase, window: Window, unit: float, out: Path
-) -> dict[str, object]:
-    """The job that samples the velocity over a pile; the window is in a unit, that in m."""
+def sampled(pile: PileCase, cases: Path, window: Window, unit: float) -> FloatArray:
+    """The velocity over a pile in a window over the one at the lid; the window is in a unit, m."""
     left, right, bottom, top = window
     rows = round(COLUMNS * (top - bottom) / (right - left))
-    return {
-        "kind": "flow",
-        "case": str((cases / pile.flow.name).resolve()),
-        "window": [edge * unit for edge in window],
-        "shape": [rows, COLUMNS],
-        "out": str(out),
-    }
+    metres = left * unit, right * unit, bottom * unit, top * unit
+    found = flow_field.velocity(cases / pile.flow.name, metres, (rows, COLUMNS))
+    return found / pile.scene.flow.speed
 
 
-def _file(folder: Path, pile: PileCase) -> Path:
-    return folder / f"{pile.flow.name}.npy"
-
-
-def _frame(piles: list[PileCase], window: Window, folder: Path) -> Canvas:
+def _frame(piles: list[PileCase], cases: Path) -> Canvas:
+    window = _window(piles)
     figure = style.canvas(1.5 * len(piles) + 0.8)
     axes = list(figure.subplots(len(piles), 1, sharex=True, squeeze=False)[:, 0])
     for ax, pile in zip(axes, piles, strict=True):
-        image = _panel(ax, pile, window, np.load(_file(folder, pile)))
+        image = _panel(ax, pile, window, sampled(pile, cases, window, pile.bed.height))
     axes[-1].set_xlabel("$x/h$ from the windward toe")
     bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
     bar.set_label(r"speed over that at the lid, $|\mathbf{u}|/U_e$")
@@ -80,10 +70,9 @@ def _frame(piles: list[PileCase], window: Window, folder: Path) -> Canvas:
 
 
 def _panel(ax: Axes, pile: PileCase, window: Window, velocity: FloatArray) -> AxesImage:
-    relative = velocity / pile.scene.flow.speed
-    speed = np.linalg.norm(relative, axis=-1)
+    speed = np.linalg.norm(velocity, axis=-1)
     image = ax.imshow(speed, origin="lower", extent=window, cmap="viridis", vmin=0, vmax=1.1)
-    _streamlines(ax, window, relative)
+    _streamlines(ax, window, velocity)
     half = 1 / np.tan(np.radians(pile.bed.slope_deg))
     ax.fill([0, half, 2 * half], [0, 1, 0], color=style.BED, lw=0)
     x = [window[0], 0, half, 2 * half, window[1]]

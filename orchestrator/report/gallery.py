@@ -1,20 +1,23 @@
 """All figures of a study, in the order of the page."""
 
+import contextlib
 import multiprocessing
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
 from matplotlib import rc_context
 
+from orchestrator import retry
+from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
     animation,
     flow_picture,
     grain_picture,
-    pictures,
+    mesh_picture,
     piles,
     single,
     stress,
@@ -22,28 +25,47 @@ from orchestrator.report import (
 )
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
+from orchestrator.solvers import process
 
 Drawn = tuple[Figure, bytes]
-"""A figure without its canvas, and its image: PNG, of an animation GIF, b"" if it is missing."""
+"""A figure without its canvas, and its image: PNG, of an animation GIF."""
 
 
 def draw(results: Results, folder: Path) -> list[Drawn]:
     """Write each figure's files into a folder; give it with its image.
 
     The sections are drawn side by side: matplotlib holds one core for seconds a figure.
+
+    Raises
+    ------
+    OrchestratorError
+        If the processes that draw are killed again and again.
     """
     _shared.append(results)
     try:
-        # forked, the workers have the results and the imported libraries already
-        context = multiprocessing.get_context("fork")
-        workers = min(os.cpu_count() or 1, len(SECTIONS))
-        with ProcessPoolExecutor(workers, mp_context=context) as pool:
-            parts = list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
+        parts = _parts(folder)
     finally:
         _shared.clear()
     # the order of the page: the pictures stand behind the single grains
     order = [part for _, part in sorted(zip(PLACES, parts, strict=True), key=lambda pair: pair[0])]
     return [drawn for part in order for drawn in part]
+
+
+def _parts(folder: Path) -> list[list[Drawn]]:
+    # forked, the workers have the results and the imported libraries already
+    context = multiprocessing.get_context("fork")
+    workers = min(os.cpu_count() or 1, len(SECTIONS))
+    for _ in range(retry.MOST):
+        with (
+            contextlib.suppress(BrokenProcessPool),
+            ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),)) as pool,
+        ):
+            return list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
+    raise OrchestratorError(
+        "a process that draws figures was killed",
+        where=str(folder),
+        remedy="out of memory? `orchestrator report` draws them again",
+    )
 
 
 _shared: list[Results] = []
@@ -57,18 +79,15 @@ def _section(number: int, folder: Path) -> list[Drawn]:
 
 def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:
     for figure in figures:
-        image = style.save(figure.canvas, folder, figure.name) if figure.canvas else b""
-        yield replace(figure, canvas=None), image
+        if figure.canvas:
+            image = style.save(figure.canvas, folder, figure.name)
+            yield replace(figure, canvas=None), image
 
 
 def _pictures(results: Results, folder: Path) -> Iterator[Drawn]:
-    with tempfile.TemporaryDirectory(prefix="orchestrator-") as name:
-        scratch = Path(name)
-        planned = [*flow_picture.plan(results, scratch), *grain_picture.plan(results, scratch)]
-        cause = ""
-        if planned:
-            cause = pictures.run([job for picture in planned for job in picture.jobs], scratch)
-        yield from _saved((picture.finished(cause) for picture in planned), folder)
+    yield from _saved(mesh_picture.draw(results), folder)
+    yield from _saved(flow_picture.draw(results), folder)
+    yield from _saved(grain_picture.draw(results), folder)
     yield from animation.draw(results, folder)
 
 

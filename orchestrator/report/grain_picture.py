@@ -1,8 +1,8 @@
 """The grains of a pile when a fraction of them has moved: how far, and how under which flow."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,23 +11,23 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize, to_rgb, to_rgba_array
 from matplotlib.figure import Figure as Canvas
-from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from orchestrator.grains.pile import PileCase
-from orchestrator.report import captions, flow_picture, labels, snapshot, style
+from orchestrator.report import captions, flow_picture, labels, snapshot, spheres, style
 from orchestrator.report import grain_marks as marks
 from orchestrator.report.figure import Figure
 from orchestrator.report.grain_marks import Window
-from orchestrator.report.picture import Picture
 from orchestrator.report.results import Results, split, valid
 from orchestrator.report.snapshot import Snapshot
 
+FloatArray = NDArray[np.float64]
+
 FRACTION = 0.3
 """n/N of the instant that is shown, or the nearest that the study reports."""
-PIXELS = 2000
+PIXELS = 1400
 GONE = "#b03030"
 TICKS = (0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30)
 SCALE = ScalarMappable(LogNorm(TICKS[0], TICKS[-1]), colormaps["YlOrRd"])
@@ -38,81 +38,62 @@ SPEED = ScalarMappable(Normalize(0, 1), PALE)
 
 @dataclass(frozen=True)
 class Shown:
-    """What a figure shows: a pile at an instant, in some windows, with files by their stems."""
+    """What a figure shows: a pile at an instant, in some windows, and the flow over the last."""
 
     pile: PileCase
     found: Snapshot
     windows: list[Window]
-    folder: Path
-
-    def file(self, stem: str) -> Path:
-        """Where a job leaves what this figure needs."""
-        return self.folder / f"{self.pile.name}-{stem}"
+    velocity: FloatArray
 
 
-def plan(results: Results, folder: Path) -> Iterator[Picture]:
-    """One figure for each slope: of its largest grains, whose closure holds if any does."""
-    for pile in chosen(results):
+def draw(results: Results) -> Iterator[Figure]:
+    """One figure for each slope: of its largest grains, whose closure holds if any does.
+
+    None where that pile's flow is a theory's, which has no field to show.
+    """
+    for pile in (one for one in chosen(results) if one.needs):
         fraction = min(pile.scene.protocol.fractions, key=lambda f: abs(f - FRACTION))
         passage = snapshot.read(pile, results.cases)
         look = passage.first(fraction)
         if look is not None:
-            shown = Shown(pile, passage.at(look), marks.windows(pile), folder)
-            yield _picture(shown, results.cases, fraction)
+            windows, d = marks.windows(pile), pile.scene.grain.diameter
+            velocity = flow_picture.sampled(pile, results.cases, windows[-1], d)
+            yield _figure(Shown(pile, passage.at(look), windows, velocity), fraction)
 
 
 def chosen(results: Results) -> Iterator[PileCase]:
-    """The pile that stands for all of its slope, by rising slope; of equals the study's first."""
+    """The pile that stands for all of its slope, by rising slope; of equals the study's first.
+
+    A pile whose files were pruned stands for nothing.
+    """
     for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
         order = rows.assign(valid=valid(rows)).sort_values(
             ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
-        yield results.plan.piles[str(order["scene_id"].iloc[0])]
+        piles = (results.plan.piles[str(scene_id)] for scene_id in order["scene_id"])
+        yield from itertools.islice(filter(results.has_files, piles), 1)
 
 
-def _picture(shown: Shown, cases: Path, fraction: float) -> Picture:
-    pile, found = shown.pile, shown.found
-    spheres = [
-        _spheres(shown, f"far-{number}", window, _by_distance(found))
-        for number, window in enumerate(shown.windows)
-    ]
-    spheres.append(_spheres(shown, "how", shown.windows[-1], _by_mode(found)))
-    d = pile.scene.grain.diameter
-    flow = flow_picture.sampling(cases, pile, shown.windows[-1], d, shown.file("flow.npy"))
-    alpha = labels.plain("alpha_deg", pile.bed.slope_deg)
-    figure = Figure(
+def _figure(shown: Shown, fraction: float) -> Figure:
+    pile = shown.pile
+    d, alpha = pile.scene.grain.diameter, labels.plain("alpha_deg", pile.bed.slope_deg)
+    return Figure(
         f"grains-alpha{pile.bed.slope_deg:g}",
         f"Grains when {fraction:.0%} have moved, {alpha}, d = {labels.millimetres(d)}",
-        captions.grains(pile, found, fraction),
+        captions.grains(pile, shown.found, fraction),
         (pile.name, pile.flow.name),
-        None,
+        _frame(shown),
     )
-    return Picture(figure, (*spheres, flow), lambda: _frame(shown))
 
 
-def _spheres(
-    shown: Shown, stem: str, window: Window, colours: NDArray[np.float64]
-) -> dict[str, object]:
-    grains, present = shown.file(f"{stem}.npz"), ~shown.found.gone
-    shades = np.asarray(np.rint(255 * colours[present]), np.uint8)
-    np.savez(grains, centres=shown.found.place[present], colours=shades)
-    return {
-        "kind": "grains",
-        "grains": str(grains),
-        "window": window,
-        "pixels": [PIXELS, round(PIXELS * marks.shape(window))],
-        "out": str(shown.file(f"{stem}.png")),
-    }
-
-
-def _by_distance(found: Snapshot) -> NDArray[np.float64]:
+def _by_distance(found: Snapshot) -> FloatArray:
     shades = SCALE.to_rgba(np.maximum(found.displacement, 1e-9))[:, :3]
     shades[found.displacement < TICKS[0]] = to_rgb(marks.LYING)
     shades[~found.mobile] = to_rgb(marks.FIXED)
     return np.asarray(shades)
 
 
-def _by_mode(found: Snapshot) -> NDArray[np.float64]:
+def _by_mode(found: Snapshot) -> FloatArray:
     return to_rgba_array(marks.by_mode(found))[:, :3]
 
 
@@ -120,8 +101,8 @@ def _frame(shown: Shown) -> Canvas:
     shapes = [marks.shape(window) for window in (*shown.windows, shown.windows[-1])]
     figure = style.canvas(6.4 * sum(shapes) + 2.6)
     axes = list(figure.subplots(len(shapes), 1, height_ratios=shapes, squeeze=False)[:, 0])
-    for number, (ax, window) in enumerate(zip(axes, shown.windows, strict=False)):
-        _panel(ax, shown, window, f"far-{number}", GONE)
+    for ax, window in zip(axes, shown.windows, strict=False):
+        _panel(ax, shown, window, _by_distance(shown.found), GONE)
     for left, right, bottom, top in shown.windows[1:]:
         box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="0.2", lw=0.7)
         axes[0].add_patch(box)
@@ -143,18 +124,20 @@ def _bars(figure: Canvas, axes: list[Axes]) -> None:
 
 def _how(ax: Axes, shown: Shown) -> None:
     window, found = shown.windows[-1], shown.found
-    velocity = np.load(shown.file("flow.npy"))
-    speed = np.linalg.norm(velocity, axis=-1) / shown.pile.scene.flow.speed
+    speed = np.linalg.norm(shown.velocity, axis=-1)
     ax.imshow(speed, origin="lower", extent=window, cmap=PALE, vmin=0, vmax=1, zorder=0)
-    _panel(ax, shown, window, "how", marks.edges(found))
+    _panel(ax, shown, window, _by_mode(found), marks.edges(found))
     marks.place(marks.symbols(ax, window), found)
 
 
-def _panel(ax: Axes, shown: Shown, window: Window, stem: str, edges: str | list[str]) -> None:
+def _panel(
+    ax: Axes, shown: Shown, window: Window, colours: FloatArray, edges: str | list[str]
+) -> None:
     marks.ground(ax, shown.pile, window)
-    gone = shown.found.start[shown.found.gone]
-    marks.discs(ax, gone, fc="white", ec=edges, lw=0.6, zorder=1, gid="gone")
-    ax.imshow(imread(shown.file(f"{stem}.png")), extent=window, zorder=2)
+    found, here = shown.found, ~shown.found.gone
+    marks.discs(ax, found.start[found.gone], fc="white", ec=edges, lw=0.6, zorder=1, gid="gone")
+    image = spheres.picture(found.place[here], colours[here], window, PIXELS)
+    ax.imshow(image, extent=window, zorder=2)
 
 
 def _entries() -> list[Artist]:

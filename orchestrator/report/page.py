@@ -34,7 +34,7 @@ def render(
     results : Results
         What the study gave.
     figures : sequence of (Figure, bytes)
-        The figures with their PNG; no bytes where one is missing.
+        The figures with their images, PNG or GIF.
     timings : DataFrame
         Wall times of the finished cases.
     failures : mapping of str to str
@@ -42,16 +42,19 @@ def render(
     judged : sequence of Claim
         The paper's claims.
     """
-    return _template().render(
+    return fill(
+        "page.html.j2",
+        title=results.study.title,
         study=results.study,
-        css=(FOLDER / "page.css").read_text(encoding="utf-8"),
         scene_count=len(results.scenes),
         case_count=len(results.plan.cases),
         piles=facts.piles(results),
         single_grains=facts.single_grains(results),
+        rungs=facts.rungs(results),
+        checks=facts.checks(results),
         remarks=facts.remarks(results, failures),
         card=claims.card(judged, [figure.name for figure, _ in figures]),
-        figures=[_entry(figure, png) for figure, png in figures],
+        figures=[entry(figure, png) for figure, png in figures],
         failures=failures,
         links=links(results),
         tables=list(results.tables),
@@ -63,8 +66,14 @@ def render(
     )
 
 
+def fill(template: str, **values: Any) -> str:
+    """The HTML of one of the templates beside this file."""
+    css = (FOLDER / "page.css").read_text(encoding="utf-8")
+    return _template(template).render(css=css, **values)
+
+
 @cache
-def _template() -> Template:
+def _template(name: str) -> Template:
     environment = Environment(
         loader=FileSystemLoader(FOLDER),
         autoescape=True,
@@ -72,7 +81,7 @@ def _template() -> Template:
         trim_blocks=True,
     )
     environment.filters["typeset"] = typeset
-    return environment.get_template("page.html.j2")
+    return environment.get_template(name)
 
 
 def typeset(text: str) -> Markup:
@@ -80,9 +89,10 @@ def typeset(text: str) -> Markup:
     return Markup(re.sub(r"(?<=\w)_([A-Za-z]+)", r"<sub>\1</sub>", str(escape(text))))
 
 
-def _entry(figure: Figure, png: bytes) -> dict[str, Any]:
+def entry(figure: Figure, png: bytes) -> dict[str, Any]:
+    """What the templates need of a figure and its image."""
     data = base64.b64encode(png).decode("ascii")
-    kept = ("name", "title", "caption", "cases", "missing")
+    kept = ("name", "title", "caption", "cases")
     return {"data": data, **{name: getattr(figure, name) for name in kept}}
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from orchestrator.case import is_whole
 from orchestrator.grains.pile import PileCase
 from orchestrator.plan import Plan
 from orchestrator.study import Study
@@ -56,6 +57,10 @@ class Results:
     def values(self, column: str) -> list[float]:
         """The values that the study's scenes have in a column, rising."""
         return sorted({float(value) for value in self.scenes[column].dropna()})
+
+    def has_files(self, pile: PileCase) -> bool:
+        """Whether a pile and its flow still have the files that pictures are drawn from."""
+        return all(is_whole(one, self.cases) for one in (pile, *pile.needs))
 
     @cached_property
     def flows(self) -> dict[str, PileCase]:

@@ -123,26 +123,35 @@ def _panel(
 
 
 def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
-    """u* of DEM over that of the closed form."""
-    figure = style.canvas(3.1)
-    ax = figure.subplots()
+    """u* of DEM over that of the closed form, a panel for each step of the holds."""
     ratio = dem["ustar_closed_form_m_s"]
     rows = dem.assign(
         value=dem["ustar_m_s"] / ratio,
         low=dem["ustar_low_m_s"] / ratio,
         high=dem["ustar_high_m_s"] / ratio,
     )
+    panels = list(split(rows, "step"))
+    figure = style.canvas(2.1 * len(panels) + 1.0)
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     colours = style.palette("alpha_deg", results.values("alpha_deg"))
+    axes[0].set_xscale("log")
+    for ax, ((step,), part) in zip(axes, panels, strict=True):
+        _ratios(ax, part, colours)
+        ax.set_title(f"flow raised by {100 * float(str(step)):.3g}% from hold to hold", loc="left")
+    for ax in axes:
+        style.plain_ticks(ax.xaxis)
+        shields.shade_transition(ax)
+    axes[-1].set_xlabel(labels.RE_AXIS)
+    entries = _colour_entries(rows, "alpha_deg", colours)
+    style.legends(figure, entries, shields.point_entries(rows))
+    cases = tuple(sorted(set(dem["case"])))
+    return Figure("accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure)
+
+
+def _ratios(ax: Axes, rows: pd.DataFrame, colours: dict[float, str]) -> None:
     ax.axhline(1, color="0.3", lw=0.8, zorder=1)
     for alpha, colour in colours.items():
         own = rows[rows["alpha_deg"] == alpha]
         shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
     reach = 1.6 * float(np.nanmax(np.abs(rows[["value", "low", "high"]] - 1)))
-    ax.set(xscale="log", ylim=(1 - reach, 1 + reach), xlabel=labels.RE_AXIS)
-    style.plain_ticks(ax.xaxis)
-    ax.set_ylabel(r"$u^\star_{DEM}/u^\star_{Eqs.\,3,\,5}$")
-    shields.shade_transition(ax)
-    entries = _colour_entries(rows, "alpha_deg", colours)
-    style.legends(figure, entries, shields.point_entries(rows))
-    cases = tuple(sorted(set(dem["case"])))
-    return Figure("accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure)
+    ax.set(ylim=(1 - reach, 1 + reach), ylabel=r"$u^\star_{DEM}/u^\star_{Eqs.\,3,\,5}$")

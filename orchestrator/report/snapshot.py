@@ -16,8 +16,6 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
-BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
-
 
 @dataclass(frozen=True)
 class Snapshot:
@@ -115,24 +113,21 @@ def read(pile: PileCase, cases: Path) -> Passage:
     """Read the dumps of a finished pile."""
     directory, d = cases / pile.name, pile.scene.grain.diameter
     looks = pd.read_csv(directory / motion.LEVELS)
-    counted = np.cumsum(pile.packing.windward) - 1
-    passage = dump.read_dump(directory / dump.PASSAGE, dump.PASSAGE_COLUMNS)
-    exposed = np.full((len(passage.steps), pile.packing.count, 2), np.nan)
-    _place(exposed, passage.rows, passage.steps, counted, d)
+    counted = np.flatnonzero(pile.packing.windward) + 1
+    exposed = dump.read_passage(directory, counted, looks)[..., :2] / d
     ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
-    bed = dump.read_dump(directory / dump.BED, BED_COLUMNS)
-    rest = np.full((len(ends), len(counted), 2), np.nan)
-    _place(rest, bed.rows, ends, np.arange(len(counted)), d)
+    bed = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS)
+    rest = np.full((len(ends), len(pile.packing.centres), 2), np.nan)
+    _place(rest, bed.rows, ends, d)
     passed = _passed(exposed, pile)
     return Passage(pile, looks, exposed, rest, passed, Motion.from_csv(directory).mode)
 
 
-def _place(
-    into: FloatArray, rows: pd.DataFrame, steps: IntArray, columns: IntArray, d: float
-) -> None:
+def _place(into: FloatArray, rows: pd.DataFrame, steps: IntArray, d: float) -> None:
     """Write the places of a dump's rows into an array by frame and grain."""
-    column = columns[rows["id"].to_numpy(int) - 1]
-    into[np.searchsorted(steps, rows["step"]), column] = rows[["x", "z"]].to_numpy(float) / d
+    into[np.searchsorted(steps, rows["step"]), rows["id"] - 1] = (
+        rows[["x", "z"]].to_numpy(float) / d
+    )
 
 
 def _passed(exposed: FloatArray, pile: PileCase) -> BoolArray:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -11,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 WIDTH = 7.0
 """Of a figure across two columns of a paper, inches."""
@@ -27,6 +28,7 @@ RC: dict[Any, Any] = {
     "lines.linewidth": 1.2,
     "lines.markersize": 4.2,
     "mathtext.fontset": "dejavusans",
+    "axes.titley": 1.0,  # where they are anyway; matplotlib would look for ticks above each panel
     "legend.frameon": False,
     "legend.handlelength": 2.2,
     "svg.hashsalt": "orchestrator",
@@ -47,6 +49,7 @@ Look = dict[str, Any]
 """Properties of an artist."""
 
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
+MINOR_TICK: Look = {"color": "black", "ms": 2, "mew": 0.6}
 MARKERS = {"low": "o", "high": "s"}
 """By closure."""
 
@@ -96,7 +99,25 @@ def plain_ticks(axis: Axis) -> None:
     low, high = axis.get_view_interval()
     digits = "2345678" if high < 5 * low else "25" if high < 50 * low else ""
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axis.set_minor_formatter(FuncFormatter(lambda x, _: _leading(x, digits)))
+    if digits:
+        axis.set_minor_formatter(FuncFormatter(lambda x, _: _leading(x, digits)))
+    else:
+        _light_ticks(axis, low, high)
+
+
+def _light_ticks(axis: Axis, low: float, high: float) -> None:
+    """Minor ticks without numbers as one artist: matplotlib’s own are five for each tick."""
+    axis.set_minor_locator(NullLocator())
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
+    places = np.outer(decades, np.arange(2, 10)).ravel()
+    places = places[(places >= low) & (places <= high)]
+    edge, ax = np.zeros_like(places), axis.axes
+    if axis is ax.xaxis:
+        ticks = Line2D(places, edge, marker=3, transform=ax.get_xaxis_transform())
+    else:
+        ticks = Line2D(edge, places, marker=0, transform=ax.get_yaxis_transform())
+    ticks.set(ls="", clip_on=False, in_layout=False, gid="minor ticks", **MINOR_TICK)
+    ax.add_artist(ticks)
 
 
 def _leading(x: float, digits: str) -> str:

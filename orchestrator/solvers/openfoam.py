@@ -10,12 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.errors import SolverError
+from orchestrator.errors import Exploded, SolverError, Stalled
 
 if TYPE_CHECKING:
     import pyvista
 
-PROGRAMS = ("gmshToFoam", "changeDictionary", "simpleFoam")
+PROGRAMS = ("gmshToFoam", "simpleFoam")
 """The programs of a case's `Allrun`, in their order."""
 TRIED = ("1912",)
 """Versions that the tests ran with."""
@@ -90,7 +90,9 @@ def _judge(found: str) -> None:
 def read_numbers(path: Path) -> dict[str, float]:
     """The entries `name number;` of a dictionary file, such as a case's `parameters`."""
     text = path.read_text(encoding="utf-8")
-    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([^\s;]+);", text)}
+    return {
+        name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([-+.\d][^\s;]*);", text)
+    }
 
 
 def read_last_time(
@@ -146,8 +148,12 @@ def check_log(directory: Path) -> int:
 
     Raises
     ------
+    Exploded
+        If simpleFoam diverged.
+    Stalled
+        If it did not converge.
     SolverError
-        If any program failed, was stopped, or did not converge, whatever its exit code was.
+        If any program failed or was stopped otherwise, whatever its exit code was.
     """
     for program in PROGRAMS:
         text = _log(directory, program)
@@ -191,8 +197,8 @@ def _check_crash(program: str, text: str, directory: Path) -> None:
         )
 
 
-def _diverged(how: str, directory: Path) -> SolverError:
-    return SolverError(
+def _diverged(how: str, directory: Path) -> Exploded:
+    return Exploded(
         f"simpleFoam diverged: {how}",
         where=str(directory),
         remedy="another first cell or number of cells per face may do; "
@@ -213,7 +219,7 @@ def _check_end(program: str, text: str, directory: Path) -> None:
 def _iterations(text: str, directory: Path) -> int:
     match = _CONVERGED.search(text)
     if match is None:
-        raise SolverError(
+        raise Stalled(
             f"simpleFoam did not converge: {_trend(text)} after {_last_time(text)}",
             where=str(directory),
             remedy="raise endTime in system/controlDict; if the residuals cycle, relax more",

@@ -1,6 +1,7 @@
 """Run one external program: in its own session, logged, limited in time, never orphaned."""
 
 import contextlib
+import ctypes
 import os
 import select
 import shutil
@@ -16,6 +17,10 @@ from orchestrator.errors import Interrupted
 
 GRACE_S = 2.0
 POLL_S = 0.1
+_SET_DEATH_SIGNAL = 1
+"""PR_SET_PDEATHSIG of Linux."""
+_SIGACTION_BYTES = 512
+"""More than a `struct sigaction` takes on any machine."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +33,15 @@ class Ended:
         As `subprocess` gives it: negative where a signal ended the program.
     seconds : float
         Wall time, s.
+    cpu_s : float
+        Processor time of it and all that it waited for, s; 0 if it was killed.
     timed_out : bool
         Whether it was killed at its time limit.
     """
 
     returncode: int
     seconds: float
+    cpu_s: float
     timed_out: bool
 
 
@@ -79,16 +87,18 @@ def run(
             env={**os.environ, "PWD": str(cwd), **(env or {})},
         )
         try:
-            timed_out = _wait(process, started + limit_s, stop)
+            cpu_s = _wait(process, started + limit_s, stop)
         except BaseException:
             end_group(process)
             raise
-    return Ended(process.returncode, time.monotonic() - started, timed_out)
+    seconds = time.monotonic() - started
+    return Ended(process.returncode, seconds, cpu_s or 0.0, timed_out=cpu_s is None)
 
 
 def _wait(
     process: "subprocess.Popen[bytes]", deadline: float, stop: threading.Event | None
-) -> bool:
+) -> float | None:
+    """Wait for a program's end; its processor time, or None if it had to be killed."""
     # asking again and again whether it has ended would take a core from it, and see it late
     with _end_of(process) as end:
         while not end.poll(1000 * POLL_S):
@@ -96,9 +106,10 @@ def _wait(
                 raise Interrupted("stopped", remedy="the same command continues")
             if time.monotonic() > deadline:
                 end_group(process)
-                return True
-    process.wait()
-    return False
+                return None
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
 
 
 @contextlib.contextmanager
@@ -126,3 +137,26 @@ def _dies_with_its_parent() -> list[str]:
     """Without this a killed driver leaves its solver running; util-linux has it since 2.33."""
     setpriv = shutil.which("setpriv")
     return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []
+
+
+@contextlib.contextmanager
+def handler_kept(number: signal.Signals) -> Iterator[None]:
+    """Undo what a library does to the handler of a signal; gmsh resets that of SIGTERM.
+
+    Python sets handlers in its main thread alone; the C library does in any.
+    """
+    c, kept = ctypes.CDLL(None), ctypes.create_string_buffer(_SIGACTION_BYTES)
+    c.sigaction(number, None, kept)
+    try:
+        yield
+    finally:
+        c.sigaction(number, kept, None)
+
+
+def follow(parent: int) -> None:
+    """Make this forked process end with its parent, and leave the signals of a user to that."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)

@@ -4,7 +4,7 @@ Tables of results hold no time and no path of a machine: the same study gives th
 wherever and whenever it runs. What the runs took is in `timings`.
 """
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,24 +25,37 @@ __all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {p.flow.name: p for p in plan.piles.values() if p.flow.name in done}
+    flows = {need.name: p for p in plan.piles.values() for need in p.needs if need.name in done}
     ready = [
-        piles.Answer.read(pile, cases)
-        for pile in plan.piles.values()
-        if pile.name in done and pile.flow.name in done
+        piles.Answer.read(scene_id, pile, cases)
+        for scene_id, pile in plan.piles.items()
+        if all(one.name in done for one in pile.runs)
     ]
     cells = [one for one in plan.cells if one.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))
     thresholds = pd.DataFrame(row for answer in ready for row in piles.threshold_rows(answer))
     made = {
         "scenes": asked,
-        "single_grain": pd.DataFrame(single.rows(study, cells, cases)),
+        "single_grain": pd.DataFrame(single.rows(plan, cells, cases)),
         "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
         "pile_grain": _concat(map(piles.grains, ready)),
         "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_scatter(thresholds, asked),
+        "check": pd.DataFrame(_checks(study, plan, cases, done)),
     }
     return {name: table for name, table in made.items() if not table.empty}
+
+
+def _checks(
+    study: Study, plan: Plan, cases: Path, done: Container[str]
+) -> Iterator[dict[str, Any]]:
+    ready = {
+        asked: pile
+        for asked, pile in plan.checks.items()
+        if all(one.name in done for one in (*pile.runs, *plan.piles[asked].runs))
+    }
+    if study.tolerance is not None:
+        yield from piles.check_rows(plan.piles, ready, study.tolerance, cases)
 
 
 def _concat(frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -57,6 +70,7 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
             "case": name,
             "kind": plan.cases[name].kind,
             "solver_s": state["solver_s"],
+            "cpu_s": state["cpu_s"],
             "outside_s": state["wall_s"] - state["solver_s"],
         }
         for name, state in states.items()

@@ -1,6 +1,7 @@
 """The tables of piles: the stress on them, their grains, their answer to the flow."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,38 +9,40 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.flow.stress import WallStress
+from orchestrator import checks, rungs
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Face, PileCase
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A pile with what its finished cases say, read once for all of its tables."""
+    """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
+    scene_id: str
     pile: PileCase
     motion: Motion
     face: Face
 
     @classmethod
-    def read(cls, pile: PileCase, cases: Path) -> "Answer":
+    def read(cls, scene_id: str, pile: PileCase, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
-        return cls(pile, Motion.from_csv(cases / pile.name), pile.face(cases))
+        return cls(scene_id, pile, pile.motion(cases), pile.face(cases))
 
 
 def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame]:
-    """The friction velocity along the bed, for the flow of each pile."""
+    """The friction velocity along the bed, for the solved flow of each pile."""
     for pile in piles:
-        stress = WallStress.from_csv(cases / pile.flow.name / "wall_stress.csv")
+        stress = pile.stress(cases)
         yield pd.DataFrame(
             {
                 "flow_case": pile.flow.name,
                 "alpha_deg": pile.bed.slope_deg,
                 "h_m": pile.bed.height,
-                "z0_m": pile.bed.roughness,
+                "z0_m": pile.flow.roughness_m,
                 "s_m": stress.s_m,
                 "s_over_h": stress.s_m / pile.bed.height,
                 "x_m": stress.x_m,
@@ -57,7 +60,7 @@ def grains(answer: Answer) -> pd.DataFrame:
     found = threshold.of_grains(motion)
     return pd.DataFrame(
         {
-            "scene_id": answer.pile.scene.id,
+            "scene_id": answer.scene_id,
             "grain_id": face.ids,
             "s_m": face.arc_length,
             "ustar_over_ustar0": face.speed,
@@ -75,7 +78,7 @@ def curve(answer: Answer) -> pd.DataFrame:
     curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
     return pd.DataFrame(
         {
-            "scene_id": scene.id,
+            "scene_id": answer.scene_id,
             "hold": np.arange(len(motion.flow)),
             "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
             "ustar0_m_s": curve.ustar0,
@@ -96,25 +99,61 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
     pile, motion, speed = answer.pile, answer.motion, answer.face.speed
     scene = pile.scene
     pivot = pile.pivot_thresholds(speed)
+    rung, error = rungs.names(scene), rungs.error(scene)
     for fraction in scene.protocol.fractions:
         found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
         yield {
-            "scene_id": scene.id,
+            "scene_id": answer.scene_id,
             **point(scene),
             "packing": pile.bed.packing,
             "stress": scene.flow.stress,
             "fraction": fraction,
             "shields": _shields(scene, found.tau),
-            "shields_low": _shields(scene, found.tau_low),
-            "shields_high": _shields(scene, found.tau_high),
+            **_interval(scene, found, error),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
-            "case": pile.name,
+            "flow_rung": rung["flow"],
+            "grain_rung": rung["grains"],
+            "error_estimate": error if math.isfinite(error) else None,
+            "case": pile.name if pile in pile.runs else None,
         }
+
+
+def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
+    """What the holds and the count enclose; at least the known error of the rungs."""
+    known = error if math.isfinite(error) else 0.0
+    return {
+        "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - known))),
+        "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + known))),
+    }
+
+
+def check_rows(
+    cheap: Mapping[str, PileCase], check: Mapping[str, PileCase], tolerance: float, cases: Path
+) -> Iterator[Row]:
+    """The piles that DEM checked: both answers at each fraction."""
+    for asked, pile in check.items():
+        scene, rung = cheap[asked].scene, rungs.names(cheap[asked].scene)
+        for one in checks.compare(cheap[asked], pile, tolerance, cases):
+            yield {
+                "scene_id": asked,
+                **point(scene),
+                "packing": pile.bed.packing,
+                "fraction": one.cheap.fraction,
+                "flow_rung": rung["flow"],
+                "grain_rung": rung["grains"],
+                "shields": _shields(scene, one.cheap.tau),
+                "shields_dem": _shields(scene, one.dem.tau),
+                "shields_dem_low": _shields(scene, one.dem.tau_low),
+                "shields_dem_high": _shields(scene, one.dem.tau_high),
+                "difference": one.cheap.tau / one.dem.tau - 1,
+                "agree": one.agree,
+                "case": pile.name,
+            }
 
 
 def _lid_speed_ratio(pile: PileCase) -> float:

@@ -14,16 +14,18 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
     """A row for each scene of each group, in the study's order."""
     cell_of = {scene.id: one.name for one in plan.cells for scene in one.scenes}
     for group in study.groups:
-        for scene in group.scenes:
-            pile = plan.piles.get(scene.id)
+        for asked in group.scenes:
+            scene, pile = plan.answers[asked.id], plan.piles.get(asked.id)
+            runs = [one.name for one in pile.runs] if pile else [cell_of.get(scene.id)]
             yield {
-                "scene_id": scene.id,
+                "scene_id": asked.id,
                 "group": group.name,
                 "bed": scene.bed.kind,
                 **point(scene),
                 **_choices(scene),
-                "case": pile.name if pile else cell_of[scene.id],
-                "flow_case": pile.flow.name if pile else None,
+                "method": scene.protocol.method,
+                "case": runs[-1] if scene.protocol.method == "dem" else None,
+                "flow_case": pile.needs[0].name if pile and pile.needs else None,
             }
 
 
@@ -54,7 +56,10 @@ def _choices(scene: Scene) -> Row:
         "disorder": pile.disorder if pile and pile.packing == "disordered" else None,
         "seed": pile.seed if pile and pile.packing == "disordered" else None,
         "mobile_layers": pile.mobile_layers if pile else None,
+        "flow_model": scene.flow.model if pile else None,
         "stress": scene.flow.stress if pile else None,
+        "average": scene.flow.average if pile else None,
+        "forced": scene.flow.forced if pile else None,
         "alpha_s": scene.flow.lift_coefficient,
         "stiffness": scene.grain.stiffness,
         "damping": scene.grain.damping,
@@ -64,7 +69,12 @@ def _choices(scene: Scene) -> Row:
         "timestep": scene.protocol.timestep,
         "until": scene.protocol.until if pile else None,
         "solve_u_e_m_s": scene.flow.speed if pile else None,
+        "solve_z0_m": scene.solve_roughness if pile else None,
         "solve_nu_m2_s": scene.flow.viscosity if pile else None,
         "first_cell_m": scene.first_cell_height if pile else None,
         "cells_per_face": scene.flow.cells_per_face if pile else None,
+        "growth": scene.flow.growth if pile else None,
+        "turbulence": scene.flow.turbulence if pile else None,
+        "convection": scene.flow.convection if pile else None,
+        "correctors": scene.flow.correctors if pile else None,
     }

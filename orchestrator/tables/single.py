@@ -1,27 +1,32 @@
 """The table of single grains: closed form and DEM."""
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase
 from orchestrator.grains.motion import Motion
+from orchestrator.plan import Plan
 from orchestrator.scene import Scene
-from orchestrator.study import Study
 from orchestrator.tables.scenes import Row, point
 
 
-def rows(study: Study, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
-    """A row for each scene of the finished cases, in the study's order."""
-    found_rows: dict[str, Row] = {}
+def rows(plan: Plan, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
+    """A row for each scene that a finished case or the closed form answers, in the plan's order."""
+    measured: dict[str, Row] = {}
     for one in cells:
         motion = Motion.from_csv(cases / one.name)
         found = threshold.of_grains(motion)
         brackets = zip(found.value, found.low, found.high, strict=True)
         for scene, bracket, fallen in zip(one.scenes, brackets, motion.fallen > 0, strict=True):
-            row = {**_row(scene, bracket), "fell_upstream": bool(fallen)}
-            found_rows[scene.id] = {**row, "case": one.name}
-    yield from (found_rows[scene.id] for scene in study.scenes if scene.id in found_rows)
+            row = _row(scene, bracket)
+            measured[scene.id] = {**row, "fell_upstream": bool(fallen), "case": one.name}
+    for asked, scene in plan.answers.items():
+        if scene.id in measured:
+            yield {"scene_id": asked, **measured[scene.id]}
+        elif asked not in plan.piles and scene.protocol.method != "dem":
+            yield {"scene_id": asked, **_row(scene, (math.nan,) * 3), "fell_upstream": False}
 
 
 def _row(scene: Scene, bracket: tuple[float, float, float]) -> Row:
@@ -29,8 +34,8 @@ def _row(scene: Scene, bracket: tuple[float, float, float]) -> Row:
     ustar, shields = float(exact.friction_velocity), float(exact.shields)
     value, low, high = bracket
     return {
-        "scene_id": scene.id,
         **point(scene),
+        "method": scene.protocol.method,
         "reynolds": float(exact.reynolds) * value,
         "reynolds_closed_form": float(exact.reynolds),
         "shields_closed_form": shields,

@@ -41,7 +41,9 @@ def solve(tmp_path_factory: pytest.TempPathFactory) -> Solve:
             directory = case.prepare(flow, cases)
             ended = allrun(directory)
             flow.collect(directory)
-            case.finish(flow, directory, solver_s=ended.seconds, wall_s=ended.seconds)
+            case.finish(
+                flow, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=ended.seconds
+            )
         return cases / flow.name
 
     return to_its_end

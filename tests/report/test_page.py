@@ -60,9 +60,9 @@ def parsed(html: str) -> Page:
 
 def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     kinds = [src.split(",")[0] for src in parsed.all("img", "src")]
-    assert kinds.count("data:image/png;base64") == 10
+    assert kinds.count("data:image/png;base64") == 11
     assert kinds.count("data:image/gif;base64") == 1
-    assert len(kinds) == 11
+    assert len(kinds) == 12
     assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in parsed.tags}
     style = parsed.texts["style"]
     assert "url(" not in style
@@ -106,7 +106,7 @@ def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
 
 def test_figures_are_beside_the_page(page: Path) -> None:
     files = sorted(path.name for path in (page.parent / "figures").iterdir())
-    assert len(files) == 21
+    assert len(files) == 23
     assert {Path(name).suffix for name in files} == {".png", ".svg", ".gif"}
     assert not list(page.parent.glob(".*.tmp"))
 
@@ -123,21 +123,6 @@ def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> N
         assert path.read_bytes() == (pages[1] / "figures" / path.name).read_bytes(), path.name
     first, second = ((folder / "report.html").read_bytes() for folder in pages)
     assert first == second
-
-
-def test_page_says_why_a_picture_is_missing(
-    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    crash = tmp_path / "python"
-    crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
-    crash.chmod(0o755)
-    monkeypatch.setattr(sys, "executable", str(crash))
-    (tmp_path / "cases").symlink_to(results.cases)
-    parsed = Page(write(only(results, "pile"), tmp_path, {}).read_text(encoding="utf-8"))
-    assert parsed.text.count("This picture could not be made") == 2
-    assert "SIGSEGV" in parsed.text
-    assert "apt-get install --no-install-recommends libosmesa6" in parsed.text
-    assert len(parsed.all("img", "src")) == 4
 
 
 def test_page_without_results(results: Results, tmp_path: Path) -> None:

@@ -1,73 +1,88 @@
-"""Pictures that VTK makes: the process, the flow's field, the grains at an instant."""
+"""Pictures of the flow and of the grains at an instant."""
 
-import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
+from orchestrator.errors import SolverError
 from orchestrator.grains import motion
-from orchestrator.report import flow_picture, grain_picture, pictures, snapshot
+from orchestrator.report import (
+    flow_field,
+    flow_picture,
+    grain_picture,
+    mesh_picture,
+    snapshot,
+    spheres,
+)
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.report.snapshot import Passage
 
-WINDOW = [-1.0, 3.0, -1.0, 1.0]
+WINDOW = (-1.0, 3.0, -1.0, 1.0)
 
 
-def test_spheres_lie_where_they_are(tmp_path: Path) -> None:
-    grains = tmp_path / "grains.npz"
-    colours = np.array([[200, 0, 0], [0, 0, 200]], np.uint8)
-    np.savez(grains, centres=np.array([[0.0, 0.0], [2.0, 0.25]]), colours=colours)
-    out = tmp_path / "out.png"
-    job = {"kind": "grains", "grains": str(grains), "window": WINDOW, "pixels": [400, 200]}
-    assert pictures.run([{**job, "out": str(out)}], tmp_path) == ""
-    image = imread(out)
+def test_spheres_lie_where_they_are() -> None:
+    centres = np.array([[0.0, 0.0], [2.0, 0.25]])
+    colours = np.array([[0.8, 0.0, 0.0], [0.0, 0.0, 0.8]])
+    image = spheres.picture(centres, colours, WINDOW, 400)
     assert image.shape == (200, 400, 4)
-    opaque = np.argwhere(image[:, :200, 3] > 0.5)
-    assert opaque.mean(axis=0) == pytest.approx([100, 100], abs=2)
-    assert np.ptp(opaque, axis=0) == pytest.approx([100, 100], abs=3)
-    assert image[100, 100, 0] > 0.4
-    assert image[75, 300, 2] > 0.4
-    assert image[5, 5, 3] == 0
+    opacity = image[..., 3] / 255
+    assert opacity.sum() == pytest.approx(2 * np.pi / 4 * 100**2, rel=1e-3)
+    red = np.argwhere(opacity[:, :200] > 0.5)
+    assert red.mean(axis=0) + 0.5 == pytest.approx([100, 100], abs=0.01)
+    assert image[100, 100].tolist() == [204, 0, 0, 255]
+    assert image[75, 300].tolist() == [0, 0, 204, 255]
+    # the rim turns away from the light
+    assert image[100, 148, 0] == pytest.approx(255 * 0.8 * (0.45 + 0.6 * 0.24), abs=3)
+    assert image[5, 5].tolist() == [0, 0, 0, 0]
 
 
-def test_drawing_is_possible_here() -> None:
-    assert pictures.can_render()
+def test_spheres_are_cut_at_the_edges_of_the_window() -> None:
+    window = (0.0, 1.0, 0.0, 1.0)
+    image = spheres.picture(np.array([[0.0, 0.0], [5.0, 5.0]]), np.ones((2, 3)), window, 100)
+    assert (image[..., 3] / 255).sum() == pytest.approx(np.pi / 16 * 100**2, rel=1e-2)
+    assert np.flatnonzero(image[..., 3].max(axis=1)).min() == 50
 
 
-def test_failure_of_the_drawing_process_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert "drawing process failed" in pictures.run([{"kind": "flow", "case": "none"}], tmp_path)
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "missing"))
-    assert not pictures.can_render()
-
-
-def test_one_bad_picture_does_not_cost_the_others(results: Results, tmp_path: Path) -> None:
-    (planned,) = flow_picture.plan(results, tmp_path)
-    bad = {"kind": "grains", "grains": "none", "window": WINDOW, "pixels": [4, 4], "out": "none"}
-    cause = pictures.run([*planned.jobs, bad], tmp_path)
-    assert cause
-    assert planned.finished(cause).canvas is not None
-
-
-def test_field_is_that_of_the_flow(results: Results, tmp_path: Path) -> None:
-    (planned,) = flow_picture.plan(results, tmp_path)
-    (job,) = planned.jobs
-    assert pictures.run(planned.jobs, tmp_path) == ""
-    velocity = np.load(job["out"])
-    assert list(velocity.shape[:2]) == job["shape"]
+def test_field_is_that_of_the_flow(results: Results) -> None:
+    (figure,) = flow_picture.draw(results)
+    (pile,) = results.plan.piles.values()
+    shown = (-0.02, 0.1, 0.0, 0.03)
+    velocity = flow_field.velocity(results.cases / pile.flow.name, shown, (60, 240))
     speed = np.linalg.norm(velocity, axis=-1) / 10.0
     assert 0.7 < speed[-1].min() < speed[-1].max() < 1.2
-    assert np.isnan(speed).any()
+    # outside: the triangle of the pile, 0.01 m high and 2 · 0.01/tan 15° wide
+    area = 0.01**2 / np.tan(np.radians(15))
+    assert np.isnan(speed).mean() * 0.12 * 0.03 == pytest.approx(area, rel=0.05)
     assert np.nanmin(velocity[..., 0]) < 0
-    figure = planned.finished("")
     assert figure.canvas is not None
-    image = figure.canvas.axes[0].images[0]
-    assert np.asarray(image.get_array()) == pytest.approx(speed, nan_ok=True)
+    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[0].images[0].get_array()))
+    assert 0.9 < float(image.max()) < 1.2
+
+
+def test_mesh_is_that_of_the_flow(results: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    edges = mesh_picture.read_edges(results.cases / pile.flow.name)
+    table = results.tables["wall_stress"]
+    faces = len(table)
+    # of a grid of quadrilaterals; its height is that of the lid
+    rows = (len(edges) - faces) // (2 * faces + 1)
+    assert len(edges) == (2 * rows + 1) * faces + rows
+    assert edges[..., 1].max() == pytest.approx(10 * pile.bed.height)
+    middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
+    bed = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
+    assert len(middles.intersection(bed)) > 0.9 * faces
+    (figure,) = mesh_picture.draw(results)
+    assert figure.canvas is not None
+    for ax in figure.canvas.axes:
+        (line,) = (line for line in ax.lines if line.get_gid() == "mesh")
+        assert 30 < len(np.asarray(line.get_xdata())) // 3 < len(edges)
+
+
+def test_a_case_without_results_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SolverError, match="no results"):
+        flow_field.velocity(tmp_path, (0.0, 1.0, 0.0, 1.0), (2, 2))
 
 
 @pytest.fixture(scope="module")
@@ -109,13 +124,10 @@ def test_no_snapshot_of_what_was_not_reached(passage: Passage) -> None:
 
 
 @pytest.fixture(scope="module")
-def figure(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Figure:
+def figure(results: Results) -> Figure:
     """The picture of the grains."""
-    folder = tmp_path_factory.mktemp("grains")
-    (planned,) = grain_picture.plan(results, folder)
-    assert json.dumps(planned.jobs)
-    assert pictures.run(planned.jobs, folder) == ""
-    return planned.finished("")
+    (drawn,) = grain_picture.draw(results)
+    return drawn
 
 
 def test_picture_shows_grains_that_are_gone_where_they_lay(

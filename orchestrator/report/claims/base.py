@@ -161,13 +161,14 @@ def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = (
         A row for each pair: ``closure``, ``low`` and ``high`` of the column, and ``ratio``, the
         value at the higher over that at the lower; NaN where one is missing.
     """
-    rows = []
-    for _, own in split(table, *others(table, along, *ignore)):
-        own = own.sort_values(along, kind="stable")
-        x, y = own[along].to_numpy(float), own[value].to_numpy(float)
-        steps = np.flatnonzero(np.diff(x) > 0)
-        rows += [(own["closure"].iloc[0], x[i], x[i + 1], y[i + 1] / y[i]) for i in steps]
-    return pd.DataFrame(rows, columns=["closure", "low", "high", "ratio"])
+    same = others(table, along, *ignore)
+    series = table.groupby(same, sort=True, dropna=False).ngroup()
+    columns = {"series": series, "closure": table["closure"], "x": table[along], "y": table[value]}
+    ordered = pd.DataFrame(columns).sort_values(["series", "x"], kind="stable")
+    low, high = ordered.iloc[:-1].reset_index(drop=True), ordered.iloc[1:].reset_index(drop=True)
+    beside = (low["series"] == high["series"]) & (high["x"] > low["x"])
+    found = {"closure": low["closure"], "low": low["x"], "high": high["x"]}
+    return pd.DataFrame({**found, "ratio": high["y"] / low["y"]})[beside].reset_index(drop=True)
 
 
 def others(table: pd.DataFrame, *along: str) -> list[str]:

@@ -19,7 +19,7 @@ downstream = 20*height;
 thickness = height/10;
 
 // twice the cells along a face: twice the cells everywhere, but the same first cell
-growth = 1.1^(40/cells_per_face);
+growth = growth_at_40^(40/cells_per_face);
 
 // the cells that begin with `first` and grow by `growth` until they fill `length`
 Macro Count

@@ -1,0 +1,122 @@
+"""What the foreign solvers share: the scene, the holds of a bed, and the answer.
+
+The forces are those of the example in examples/native; the format is docs/benchmark.md.
+"""
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "native"))
+from solver import forces, table
+
+LOOK = 0.5
+"""Time between two looks at the grains, sqrt(d/g')."""
+SETTLE = 10.0
+"""Time of hold 0."""
+MARGIN = 3.0
+"""From a face to the height at which a grain in flight is gone, d."""
+
+
+class Bed:
+    """The grains of a pivot or a pile, and the force on each in each hold.
+
+    The counted grains come first, the fixed ones last.
+    """
+
+    def __init__(self, case):
+        self.scene = json.loads((case / "scene.json").read_text())
+        rows = table(case / "grains.csv")
+        self.is_pivot = self.scene["kind"] == "pivot"
+        if self.is_pivot:
+            rows = [{**row, "kind": row["kind"].replace("mobile", "counted")} for row in rows]
+        # LAMMPS wants the highest id never to leave
+        order = {"counted": 0, "fixed": 2}
+        self.grains = sorted(rows, key=lambda row: order.get(row["kind"], 1))
+        self.holds = table(case / "holds.csv")
+        self.counted = sum(row["kind"] == "counted" for row in rows)
+        alpha = math.radians(self.scene["alpha_deg"])
+        self.along = math.cos(alpha), math.sin(alpha)
+
+    @property
+    def flow(self):
+        """The flow of each hold, m/s."""
+        return [float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.holds]
+
+    def force(self, hold):
+        """The force of the flow on each grain in a hold: a list of (fx, fz), N."""
+        if self.is_pivot:
+            own = float(self.holds[hold]["fx_n"]), float(self.holds[hold]["fz_n"])
+            return [own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains]
+        return [self._pushed(row, self.flow[hold]) for row in self.grains]
+
+    def _pushed(self, row, ustar0):
+        if row["kind"] not in ("counted", "pushed"):
+            return 0.0, 0.0
+        ratio, slope = float(row["ustar_over_ustar0"]), math.radians(float(row["slope_deg"]))
+        drag, lift = forces(self.scene, abs(ratio) * ustar0)
+        drag = math.copysign(drag, ratio)
+        x, z = math.cos(slope), math.sin(slope)
+        return drag * x - lift * z, drag * z + lift * x
+
+    @property
+    def ceiling(self):
+        """A point on the ridge of the roof above which a grain in flight is gone, m."""
+        d = self.scene["d_m"]
+        top = max(self.grains[: self.counted], key=lambda row: float(row["z_m"]))
+        if self.is_pivot:
+            return float(top["x_m"]), float(top["z_m"]) + 1e3 * d
+        return float(top["x_m"]), float(top["z_m"]) + MARGIN * d / self.along[0]
+
+    def answer(self, moved_in):
+        """Write nothing; give the answer to a question, from the hold in which each grain moved.
+
+        `moved_in` has a number for each counted grain: the hold, or 0 for one that never moved.
+        """
+        return _Answer(self, moved_in)
+
+
+class _Answer:
+    def __init__(self, bed, moved_in):
+        self.bed, self.moved_in, self.flow = bed, moved_in, bed.flow
+
+    def __call__(self, quantity, at):
+        if quantity == "moved":
+            return self._moved(int(at))
+        if quantity == "not_moved":
+            return self.bed.counted - self._moved(int(at))
+        if quantity == "ustar_m_s":
+            return self._between(self.moved_in[0])
+        hold = self._first(float(at))
+        ustar0 = self._between(hold)
+        return ustar0 if quantity == "ustar0_m_s" else self._shields(hold, ustar0)
+
+    def _moved(self, hold):
+        return sum(0 < level <= hold for level in self.moved_in)
+
+    def _first(self, fraction):
+        need = max(math.ceil(fraction * self.bed.counted - 1e-9), 1)
+        holds = range(1, len(self.flow))
+        return next((hold for hold in holds if self._moved(hold) >= need), len(self.flow) - 1)
+
+    def _between(self, hold):
+        return math.sqrt(self.flow[hold - 1] * self.flow[hold])
+
+    def _shields(self, hold, ustar0):
+        scene, rows = self.bed.scene, zip(self.bed.grains, self.moved_in, strict=False)
+        ratio = [float(row["ustar_over_ustar0"]) for row, level in rows if 0 < level <= hold]
+        mean = sum(r * abs(r) for r in ratio) / max(len(ratio), 1)
+        excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
+        return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
+
+
+def write(case, out, answer):
+    """Write the answer to each question of a scene."""
+    with out.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["quantity", "at", "value"])
+        for asked in table(case / "ask.csv"):
+            quantity, at = asked["quantity"], asked["at"]
+            writer.writerow([quantity, at, repr(float(answer(quantity, at)))])

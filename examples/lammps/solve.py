@@ -1,0 +1,150 @@
+"""LAMMPS behind the door of a benchmark pack:  python solve.py CASE OUT
+
+Copies the decks beside this file to the working directory, writes the parameters, runs ``lmp``
+there and turns what it wrote into an answer. Kinds: collision, incline, sliding, pivot, pile.
+"""
+
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+import door
+
+CHECKS = {"collision": "speed_m_s", "incline": "incline_deg", "sliding": "speed_m_s"}
+
+
+def parameters(scene):
+    """The variables of every deck."""
+    step = scene["timestep"] * math.sqrt(scene["mass_kg"] / scene["spring_n_m"])
+    return {
+        "diameter": scene["d_m"],
+        "density": scene["rho_sol_kg_m3"],
+        "mass": scene["mass_kg"],
+        "gravity": scene["reduced_gravity_m_s2"],
+        "spring": scene["spring_n_m"],
+        "damping": scene["damping"],
+        "friction": math.tan(math.radians(scene["phi_deg"])),
+        "dt": step,
+    }
+
+
+def bed_parameters(bed, step):
+    """The variables of the deck for beds."""
+    unit = bed.scene["time_unit_s"]
+    look = int(door.LOOK * unit / step + 0.5)
+    x, z = bed.ceiling
+    return {
+        "counted": bed.counted,
+        "look_steps": look,
+        "settle_steps": int(door.SETTLE / door.LOOK + 0.5) * look,
+        "quiet_looks": int(bed.scene["quiet"] / door.LOOK + 0.5),
+        "holds": len(bed.holds) - 1,
+        "marker": bed.scene["marker"],
+        "along_x": bed.along[0],
+        "along_z": bed.along[1],
+        "ceiling_x": x,
+        "ceiling_z": z,
+    }
+
+
+def write_variables(path, values):
+    """Write a file of LAMMPS variables."""
+    lines = (f"variable        {name} index {value!r}\n" for name, value in values.items())
+    path.write_text("".join(lines))
+
+
+def write_bed(bed, folder):
+    """Write the grains, and the force on each for every hold."""
+    d, rho = bed.scene["d_m"], bed.scene["rho_sol_kg_m3"]
+    kinds = {"fixed": 1, "mobile": 2, "counted": 3, "pushed": 3}
+    places = [(float(row["x_m"]), float(row["z_m"])) for row in bed.grains]
+    margin = (door.MARGIN + 1) * d
+    lines = ["grains", "", f"{len(places)} atoms", "3 atom types", ""]
+    for axis, values in zip("xz", zip(*places, strict=True), strict=True):
+        lines.append(f"{min(values) - margin!r} {max(values) + margin!r} {axis}lo {axis}hi")
+    lines += [f"{-margin!r} {margin!r} ylo yhi", "", "Atoms  # sphere", ""]
+    for number, (row, (x, z)) in enumerate(zip(bed.grains, places, strict=True), 1):
+        lines.append(f"{number} {kinds[row['kind']]} {d!r} {rho!r} {x!r} 0.0 {z!r}")
+    (folder / "grains.data").write_text("\n".join(lines) + "\n")
+    with (folder / "force.x.txt").open("w") as fx, (folder / "force.z.txt").open("w") as fz:
+        # LAMMPS reads one set more than it uses
+        for hold in (*range(len(bed.holds)), len(bed.holds) - 1):
+            for stream, axis in ((fx, 0), (fz, 1)):
+                stream.write(f"{len(places)}\n")
+                for number, force in enumerate(bed.force(hold), 1):
+                    stream.write(f"{number} {force[axis]!r}\n")
+
+
+def moved_in(bed, folder):
+    """The hold in which each counted grain first passed the marker, or was gone; 0 for never."""
+    looks = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
+    frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
+    rows = [[line.split() for line in frame.splitlines()[8:]] for frame in frames]
+    found = [{int(a): (float(x), float(z)) for a, x, z in frame} for frame in rows]
+    start, marker = found[0], bed.scene["marker"] * bed.scene["d_m"]
+    first = [0] * bed.counted
+    for hold, frame in zip(looks, found[1:], strict=True):
+        for number in range(1, bed.counted + 1):
+            if first[number - 1] == 0 and _passed(start[number], frame.get(number), bed, marker):
+                first[number - 1] = hold
+    return first
+
+
+def _passed(start, now, bed, marker):
+    if now is None:
+        return True
+    travel = sum(a * (b - c) for a, b, c in zip(bed.along, now, start, strict=True))
+    return travel >= marker
+
+
+def run(deck, *variables):
+    """Run LAMMPS on a deck in the working directory."""
+    command = ["lmp", "-in", deck, "-nocite", "-log", "none", *variables]
+    with open("log.txt", "w") as log:
+        code = subprocess.call(command, stdout=log, stderr=log)
+    if code != 0:
+        said = Path("log.txt").read_text().splitlines()
+        sys.exit("\n".join(line for line in said if line.startswith("ERROR")))
+
+
+def check(kind, scene):
+    """One of the decks for the contact law."""
+    key = CHECKS[kind]
+    run(f"in.{kind}", "-var", key.partition("_")[0], repr(scene[key]))
+    rows = [line.split(",") for line in Path("answer.csv").read_text().split()]
+    found = {(quantity, at): float(value) for quantity, at, value in rows}
+    return lambda quantity, at: found[quantity, at]
+
+
+def main(case, out):
+    """Answer one scene."""
+    scene = json.loads((case / "scene.json").read_text())
+    kind = scene["kind"]
+    if kind not in (*CHECKS, "pivot", "pile"):
+        print(f"LAMMPS is not asked for the kind {kind}", file=sys.stderr)
+        return 2
+    folder = Path("lammps")
+    shutil.copytree(HERE, folder, dirs_exist_ok=True)
+    values = parameters(scene)
+    write_variables(folder / "parameters.lammps", values)
+    os.chdir(folder)
+    if kind in CHECKS:
+        answer = check(kind, scene)
+    else:
+        bed = door.Bed(case)
+        write_variables(Path("bed.lammps"), bed_parameters(bed, values["dt"]))
+        write_bed(bed, Path())
+        run("in.bed")
+        answer = bed.answer(moved_in(bed, Path()))
+    door.write(case, out, answer)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]).absolute(), Path(sys.argv[2]).absolute()))

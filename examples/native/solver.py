@@ -1,0 +1,269 @@
+"""A small native solver: levels 1 and 2 and the pivot law of level 4; standard library only.
+
+    python solver.py CASE OUT
+
+It reads the directory of a scene and writes its answer, as docs/benchmark.md says. The contact
+mechanics are those of a sphere in a plane, integrated explicitly; the thresholds of a pile are
+those of each grain alone under its own stress. It knows no other kind and ends with 2 then.
+"""
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+
+KARMAN = 2.5
+INERTIA = 0.4  # of a sphere, over m r^2
+STEP = 0.05  # of the integration, in sqrt(m/K)
+
+
+def forces(scene, ustar):
+    """Drag and lift on an exposed grain, N (Eqs. 2 and 4)."""
+    d, rho, nu = scene["d_m"], scene["rho_f_kg_m3"], scene["nu_m2_s"]
+    r = scene["z0_m"] / d
+    if scene["closure"] == "low":
+        drag = 1.5 * math.pi * (1 + 2 * r) * rho * d**2 * ustar**2
+        lift = scene["alpha_s"] / 2 * (1 + 2 * r) * rho * d**3 * ustar**3 / nu
+        return drag, lift
+    v = KARMAN * ((1 + r) * math.log(1 + 1 / r) - 1)
+    drag = 3 * math.pi * rho * nu * d * v * ustar * (1 + 0.15 * (v * ustar * d / nu) ** 0.687)
+    gradient = math.sqrt(KARMAN * math.log(1 + 1 / r) * nu)
+    return drag, scene["alpha_s"] * v * gradient * rho * d**1.5 * ustar**1.5
+
+
+def threshold(scene):
+    """The u* (m/s) at which the forces turn a grain over its neighbour (Eq. 1), by bisection."""
+    alpha, beta = math.radians(scene["alpha_deg"]), math.radians(scene["beta_deg"])
+    goal = scene["weight_n"] * math.cos(alpha - beta)
+    low, high = 1e-6, 1e3
+    for _ in range(200):
+        middle = math.sqrt(low * high)
+        drag, lift = forces(scene, middle)
+        if drag * math.sin(beta) + lift * math.cos(beta) < goal:
+            low = middle
+        else:
+            high = middle
+    return math.sqrt(low * high)
+
+
+def closed_form(scene, case):
+    """Level 1."""
+    ustar = threshold(scene)
+    d, rho = scene["d_m"], scene["rho_f_kg_m3"]
+    excess = (scene["rho_sol_kg_m3"] - rho) * scene["g_m_s2"] * d
+    answers = {
+        "ustar_m_s": lambda at: ustar,
+        "reynolds": lambda at: ustar * d / scene["nu_m2_s"],
+        "shields": lambda at: rho * ustar**2 / excess,
+        "drag_n": lambda at: forces(scene, float(at))[0],
+        "lift_n": lambda at: forces(scene, float(at))[1],
+    }
+    return lambda quantity, at: answers[quantity](at)
+
+
+class Contact:
+    """A spring that pushes and a tangential one that remembers, each with its dashpot."""
+
+    def __init__(self, scene, mass):
+        self.k = scene["spring_n_m"]
+        self.gamma = 2 * scene["damping"] * math.sqrt(self.k * mass)
+        self.friction = math.tan(math.radians(scene["phi_deg"]))
+        self.stretch = 0.0
+
+    def force(self, overlap, approach, slip, dt):
+        """Normal push and friction, N; `approach` and `slip` are speeds at the contact, m/s."""
+        push = self.k * overlap + self.gamma * approach
+        if overlap <= 0 or push <= 0:
+            self.stretch = 0.0
+            return 0.0, 0.0
+        self.stretch += slip * dt
+        grip = -self.k * self.stretch - self.gamma * slip
+        most = self.friction * push
+        if abs(grip) > most:
+            grip = math.copysign(most, grip)
+            self.stretch = -grip / self.k
+        return push, grip
+
+
+def time_step(scene):
+    """Of the integration, s."""
+    return STEP * math.sqrt(scene["mass_kg"] / scene["spring_n_m"])
+
+
+def collision(scene, case):
+    """Two equal grains head on: the relative motion of one with half the mass."""
+    mass, dt = scene["mass_kg"] / 2, time_step(scene) / 10
+    contact = Contact(scene, mass)
+    start = speed = 2 * scene["speed_m_s"]
+    overlap = 0.0
+    while True:
+        overlap += speed * dt
+        push, _ = contact.force(overlap, speed, 0.0, dt)
+        if push == 0:
+            return lambda quantity, at: -speed / start
+        speed -= push / mass * dt
+
+
+def roll(scene, incline_deg, speed, times):
+    """A sphere on a plane: its speed and the speed of its surface by spinning at some times."""
+    m, g, radius = scene["mass_kg"], scene["reduced_gravity_m_s2"], scene["d_m"] / 2
+    a, dt = math.radians(incline_deg), time_step(scene)
+    contact = Contact(scene, m)
+    overlap = m * g * math.cos(a) / contact.k  # at rest in the plane
+    sink, spin, time, found = 0.0, 0.0, 0.0, []
+    for end in times:
+        while time < end:
+            push, grip = contact.force(overlap, sink, speed - spin * radius, dt)
+            speed += (g * math.sin(a) + grip / m) * dt
+            spin -= grip * radius / (INERTIA * m * radius**2) * dt
+            sink += (g * math.cos(a) - push / m) * dt
+            overlap += sink * dt
+            time += dt
+        found.append((time, speed, spin * radius))
+    return found
+
+
+def incline(scene, case):
+    """The acceleration of a sphere on a plane, once it rolls or slides."""
+    unit, g = scene["time_unit_s"], scene["reduced_gravity_m_s2"]
+    (t1, v1, _), (t2, v2, _) = roll(scene, scene["incline_deg"], 0.0, (2 * unit, 6 * unit))
+    return lambda quantity, at: (v2 - v1) / (t2 - t1) / g
+
+
+def sliding(scene, case):
+    """A sphere that starts to slide, until it rolls."""
+    start = scene["speed_m_s"]
+    places = ("0.5", "2")
+    found = roll(scene, 0.0, start, [float(at) * scene["roll_time_s"] for at in places])
+    speed = {at: v / start for at, (_, v, _) in zip(places, found, strict=True)}
+    spin = {at: w / start for at, (_, _, w) in zip(places, found, strict=True)}
+    return lambda quantity, at: (speed if quantity == "speed_over_start" else spin)[at]
+
+
+class Bed:
+    """One mobile grain on fixed ones, in the plane."""
+
+    def __init__(self, scene, grains):
+        self.scene, self.dt = scene, time_step(scene)
+        self.fixed = [(float(g["x_m"]), float(g["z_m"])) for g in grains if g["kind"] == "fixed"]
+        mobile = next(g for g in grains if g["kind"] == "mobile")
+        self.x, self.z = float(mobile["x_m"]), float(mobile["z_m"])
+        self.vx = self.vz = self.spin = 0.0
+        self.contacts = [Contact(scene, scene["mass_kg"]) for _ in self.fixed]
+
+    def step(self, fx, fz):
+        """Move the grain by one time step under a force and its weight."""
+        m, d = self.scene["mass_kg"], self.scene["d_m"]
+        fz -= self.scene["weight_n"]
+        torque = 0.0
+        for (x, z), contact in zip(self.fixed, self.contacts, strict=True):
+            dx, dz = self.x - x, self.z - z
+            distance = math.hypot(dx, dz)
+            nx, nz = dx / distance, dz / distance
+            # along the contact, in the sense in which the grain rolls forwards over its neighbour
+            slip = self.vx * nz - self.vz * nx - self.spin * d / 2
+            push, grip = contact.force(d - distance, -self.vx * nx - self.vz * nz, slip, self.dt)
+            fx += push * nx + grip * nz
+            fz += push * nz - grip * nx
+            torque -= grip * d / 2
+        self.vx += fx / m * self.dt
+        self.vz += fz / m * self.dt
+        self.spin += torque / (INERTIA * m * d**2 / 4) * self.dt
+        self.x += self.vx * self.dt
+        self.z += self.vz * self.dt
+
+
+def moves(scene, grains, resting, hold):
+    """Whether the grain passes the marker in a hold, after holds in which it rests."""
+    bed = Bed(scene, grains)
+    alpha, unit = math.radians(scene["alpha_deg"]), scene["time_unit_s"]
+    for rest in resting:
+        for _ in range(int(10 * unit / bed.dt)):
+            bed.step(float(rest["fx_n"]), float(rest["fz_n"]))
+    x, z = bed.x, bed.z
+    for _ in range(int(scene["quiet"] * unit / bed.dt)):
+        bed.step(float(hold["fx_n"]), float(hold["fz_n"]))
+        travel = (bed.x - x) * math.cos(alpha) + (bed.z - z) * math.sin(alpha)
+        if travel >= scene["marker"] * scene["d_m"]:
+            return True
+    return False
+
+
+def pivot(scene, case):
+    """Bisect among the holds; each trial starts from rest in the last hold that did not move it."""
+    grains, holds = table(case / "grains.csv"), table(case / "holds.csv")
+    low, high = 1, len(holds) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if moves(scene, grains, (holds[0], holds[low]), holds[middle]):
+            high = middle
+        else:
+            low = middle
+    ustar = math.sqrt(float(holds[low]["ustar_m_s"]) * float(holds[high]["ustar_m_s"]))
+    return lambda quantity, at: ustar
+
+
+def pile(scene, case):
+    """Each grain alone: it moves when its own stress reaches the threshold of one grain."""
+    alone = threshold(scene)
+    counted = [g for g in table(case / "grains.csv") if g["kind"] == "counted"]
+    ratio = [float(g["ustar_over_ustar0"]) for g in counted]
+    flow = [float(h["ustar0_m_s"]) for h in table(case / "holds.csv")]
+    order = sorted((r for r in ratio if r > 0), reverse=True)
+    moved = [sum(alone <= r * u for r in order) for u in flow]
+    excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
+
+    def first(fraction):
+        need = max(math.ceil(fraction * len(counted) - 1e-9), 1)
+        level = next((i for i, n in enumerate(moved) if n >= need), len(moved) - 1)
+        return level, math.sqrt(flow[level - 1] * flow[level])
+
+    def shields(fraction):
+        level, ustar0 = first(fraction)
+        mean = sum(r * r for r in order[: moved[level]]) / max(moved[level], 1)
+        return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
+
+    answers = {
+        "moved": lambda at: moved[int(at)],
+        "not_moved": lambda at: len(counted) - moved[int(at)],
+        "ustar0_m_s": lambda at: first(float(at))[1],
+        "shields": lambda at: shields(float(at)),
+    }
+    return lambda quantity, at: answers[quantity](at)
+
+
+KINDS = {
+    "closed-form": closed_form,
+    "collision": collision,
+    "incline": incline,
+    "sliding": sliding,
+    "pivot": pivot,
+    "pile": pile,
+}
+
+
+def table(path):
+    """The rows of a CSV file, as dictionaries of texts."""
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def main(case, out):
+    """Answer one scene."""
+    scene = json.loads((case / "scene.json").read_text())
+    if scene["kind"] not in KINDS:
+        print(f"this solver does not know the kind {scene['kind']}", file=sys.stderr)
+        return 2
+    answer = KINDS[scene["kind"]](scene, case)
+    with out.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["quantity", "at", "value"])
+        for asked in table(case / "ask.csv"):
+            quantity, at = asked["quantity"], asked["at"]
+            writer.writerow([quantity, at, repr(float(answer(quantity, at)))])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]), Path(sys.argv[2])))

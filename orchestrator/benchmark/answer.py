@@ -1,0 +1,122 @@
+"""A solver's answer to a scene: one CSV file, taken only if it is whole."""
+
+import csv
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from orchestrator.errors import OrchestratorError
+
+COLUMNS = ("quantity", "at", "value")
+FILE = "answer.csv"
+Key = tuple[str, str]
+"""Quantity, and the text of its `at` with seven digits."""
+
+
+class AnswerError(OrchestratorError):
+    """An answer that cannot be used."""
+
+
+def key(quantity: str, at: str) -> Key:
+    """The same for every way in which a solver may write the number `at`."""
+    return quantity, f"{float(at):.7g}" if at.strip() else ""
+
+
+def read(path: Path, asked: pd.DataFrame, count: float | None) -> dict[Key, float]:
+    """Read an answer.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    asked : DataFrame
+        Columns ``quantity`` and ``at``.
+    count : float or None
+        How many grains are counted, where the scene says so.
+
+    Raises
+    ------
+    AnswerError
+        Naming what is wrong with it.
+    """
+    found = numbers(path)
+    _check_complete(
+        found, [key(q, at) for q, at in zip(asked["quantity"], asked["at"], strict=True)]
+    )
+    _check_counts(found, count)
+    return found
+
+
+def numbers(path: Path) -> dict[Key, float]:
+    """The numbers of an answer, whatever was asked.
+
+    Raises
+    ------
+    AnswerError
+        If the file is missing or not whole.
+    """
+    if not path.is_file():
+        raise AnswerError(f"it wrote no {FILE}")
+    try:
+        return dict(_rows(path.read_text(encoding="utf-8")))
+    except UnicodeDecodeError:
+        raise AnswerError(f"{FILE} is no text") from None
+
+
+def _rows(text: str) -> list[tuple[Key, float]]:
+    lines = text.splitlines()
+    if not lines or tuple(lines[0].strip().split(",")) != COLUMNS:
+        start = f"begins with {lines[0][:60]!r}" if lines else "is empty"
+        raise AnswerError(f"{FILE} {start}, not with {','.join(COLUMNS)}")
+    rows = [_row(number, row) for number, row in enumerate(csv.reader(lines[1:]), 2) if row]
+    if not text.endswith("\n"):
+        raise AnswerError(f"{FILE} is cut short: line {len(lines)} has no end")
+    keys = [found for found, _ in rows]
+    twice = (
+        next((k for k in keys if keys.count(k) > 1), None) if len(set(keys)) < len(keys) else None
+    )
+    if twice:
+        raise AnswerError(f"{FILE} answers {_said(twice)} twice")
+    return rows
+
+
+def _row(number: int, row: Sequence[str]) -> tuple[Key, float]:
+    if len(row) != len(COLUMNS):
+        raise AnswerError(f"{FILE} is cut short: line {number} has {len(row)} of 3 fields")
+    try:
+        where = key(row[0].strip(), row[1])
+        value = float(row[2])
+    except ValueError:
+        raise AnswerError(f"{FILE}, line {number}: {','.join(row)!r} holds no number") from None
+    if not math.isfinite(value):
+        raise AnswerError(f"{FILE}, line {number}: {_said(where)} is {row[2].strip()}, not finite")
+    return where, value
+
+
+def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
+    missing = [one for one in asked if one not in found]
+    if not missing:
+        return
+    extra = {quantity for quantity, _ in found} - {quantity for quantity, _ in asked}
+    like = difflib.get_close_matches(missing[0][0], sorted(extra), n=1, cutoff=0.5)
+    hint = f"; is {like[0]} meant?" if like else ""
+    more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+    raise AnswerError(f"{FILE} lacks {_said(missing[0])}{more}{hint}")
+
+
+def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
+    total = found.get(("count", ""), count)
+    for (quantity, at), rest in found.items():
+        moved = found.get(("moved", at), 0.0)
+        if quantity == "not_moved" and total is not None and moved + rest != total:
+            lost = "are lost" if moved + rest < total else "are too many"
+            raise AnswerError(
+                f"grains {lost}: {moved:g} moved and {rest:g} not, at hold {at}, of {total:g}"
+            )
+
+
+def _said(one: Key) -> str:
+    return f"{one[0]} at {one[1]}" if one[1] else one[0]

@@ -1,0 +1,160 @@
+"""Levels 1 and 2: scenes whose answers are formulas."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.benchmark.problem import (
+    Problem,
+    Row,
+    exact,
+    expectations,
+    expected,
+    mechanics,
+    parameters,
+    place,
+)
+from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY, LAST
+from orchestrator.grains.protocol import SETTLE_FLOW, START
+from orchestrator.scene import Grain, Scene
+
+FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
+"""Relative tolerances."""
+FLOWS = (0.5, 0.8, 1.1, 1.4)
+"""Friction velocities at which the forces are asked, over that of the threshold."""
+DAMPINGS = (0.05, 0.1, 0.3)
+INCLINES_DEG = (5.0, 20.0, 45.0, 60.0, 70.0, 75.0)
+SPEEDS = (1.0, 2.0, 5.0)
+"""Starts of a sliding grain, sqrt(d g')."""
+UNIT = float(np.sqrt(DIAMETER * GRAVITY))
+"""sqrt(d g') of the check decks' grain, m/s."""
+MEETING = 0.1
+"""Speed of each of two colliding grains, sqrt(d g')."""
+LEAST_QUIET = 5.0
+"""Holds shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
+
+
+def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
+    """Level 1: the forces on a grain and its threshold."""
+    drag, lift = scene.powers()
+    found = scene.closed_form(scene.closure)
+    flows = [float(f"{x * float(found.friction_velocity):.4g}") for x in FLOWS]
+    rows: list[Row] = []
+    for quantity, force in (("drag_n", drag), ("lift_n", lift)):
+        rows += [exact(quantity, float(force(u)), FORMULA, place(u)) for u in flows]
+    thresholds = {
+        "ustar_m_s": found.friction_velocity,
+        "reynolds": found.reynolds,
+        "shields": found.shields,
+    }
+    rows += [exact(name, float(value), FORMULA) for name, value in thresholds.items()]
+    asked = expectations(rows).assign(ours=lambda table: table["value"])
+    return Problem(1, scene.id, "closed-form", parameters(scene, row), {}, asked)
+
+
+def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> Problem:
+    """Level 2: one grain on its two neighbours; `ours` is the DEM's threshold, m/s."""
+    threshold = float(scene.closed_form(scene.closure).friction_velocity)
+    # the mean of two holds is within half a step of what lies between them
+    half = float(np.sqrt(1 + scene.protocol.step))
+    interval = threshold / half, threshold * half
+    asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
+    tables = {"grains": _cell(scene), "holds": _holds(scene, threshold)}
+    return Problem(2, scene.id, "pivot", parameters(scene, row), tables, asked)
+
+
+def has_pivot(scene: Scene) -> bool:
+    """Whether the grain's threshold by holds is the closed form's, and means something."""
+    return scene.regime == scene.closure and scene.protocol.quiet >= LEAST_QUIET
+
+
+def _cell(scene: Scene) -> pd.DataFrame:
+    along, outward = _directions(scene)
+    beta = np.radians(scene.bed.entrainment_angle_deg)
+    sides = (-1.0, 1.0)
+    below = [side * np.cos(beta) * along - np.sin(beta) * outward for side in sides]
+    x, z = np.vstack([*below, np.zeros(2)]).T * scene.grain.diameter
+    kinds = ["fixed", "fixed", "mobile"]
+    return pd.DataFrame(
+        {"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": scene.grain.diameter, "kind": kinds}
+    )
+
+
+def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
+    count = int(np.ceil(np.log(LAST / START) / np.log1p(scene.protocol.step)))
+    flows = threshold * START * (1 + scene.protocol.step) ** np.arange(count + 1)
+    flows = np.concatenate([[SETTLE_FLOW * flows[0]], flows])
+    along, outward = _directions(scene)
+    drag, lift = scene.powers()
+    force = np.outer(drag(flows), along) + np.outer(lift(flows), outward)
+    return pd.DataFrame(
+        {"hold": range(len(flows)), "ustar_m_s": flows, "fx_n": force[:, 0], "fz_n": force[:, 1]}
+    )
+
+
+def _directions(scene: Scene) -> tuple[Any, Any]:
+    """Unit vectors up the slope and out of the bed."""
+    alpha = np.radians(scene.bed.slope_deg)
+    along = np.array([np.cos(alpha), np.sin(alpha)])
+    return along, np.array([-along[1], along[0]])
+
+
+def checks() -> Iterator[Problem]:
+    """Level 2: the contact law, on the reference grain of the decks."""
+    for damping in DAMPINGS:
+        yield _collision(damping)
+    for incline in INCLINES_DEG:
+        yield _incline(incline)
+    for speed in SPEEDS:
+        yield _sliding(speed)
+
+
+def _contact(damping: float = 0.1) -> dict[str, Any]:
+    """The grain of the check decks."""
+    grain = Grain(diameter=DIAMETER, density=DENSITY, damping=damping)
+    weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+    return {
+        "d_m": DIAMETER,
+        "rho_sol_kg_m3": DENSITY,
+        "phi_deg": grain.friction_angle_deg,
+        "stiffness": grain.stiffness,
+        "damping": damping,
+        **mechanics(DIAMETER, DENSITY, GRAVITY, weight, grain.stiffness),
+    }
+
+
+def _collision(damping: float) -> Problem:
+    told = _contact(damping)
+    root = np.sqrt(1 - damping**2)
+    # the contact ends where the force does, not the overlap
+    exponent = damping / root * (np.pi - 2 * np.arcsin(damping))
+    asked = expectations([exact("restitution", float(np.exp(-exponent)), CHECK)])
+    told |= {"speed_m_s": MEETING * UNIT, "timestep": 0.01}
+    return Problem(2, f"collision-{damping:g}", "collision", told, {}, asked)
+
+
+def _incline(incline_deg: float) -> Problem:
+    told = _contact()
+    friction = np.tan(np.radians(told["phi_deg"]))
+    a = np.radians(incline_deg)
+    rolls = np.tan(a) < 3.5 * friction
+    value = 5 / 7 * np.sin(a) if rolls else np.sin(a) - friction * np.cos(a)
+    asked = expectations([exact("acceleration_over_g", float(value), CHECK)])
+    told |= {"incline_deg": incline_deg, "timestep": 0.2}
+    return Problem(2, f"incline-{incline_deg:g}", "incline", told, {}, asked)
+
+
+def _sliding(speed: float) -> Problem:
+    told = _contact()
+    start = speed * UNIT
+    friction = float(np.tan(np.radians(told["phi_deg"])))
+    rows = [
+        exact("speed_over_start", 6 / 7, CHECK, "0.5"),
+        exact("speed_over_start", 5 / 7, CHECK, "2"),
+        exact("spin_over_start", 5 / 7, CHECK, "2"),
+    ]
+    roll_time = 2 * start / (7 * friction * told["reduced_gravity_m_s2"])
+    told |= {"speed_m_s": start, "roll_time_s": roll_time, "timestep": 0.02}
+    return Problem(2, f"sliding-{speed:g}", "sliding", told, {}, expectations(rows))

@@ -1,0 +1,132 @@
+"""The scenes of a pack, from a study."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from orchestrator import case, plan, study, tables
+from orchestrator.benchmark import exact, measured, pack
+from orchestrator.benchmark.problem import Problem
+from orchestrator.errors import InputError
+from orchestrator.plan import Plan
+from orchestrator.study import Study
+from orchestrator.tables import scenes as scene_rows
+from orchestrator.workspace import Workspace
+
+LEVELS = (1, 2, 3, 4, 5)
+FORMULAS = (1, 2)
+"""Levels that need no finished study."""
+DEFAULT = "first-look"
+"""The study whose single grains are exported where none is named."""
+
+
+def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
+    """Write a pack, and return how many scenes it has.
+
+    Parameters
+    ----------
+    root : Path
+        Where it goes.
+    source : Path or None
+        Directory of a finished study. Without one the answers are formulas: levels 1 and 2.
+    levels : sequence of int
+        Which levels; empty for all that can be had.
+
+    Raises
+    ------
+    InputError
+        If a level needs a study, or the study is not finished.
+    """
+    if source is None:
+        return _formulas(root, levels or FORMULAS)
+    space = Workspace(source.absolute())
+    about = space.description()
+    asked = study.parse(about["study"], name=about["name"], where=str(source))
+    planned = plan.make(asked)
+    finished = Finished(asked, planned, space)
+    problems = list(finished.problems(levels or LEVELS))
+    return pack.write(root, problems, asked.text, case.programs(space.cases))
+
+
+def _formulas(root: Path, levels: Sequence[int]) -> int:
+    lacking = sorted(set(levels) - set(FORMULAS))
+    if lacking:
+        raise InputError(
+            f"level {lacking[0]} needs the answers of a finished study",
+            where="--level",
+            remedy="name its directory with --from",
+        )
+    asked = study.load(DEFAULT)
+    return pack.write(root, formulas(asked, plan.make(asked), levels, {}), asked.text, {})
+
+
+def formulas(
+    asked: Study, planned: Plan, levels: Sequence[int], found: Mapping[str, float]
+) -> Iterator[Problem]:
+    """Levels 1 and 2; `found` holds the DEM's thresholds by scene, m/s, as far as there are any."""
+    rows = {row["scene_id"]: row for row in scene_rows.rows(asked, planned)}
+    grains = [scene for scene in asked.scenes if scene.id not in planned.piles]
+    if 1 in levels:
+        yield from (exact.closed_form(scene, rows[scene.id]) for scene in grains)
+    if 2 in levels:
+        yield from exact.checks()
+        for scene in filter(exact.has_pivot, grains):
+            yield exact.pivot(scene, rows[scene.id], found.get(scene.id, float("nan")))
+
+
+class Finished:
+    """A study whose cases are done, as scenes of a pack."""
+
+    def __init__(self, asked: Study, planned: Plan, space: Workspace) -> None:
+        """Read the study's tables.
+
+        Raises
+        ------
+        InputError
+            If they are not there, or of another version.
+        """
+        self.asked, self.planned, self.cases = asked, planned, space.cases
+        if not space.drawn.is_file():
+            raise InputError(
+                "the study is not finished", where=str(space.root), remedy="run it to its end"
+            )
+        self.tables = tables.read(space.tables)
+        told = self.tables["scenes"]
+        self._check_cases(set(told["case"]) | set(told["flow_case"].dropna()), space.root)
+        times = pd.read_csv(space.root / "timings" / "timings.csv")
+        self.seconds: dict[str, float] = dict(zip(times["case"], times["solver_s"], strict=True))
+        self.rows = {row["scene_id"]: row for row in scene_rows.rows(asked, planned)}
+
+    def _check_cases(self, told: set[str], root: Path) -> None:
+        if told != set(self.planned.cases):
+            raise InputError(
+                "the study was run by another version of the program: its cases are others",
+                where=str(root),
+                remedy="run it again",
+            )
+
+    def problems(self, levels: Sequence[int]) -> Iterator[Problem]:
+        """The scenes at some levels."""
+        thresholds: Any = self.tables.get("single_grain")
+        found = {} if thresholds is None else thresholds.set_index("scene_id")["ustar_m_s"]
+        yield from map(self._timed, formulas(self.asked, self.planned, levels, dict(found)))
+        piles = measured.answered(self.planned.piles.values(), self.rows, self.tables, self.cases)
+        if 3 in levels:
+            of_flow = {one.pile.flow.name: one for one in piles}
+            for name, one in of_flow.items():
+                yield replace(measured.flow(one), seconds=self.seconds[name])
+        for one in piles if 4 in levels else ():
+            yield replace(measured.pile(one), seconds=self.seconds[one.pile.name])
+        for one in piles if 5 in levels else ():
+            both = self.seconds[one.pile.name] + self.seconds[one.pile.flow.name]
+            yield replace(measured.line(one), seconds=both)
+
+    def _timed(self, problem: Problem) -> Problem:
+        """Cells share a run: each has its part of the time."""
+        for one in self.planned.cells if problem.kind == "pivot" else ():
+            if any(scene.id == problem.name for scene in one.scenes):
+                return replace(problem, seconds=self.seconds[one.name] / len(one.scenes))
+        return problem

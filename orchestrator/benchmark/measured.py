@@ -1,0 +1,198 @@
+"""Levels 3 to 5: scenes whose answers are those of a finished study."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.benchmark.problem import (
+    Problem,
+    Row,
+    exact,
+    expectations,
+    expected,
+    parameters,
+    place,
+)
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains.pile import PileCase
+from orchestrator.tables import Tables
+
+STRESS, MEAN_STRESS = 0.10, 0.05
+"""Relative tolerances of the friction velocity along the bed, and of its mean."""
+FACE = (0.1, 0.9)
+"""Part of the windward face on which it is judged: toe and crest are points of the mesh."""
+GRAINS, LINE = 0.03, 0.10
+"""Relative tolerances of a pile's thresholds under the given stress, and with one's own flow."""
+SCATTER = 0.05
+"""Of the count, that the number of moved grains may differ by besides one hold."""
+UPSTREAM, DOWNSTREAM, LID = 10.0, 20.0, 10.0
+"""Ends of the flow's domain, h."""
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A pile whose cases are done.
+
+    Attributes
+    ----------
+    pile : PileCase
+        The pile.
+    row : mapping
+        Its row in the study's table of scenes.
+    curve, thresholds, stress : DataFrame
+        Its rows in the tables ``pile_curve``, ``pile_threshold`` and ``wall_stress``.
+    cases : Path
+        Directory of the cases.
+    """
+
+    pile: PileCase
+    row: Mapping[str, Any]
+    curve: pd.DataFrame
+    thresholds: pd.DataFrame
+    stress: pd.DataFrame
+    cases: Path
+
+
+def answered(
+    piles: Iterable[PileCase],
+    rows: Mapping[str, Mapping[str, Any]],
+    tables: Tables,
+    cases: Path,
+) -> list[Answered]:
+    """The piles of a study with what its tables say of each; `rows` are its scenes by id."""
+    if "pile_curve" not in tables:
+        return []
+    curves = dict(iter(tables["pile_curve"].groupby("scene_id")))
+    thresholds = dict(iter(tables["pile_threshold"].groupby("scene_id")))
+    stresses = dict(iter(tables["wall_stress"].groupby("flow_case")))
+    return [
+        Answered(pile, rows[name], curves[name], thresholds[name], stresses[pile.flow.name], cases)
+        for pile in piles
+        for name in (pile.scene.id,)
+    ]
+
+
+def flow(one: Answered) -> Problem:
+    """Level 3: the stress on the bed."""
+    case = one.pile.flow
+    tables = {"bed": _bed(case)}
+    asked = expectations(_stress_rows(one))
+    return Problem(3, case.id[:12], "flow", flow_parameters(one), tables, asked)
+
+
+def flow_parameters(one: Answered) -> dict[str, Any]:
+    """What the flow of a pile is solved with."""
+    case = one.pile.flow
+    return {
+        "alpha_deg": case.slope_deg,
+        "h_m": case.height_m,
+        "z0_m": case.roughness_m,
+        "u_e_m_s": case.speed_m_s,
+        "ustar0_m_s": case.ustar0_m_s,
+        "lid_m": LID * case.height_m,
+        "solve_nu_m2_s": case.viscosity_m2_s,
+        "rho_f_kg_m3": one.pile.scene.fluid.density,
+        "first_cell_m": case.first_cell_m,
+        "cells_per_face": case.cells_per_face,
+    }
+
+
+def _bed(case: FlowCase) -> pd.DataFrame:
+    h = case.height_m
+    face = h / np.tan(np.radians(case.slope_deg))
+    x = [-UPSTREAM * h, 0.0, face, 2 * face, 2 * face + DOWNSTREAM * h]
+    return pd.DataFrame({"x_m": x, "z_m": [0.0, 0.0, h, 0.0, 0.0]})
+
+
+def _stress_rows(one: Answered) -> Iterator[Row]:
+    along = one.stress
+    mean = windward_mean(one)
+    yield exact("windward_mean", mean, MEAN_STRESS, ours=mean)
+    crest = 1 / np.sin(np.radians(one.pile.bed.slope_deg))
+    for s, u in zip(along["s_over_h"], along["ustar_over_ustar0_wall"], strict=True):
+        judged = FACE[0] * crest <= s <= FACE[1] * crest
+        yield exact("ustar_over_ustar0", u, STRESS if judged else np.nan, place(s), u)
+
+
+def windward_mean(one: Answered) -> float:
+    """Mean of u*/u*_0 over the windward face by arc length."""
+    stress = WallStress.from_csv(one.cases / one.pile.flow.name / "wall_stress.csv")
+    crest = one.pile.bed.height / np.sin(np.radians(one.pile.bed.slope_deg))
+    face = (stress.s_m > 0) & (stress.s_m < crest)
+    return float(np.average(stress.ustar_over_ustar0_wall[face], weights=stress.length_m[face]))
+
+
+def pile(one: Answered) -> Problem:
+    """Level 4: the grains of a pile under a given stress."""
+    scene = one.pile.scene
+    told = parameters(scene, one.row) | {"count": one.pile.packing.count}
+    tables = {"grains": _grains(one), "holds": holds(one)}
+    return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
+
+
+def line(one: Answered) -> Problem:
+    """Level 5: flow and grains."""
+    scene = one.pile.scene
+    told = parameters(scene, one.row) | flow_parameters(one)
+    tables = {"bed": _bed(one.pile.flow), "holds": holds(one)}
+    count = float(one.pile.packing.count)
+    counted = exact("count", count, LINE, ours=count)
+    asked = expectations([counted, *_pile_rows(one, LINE)])
+    return Problem(5, scene.id, "line", told, tables, asked)
+
+
+def holds(one: Answered) -> pd.DataFrame:
+    """The holds that our run came to, the settling first."""
+    return one.curve[["hold", "ustar0_m_s", "u_e_m_s"]]
+
+
+def _grains(one: Answered) -> pd.DataFrame:
+    packing, scene = one.pile.packing, one.pile.scene
+    pushed = packing.mobile & packing.lee
+    kinds = [~packing.mobile, packing.windward, pushed]
+    forced = packing.windward | pushed
+    slope = np.where(packing.lee, -scene.bed.slope_deg, scene.bed.slope_deg)
+    x, z = packing.centres.T * scene.grain.diameter
+    return pd.DataFrame(
+        {
+            "id": np.arange(1, len(x) + 1),
+            "x_m": x,
+            "z_m": z,
+            "d_m": scene.grain.diameter,
+            "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
+            "slope_deg": np.where(forced, slope, np.nan),
+            "ustar_over_ustar0": np.where(forced, one.pile._speed(one.cases), np.nan),
+        }
+    )
+
+
+def _pile_rows(one: Answered, tolerance: float) -> Iterator[Row]:
+    yield from _count_rows(one.curve)
+    ustar0 = one.curve["ustar0_m_s"].to_numpy(float)
+    for row in one.thresholds.dropna(subset="shields").to_dict("records"):
+        at, shields, flow = place(row["fraction"]), row["shields"], row["ustar0_m_s"]
+        interval = row["shields_low"], row["shields_high"]
+        yield expected("shields", at, shields, interval, tolerance, shields)
+        # the number is the mean of two holds: one hold more to each side
+        hold = int(np.searchsorted(ustar0, flow))
+        around = ustar0[max(hold - 2, 0)], ustar0[min(hold + 1, len(ustar0) - 1)]
+        yield expected("ustar0_m_s", at, flow, around, tolerance, flow)
+
+
+def _count_rows(curve: pd.DataFrame) -> Iterator[Row]:
+    total = float(curve["count"].iloc[0])
+    n = curve["moved"].to_numpy(float)
+    last = len(n) - 1
+    # hold 0 is the settling
+    for hold in range(1, last + 1):
+        near = n[hold - 1 : hold + 2]
+        low = max(float(near.min()) - SCATTER * total, 0.0)
+        high = min(float(near.max()) + SCATTER * total, total)
+        yield expected("moved", place(hold), n[hold], (low, high), 0.0, n[hold])
+    rest = total - n[last]
+    yield expected("not_moved", place(last), rest, (total - high, total - low), 0.0, rest)

@@ -1,0 +1,177 @@
+"""Our own answer to a scene of a pack, run anew on this machine."""
+
+import math
+import re
+import resource
+import shutil
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator import assets, engine, plan, study, tables
+from orchestrator.benchmark import exact, measured
+from orchestrator.benchmark.measured import Answered
+from orchestrator.benchmark.pack import STUDY, Pack
+from orchestrator.benchmark.problem import Problem
+from orchestrator.case import Case, done_state
+from orchestrator.errors import InputError, SolverError
+from orchestrator.plan import Plan
+from orchestrator.scene import Scene
+from orchestrator.solvers import liggghts, process
+from orchestrator.study import Group
+from orchestrator.tables import scenes as scene_rows
+
+LIMIT_S = 3600.0
+SAID = {
+    "restitution": ("restitution", ""),
+    "acceleration over g": ("acceleration_over_g", ""),
+    "speed at half the time": ("speed_over_start", "0.5"),
+    "speed when it rolls": ("speed_over_start", "2"),
+    "spin when it rolls": ("spin_over_start", "2"),
+}
+"""What the check decks print, and what a pack asks."""
+
+
+@dataclass(frozen=True)
+class Took:
+    """What solvers took: wall time, and CPU time of them all, s; NaN for formulas."""
+
+    seconds: float
+    cpu_s: float
+
+    def __add__(self, other: "Took") -> "Took":
+        return Took(self.seconds + other.seconds, self.cpu_s + other.cpu_s)
+
+
+NOTHING = Took(math.nan, math.nan)
+Given = tuple[pd.DataFrame, Took]
+"""An answer, and what it took."""
+
+
+class Ours:
+    """The solvers of this package behind the same door."""
+
+    def __init__(self, pack: Pack, root: Path) -> None:
+        """Read the pack's study; cases are made below `root`."""
+        text = (pack.root / STUDY).read_text(encoding="utf-8")
+        self.pack, self.root = pack, root
+        self.study = study.parse(text, name="benchmark", where=str(pack.root / STUDY))
+        self.scenes = {scene.id: scene for scene in self.study.scenes}
+        piles = plan.make(self.study).piles.values()
+        self.flows: dict[str, Took] = {}
+        self.of_flow = {pile.flow.id[:12]: pile.scene for pile in piles}
+
+    def answer(self, name: str) -> Given:
+        """Answer a scene.
+
+        Raises
+        ------
+        InputError
+            If the pack is of another version of the program.
+        SolverError
+            If a solver failed.
+        """
+        told = self.pack.scenes[name]
+        kind = told["kind"]
+        if kind in ("collision", "incline", "sliding"):
+            return self._check(kind, told)
+        scene = self._scene(name.partition("-")[2], kind)
+        asked = replace(self.study, groups=(Group("benchmark", (scene,)),))
+        planned = plan.make(asked)
+        row = next(scene_rows.rows(asked, planned))
+        if kind == "closed-form":
+            return _given(exact.closed_form(scene, row)), NOTHING
+        if kind == "pivot":
+            took = self._run(*planned.cases.values())
+            made = tables.make(asked, planned, self.root, planned.cases)
+            ours = float(made["single_grain"]["ustar_m_s"].iloc[0])
+            return _given(exact.pivot(scene, row, ours)), took
+        return self._bed(kind, asked, planned, row)
+
+    def _scene(self, name: str, kind: str) -> Scene:
+        found = (self.of_flow if kind == "flow" else self.scenes).get(name)
+        if found is None:
+            raise InputError(
+                f"no scene of its study is {name}: it is of another version of the program",
+                where=str(self.pack.root),
+                remedy="export it again",
+            )
+        return found
+
+    def _bed(self, kind: str, asked: study.Study, planned: Plan, row: Mapping[str, Any]) -> Given:
+        pile = next(iter(planned.piles.values()))
+        if pile.flow.name not in self.flows:  # scenes share them
+            self.flows[pile.flow.name] = self._run(pile.flow)
+        flow_took = self.flows[pile.flow.name]
+        cases = {pile.flow.name} if kind == "flow" else set(planned.cases)
+        pile_took = NOTHING if kind == "flow" else self._run(pile)
+        made = tables.make(asked, planned, self.root, cases)
+        nothing = pd.DataFrame()
+        one = Answered(
+            pile,
+            row,
+            made.get("pile_curve", nothing),
+            made.get("pile_threshold", nothing),
+            made["wall_stress"],
+            self.root,
+        )
+        if kind == "flow":
+            return _given(measured.flow(one)), flow_took
+        if kind == "pile":
+            return _given(measured.pile(one)), pile_took
+        return _given(measured.line(one)), flow_took + pile_took
+
+    def _run(self, *cases: Case) -> Took:
+        """Run cases anew."""
+        before = _cpu_s()
+        for one in cases:
+            engine.execute(one, self.root, LIMIT_S, threading.Event())
+        return Took(sum(_seconds(one, self.root) for one in cases), _cpu_s() - before)
+
+    def _check(self, kind: str, told: Mapping[str, Any]) -> Given:
+        """Run one of the decks for the contact law."""
+        folder = self.root / "checks"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(assets.templates() / "liggghts", folder)
+        unit = np.sqrt(told["d_m"] * told["reduced_gravity_m_s2"])
+        variables = {"damping": told["damping"], "timestep": told["timestep"]}
+        if kind == "incline":
+            variables["incline"] = told["incline_deg"]
+        if kind == "sliding":
+            variables["speed"] = float(told["speed_m_s"] / unit)
+        command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
+        for name, value in variables.items():
+            command += ["-var", name, repr(value)]
+        log, before = folder / "log.check", _cpu_s()
+        ended = process.run(
+            command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
+        )
+        said = log.read_text(errors="replace")
+        if ended.returncode != 0 or "the check has ended" not in said:
+            raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
+        found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
+        rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
+        return pd.DataFrame(rows, columns=["quantity", "at", "value"]), Took(
+            ended.seconds, _cpu_s() - before
+        )
+
+
+def _given(problem: Problem) -> pd.DataFrame:
+    return problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
+
+
+def _cpu_s() -> float:
+    """CPU time of all processes that this one started and that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _seconds(case: Case, root: Path) -> float:
+    state = done_state(case, root)
+    assert state is not None, "it was run just now"
+    return float(state["solver_s"])

@@ -1,0 +1,140 @@
+"""One scene of a pack: what a solver is given, what it is asked, what is expected of it."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.scene import Scene
+
+SCHEMA = 1
+"""Of the exchange format, ``docs/benchmark.md``."""
+SCENE = "scene.json"
+ASK = "ask.csv"
+NUMBER = "%.9g"
+"""Of all tables of a pack."""
+EXPECTED = ("quantity", "at", "value", "low", "high", "tolerance", "ours")
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene at a level.
+
+    Attributes
+    ----------
+    level : int
+        1 to 5.
+    name : str
+        Of the scene among those of its level.
+    kind : str
+        What is to be solved.
+    parameters : mapping
+        Numbers and words, SI units in their names.
+    tables : mapping of str to DataFrame
+        What lies beside them, by the stem of the file's name.
+    expected : DataFrame
+        Columns `EXPECTED`, a row for each number that is asked; `at` is a text.
+    seconds : float
+        What our answer took, s; NaN if it is not known.
+    """
+
+    level: int
+    name: str
+    kind: str
+    parameters: Mapping[str, Any]
+    tables: Mapping[str, pd.DataFrame]
+    expected: pd.DataFrame
+    seconds: float = float("nan")
+
+    @property
+    def scene(self) -> str:
+        """Name of its directory."""
+        return f"{self.level}-{self.name}"
+
+    def write(self, folder: Path) -> None:
+        """Write what a solver is given."""
+        folder.mkdir(parents=True)
+        head = {"schema": SCHEMA, "scene": self.scene, "level": self.level, "kind": self.kind}
+        text = json.dumps({**head, **self.parameters}, indent=1, allow_nan=False)
+        (folder / SCENE).write_text(text + "\n", encoding="utf-8")
+        for stem, table in {**self.tables, "ask": self.expected[["quantity", "at"]]}.items():
+            (folder / f"{stem}.csv").write_text(csv(table), encoding="utf-8")
+
+
+def csv(table: pd.DataFrame) -> str:
+    """The text of a table; a pack has thousands, and pandas takes a millisecond for each."""
+    columns = [_texts(table[name]) for name in table]
+    rows = map(",".join, zip(*columns, strict=True))
+    return "\n".join([",".join(map(str, table)), *rows, ""])
+
+
+def _texts(column: "pd.Series[Any]") -> list[str]:
+    values = column.tolist()
+    if column.dtype == float:
+        return [NUMBER % value if value == value else "" for value in values]
+    if column.dtype == object:  # numbers and words, whatever a scene has
+        return ["" if v != v else NUMBER % v if isinstance(v, float) else str(v) for v in values]
+    return [str(value) for value in values]
+
+
+def place(value: float) -> str:
+    """The text of an `at`."""
+    return NUMBER % value
+
+
+def expected(
+    quantity: str,
+    at: str,
+    value: float,
+    interval: tuple[float, float],
+    tolerance: float,
+    ours: float,
+) -> Row:
+    """One expectation; a tolerance of NaN is not judged."""
+    return dict(zip(EXPECTED, (quantity, at, value, *interval, tolerance, ours), strict=True))
+
+
+def exact(quantity: str, value: float, tolerance: float, at: str = "", ours: float = np.nan) -> Row:
+    """Expectation of a number that a formula gives."""
+    return expected(quantity, at, value, (value, value), tolerance, ours)
+
+
+def expectations(rows: Iterable[Row]) -> pd.DataFrame:
+    """The table of some rows."""
+    return pd.DataFrame(list(rows), columns=list(EXPECTED))
+
+
+def parameters(scene: Scene, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What a pack says of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a study, with its closure decided.
+    row : mapping
+        Its row in the study's table of scenes: whatever that table says goes into the pack.
+    """
+    hidden = ("scene_id", "group", "case", "flow_case", "bed")
+    told = {k: v for k, v in row.items() if k not in hidden and v is not None and v == v}
+    grain = scene.grain
+    return told | mechanics(
+        grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness
+    )
+
+
+def mechanics(
+    diameter: float, density: float, gravity: float, weight: float, stiffness: float
+) -> dict[str, float]:
+    """The mechanics of a grain in SI units; gravity is that of the submerged grain."""
+    return {
+        "mass_kg": density * np.pi / 6 * diameter**3,
+        "reduced_gravity_m_s2": gravity,
+        "weight_n": weight,
+        "spring_n_m": stiffness * weight / diameter,
+        "time_unit_s": float(np.sqrt(diameter / gravity)),
+    }

@@ -1,0 +1,152 @@
+"""The ladder: what each rung costs, and how far its thresholds are from the dearest ones'.
+
+Every scene is answered on many pairs of rungs. The grains' rungs are run on the reference's flow,
+the flow's with the grains by peeling, so that each error is that of one part; a few pairs as they
+are used show that the errors add up.
+"""
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator import rungs
+from orchestrator.experiments import naive
+from orchestrator.grains.threshold import of_pile
+from orchestrator.plan import Plan
+from orchestrator.rungs import Part, Rung
+from orchestrator.scene import PileBed, Scene
+from orchestrator.study import Study
+from orchestrator.tables.scenes import point
+
+Pair = tuple[str, str]
+"""Names of a flow's and of a grains' rung."""
+Row = dict[str, Any]
+
+REFERENCE: Pair = ("fine", "reference")
+AGAIN: Pair = ("fine", "soft reference")
+"""The same with every number of the grains' run changed: the reference's own uncertainty."""
+FINER: Pair = ("finest", "peeling")
+BESIDE = "peeling"
+"""The grains' rung beside which the flow's are measured."""
+USED: tuple[Pair, ...] = (
+    ("hill", "pivot"),
+    ("hill", "peeling"),
+    ("shared", "peeling"),
+    ("coarse", "1 layer, coarse"),
+    ("coarse", "1 layer, fast"),
+    ("standard", "1 layer, fast"),
+    ("standard", "1 layer, slow"),
+)
+"""Pairs as they are used together."""
+CURVE = np.arange(0.05, 0.86, 0.05)
+"""Fractions at which whole curves are compared."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """One scene on one pair of rungs."""
+
+    scene: Scene
+    pair: Pair
+
+    @property
+    def text(self) -> str:
+        """Its name in the plan."""
+        return " | ".join((self.scene.id, *self.pair))
+
+
+def keys(study: Study) -> Iterator[Key]:
+    """What the ladder runs: every pile of a study on its pairs of rungs."""
+    for scene in study.scenes:
+        if isinstance(scene.bed, PileBed):
+            yield from (Key(scene, pair) for pair in dict.fromkeys(_pairs(scene)))
+
+
+def _pairs(scene: Scene) -> Iterator[Pair]:
+    by_dem = scene.protocol.method == "dem"
+    for flow in _affordable("flow", scene):
+        yield flow.name, BESIDE
+    if by_dem:
+        yield from ((REFERENCE[0], grains.name) for grains in _affordable("grains", scene))
+        yield from USED
+
+
+def _affordable(part: Part, scene: Scene) -> Iterator[Rung]:
+    assert isinstance(scene.bed, PileBed)
+    face = scene.bed.height / math.sin(math.radians(scene.bed.slope_deg))
+    for one in rungs.LADDER[part]:
+        if one.on_lattices and scene.bed.packing == "disordered":
+            continue
+        if one.most_grains is None or face / scene.grain.diameter <= one.most_grains:
+            yield one
+
+
+def answers(study: Study) -> dict[str, Scene]:
+    """The scenes of the ladder as they are answered, by their keys."""
+    return {key.text: _answer(key) for key in keys(study)}
+
+
+def _answer(key: Key) -> Scene:
+    flow, grains = key.pair
+    return rungs.rung("grains", grains).of(rungs.rung("flow", flow).of(key.scene))
+
+
+def fast(study: Study) -> str:
+    """Key of the first pile by DEM on the rung that the naive route is beside."""
+    return next(k.text for k in keys(study) if k.pair == (REFERENCE[0], naive.FAST))
+
+
+def points(
+    study: Study, planned: Plan, cases: Path, states: Mapping[str, Mapping[str, Any]]
+) -> pd.DataFrame:
+    """A row for each scene and pair: its cost and its thresholds; of the runs that are done."""
+    return pd.DataFrame(
+        _point(key, planned, cases, states)
+        for key in keys(study)
+        if all(run.name in states for run in planned.piles[key.text].runs)
+    )
+
+
+def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[str, Any]]) -> Row:
+    pile = planned.piles[key.text]
+    started = time.process_time()
+    motion = pile.motion(cases)
+    own = time.process_time() - started if pile.scene.protocol.method != "dem" else 0.0
+    speed = pile.face(cases).speed
+    row: Row = {
+        "scene_id": key.scene.id,
+        "scene": label(key.scene),
+        **point(key.scene),
+        "packing": pile.bed.packing,
+        "asked": key.scene.protocol.method,
+        **{f"like_{part}": rungs.likeness(part, key.scene) for part in rungs.LADDER},
+        "count": motion.count,
+        "flow_rung": key.pair[0],
+        "grain_rung": key.pair[1],
+        "same_model": rungs.rung("flow", key.pair[0]).same_model,
+        "flow_s": sum(states[run.name]["cpu_s"] for run in pile.needs),
+        "grains_s": own + sum(states[r.name]["cpu_s"] for r in pile.runs if r is pile),
+    }
+    for fraction in key.scene.protocol.fractions:
+        found = of_pile(motion, speed, fraction, key.scene.fluid.density)
+        row[f"tau_{fraction:g}"] = found.tau
+        row[f"half_{fraction:g}"] = (found.tau_high - found.tau_low) / 2 / found.tau
+    for fraction in CURVE:
+        found = of_pile(motion, speed, float(fraction), key.scene.fluid.density)
+        row[f"curve_{fraction:.2f}"] = found.tau
+    return row
+
+
+def label(scene: Scene) -> str:
+    """A scene in a few words."""
+    assert isinstance(scene.bed, PileBed)
+    words = [f"{scene.bed.slope_deg:g}°", f"d = {1e3 * scene.grain.diameter:g} mm", scene.closure]
+    if scene.bed.packing == "disordered":
+        words.append(f"gaps {scene.bed.disorder:g} d")
+    return ", ".join(words)

@@ -1,0 +1,143 @@
+"""What the pages of the experiments say around their figures and tables."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import pandas as pd
+from matplotlib import rc_context
+
+from orchestrator import limits, rungs
+from orchestrator.experiments.maps import Map
+from orchestrator.experiments.stability import WRONG
+from orchestrator.report import experiment, ladder, maps, style
+from orchestrator.report.experiment import Section
+from orchestrator.report.figure import Figure
+
+CHART = "speed-against-accuracy"
+ERROR_COLUMNS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
+
+
+def of_ladder(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
+    """The page of the ladder: points, rungs and naive routes."""
+    with rc_context(style.RC):
+        return list(_ladder(tables["points"], tables["rungs"], tables["naive"]))
+
+
+def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> Iterator[Section]:
+    by_dem = points[points["asked"] == "dem"]
+    yield Section(
+        "Speed against accuracy",
+        "Every scene is answered on many pairs of rungs, one for the flow and one for the grains. "
+        "The error is that of tau_c at 10, 30, 50 and 70 % of the grains, against the dearest pair "
+        "with the same model choices; the cost is processor time, of the flow's solve and of the "
+        "grains' run together. No pair on the step line is beaten in both by another.\n\n"
+        "The band is how far the reference itself moved when all of its numbers were changed: "
+        "stiffness, time step, number of layers. A point within it is as good as the reference.",
+        (
+            Figure(CHART, "Cost against error", _CAPTION, (), ladder.against_cost(by_dem)),
+            Figure(
+                "error-at-fractions",
+                "The error at each fraction",
+                "The same errors at each fraction, and over the whole curve (its mean size at 5 to "
+                "85 %).",
+                (),
+                ladder.by_fraction(by_dem),
+            ),
+        ),
+        (experiment.sheet(_means(by_dem)),),
+    )
+    yield Section(
+        "What is gained over the naive route",
+        "One explicit run of the whole pile for each Re*, at K d/W = 1e4 and at the paper's "
+        "K = 1e6 N/m with the time step that it forces. The time of a hold is measured on a small "
+        "pile; the pile of the figure has more grains, in proportion to which it is extrapolated, "
+        "and needs as many runs as the fast rung has holds.",
+        (Figure("gains", "Factors gained", "", (), ladder.gains(routes)),),
+        (experiment.sheet(routes),),
+    )
+    yield Section(
+        "The rungs, and what is known of them",
+        "The largest error over the scenes of a kind, the reference's own uncertainty included. "
+        "From this table `study --tolerance` chooses.",
+        tables=(experiment.sheet(_meanings()), experiment.sheet(_wide(known))),
+        limits=(
+            "An error is known for the kinds of scenes that were run, no others; it is that of the "
+            "method, not of the model: first cell, turbulence model and the way to read the stress "
+            "move the answer by more.",
+        ),
+    )
+
+
+_CAPTION = (
+    "A panel for each packing; the largest error over the four fractions and over the scenes. "
+    "Hollow points have another turbulence model: their distance is the spread of the models."
+)
+
+
+def _means(points: pd.DataFrame) -> pd.DataFrame:
+    """The largest errors in %, and the mean cost, of each pair and packing."""
+    keys = ["packing", "flow_rung", "grain_rung"]
+    groups = points.groupby(keys, sort=False)
+    errors = groups[list(ERROR_COLUMNS)].agg(_worst)
+    table = groups["cost_core_s"].mean().to_frame("core-s").join(errors).reset_index()
+    heads = {name: f"{name.removeprefix('error_')} %" for name in ERROR_COLUMNS}
+    heads = {**heads, "error_curve": "curve, %", "flow_rung": "flow", "grain_rung": "grains"}
+    return table.rename(columns=heads).sort_values(["packing", "core-s"])
+
+
+def _worst(values: pd.Series) -> float:
+    """In %; NaN where a fraction was not reached in one of the scenes."""
+    return 100 * float(values.abs().max(skipna=False))
+
+
+def _meanings() -> pd.DataFrame:
+    rows = [
+        {"part": part, "rung": one.name, "what it is": one.meaning}
+        for part, listed in rungs.LADDER.items()
+        for one in listed
+    ]
+    return pd.DataFrame(rows)
+
+
+def _wide(known: pd.DataFrame) -> pd.DataFrame:
+    """A row for each rung and kind of scene, a column for each fraction, %."""
+    order = {one.name: place for place, one in enumerate((*rungs.FLOW, *rungs.GRAINS))}
+    index = ["part", "like", "rung", "scenes", "cost_core_s"]
+    table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
+    table.columns = pd.Index([f"{fraction:.0%}" for fraction in table.columns])
+    table = table.reset_index()
+    table = table.assign(place=table["rung"].map(order)).sort_values(["part", "like", "place"])
+    heads = {"like": "kind of scene", "cost_core_s": "core-s"}
+    return table.drop(columns="place").rename(columns=heads)
+
+
+def of_stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> list[Section]:
+    """The page of the maps: the sheet of all, then each by itself."""
+    shown = {
+        one.name: maps.Map(
+            judged[one.name],
+            one.title,
+            one.x.label,
+            one.y.label,
+            one.question,
+            " ".join(limit.says for limit in limits.of_map(one.name)),
+        )
+        for one in drawn
+    }
+    with rc_context(style.RC):
+        first = Section(
+            "All maps",
+            "Each cell is a real run. It is good where tau_c is within "
+            f"{WRONG:.0%} of its reference at every fraction; wrong where it is not and nothing "
+            "said so; noisy, exploded or stalled where the run itself said so (a marked corner).",
+            (Figure("maps", "Where each method fails", "", (), maps.sheet(list(shown.values()))),),
+        )
+        rest = [
+            Section(
+                one.title,
+                one.question,
+                (Figure(f"map-{one.name}", one.title, "", (), maps.draw(shown[one.name])),),
+                limits=tuple(limit.says for limit in limits.of_map(one.name)),
+            )
+            for one in drawn
+        ]
+    return [first, *rest]

@@ -1,0 +1,125 @@
+"""What the ladder's points say: errors against the dearest rungs, the front, what is known."""
+
+import math
+from collections.abc import Hashable, Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from orchestrator.experiments.ladder import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.report.results import split
+from orchestrator.rungs import Part
+
+Row = dict[str, Any]
+TAU, CURVE = "tau_", "curve_"
+"""Beginnings of the columns of thresholds: at the asked fractions, and along the curve."""
+
+
+def errors(found: pd.DataFrame) -> pd.DataFrame:
+    """The points with their relative errors against the dearest pair that their scene has.
+
+    For scenes without DEM that is the dearest flow, by peeling. `reference_error` is how far the
+    reference itself moved when all of its numbers were changed.
+    """
+    parts = [_against(own) for _, own in found.groupby("scene_id", sort=False)]
+    return pd.concat(parts, ignore_index=True) if parts else found
+
+
+def _columns(table: pd.DataFrame, start: str) -> list[str]:
+    return [str(name) for name in table.columns if str(name).startswith(start)]
+
+
+def _against(own: pd.DataFrame) -> pd.DataFrame:
+    pairs = list(zip(own["flow_rung"], own["grain_rung"], strict=True))
+    by_pair = dict(zip(pairs, own.index, strict=True))
+    by_dem = REFERENCE in by_pair
+    dearest, again = (REFERENCE, AGAIN) if by_dem else ((REFERENCE[0], BESIDE), FINER)
+    if dearest not in by_pair:
+        return own.iloc[:0]
+    taus, curve = _columns(own, TAU), _columns(own, CURVE)
+    relative = own[[*taus, *curve]].astype(float)
+    relative = relative / relative.loc[by_pair[dearest]] - 1
+    unsure = relative.loc[by_pair[again], taus].abs().max() if again in by_pair else math.nan
+    named = {f"error_{round(100 * float(name[len(TAU) :]))}": relative[name] for name in taus}
+    return own.assign(
+        **named,
+        error_curve=relative[curve].abs().mean(axis=1),
+        cost_core_s=own["flow_s"] + own["grains_s"],
+        reference_error=unsure,
+    )
+
+
+def with_front(table: pd.DataFrame) -> pd.DataFrame:
+    """Mark the pairs that no other of their packing beats in both cost and error.
+
+    A pair counts with its largest cost and its largest error over the scenes.
+    """
+    worst = table.filter(regex=r"^error_\d+$").abs().max(axis=1, skipna=False)
+    rows = table.assign(worst=worst)[table["same_model"] & (table["asked"] == "dem")]
+    front: set[tuple[Hashable, ...]] = set()
+    for (packing,), own in split(rows, "packing"):
+        most = own.groupby(["flow_rung", "grain_rung"])[["cost_core_s", "worst"]].agg(_largest)
+        names = most[_undominated(most.to_numpy(float))].index
+        front |= {(packing, *name) for name in names}
+    columns = (table[name] for name in ("packing", "flow_rung", "grain_rung"))
+    return table.assign(pareto=[key in front for key in zip(*columns, strict=True)])
+
+
+def _largest(values: pd.Series) -> float:
+    """With a NaN among them it is NaN: a fraction was not reached."""
+    return float(values.max(skipna=False))
+
+
+def _undominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.array(
+        [
+            np.isfinite(one).all()
+            and not any((other <= one).all() and (other < one).any() for other in values)
+            for one in values
+        ],
+        dtype=bool,
+    )
+
+
+def known(found: pd.DataFrame) -> pd.DataFrame:
+    """What is known of each rung, for each kind of scene and fraction: `rungs.known` reads it.
+
+    The error is the largest over the scenes, the reference's own uncertainty included; it is
+    infinite where one of the two did not reach the fraction.
+    """
+    grains = found[(found["flow_rung"] == REFERENCE[0]) & (found["asked"] == "dem")]
+    flow = found[(found["grain_rung"] == BESIDE) & found["same_model"]]
+    rows = [
+        *_known("grains", "grain_rung", grains, REFERENCE[1], AGAIN[1]),
+        *_known("flow", "flow_rung", flow, REFERENCE[0], FINER[0]),
+    ]
+    return pd.DataFrame(rows).sort_values(["part", "rung", "like", "fraction"])
+
+
+def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
+    for like, alike in table.groupby(f"like_{part}", sort=True):
+        by_rung = {rung: rows.set_index("scene_id") for rung, rows in alike.groupby(name)}
+        for rung, rows in by_rung.items():
+            for column in _columns(table, TAU):
+                unsure = _shift(by_rung.get(again), by_rung[dearest], column)
+                yield {
+                    "part": part,
+                    "rung": rung,
+                    "like": like,
+                    "fraction": float(column[len(TAU) :]),
+                    "error": _shift(rows, by_rung[dearest], column) + unsure,
+                    "cost_core_s": float(rows[f"{part}_s"].mean()),
+                    "scenes": len(rows),
+                }
+
+
+def _shift(own: pd.DataFrame | None, reference: pd.DataFrame, column: str) -> float:
+    """The largest relative difference over the scenes that both have."""
+    if own is None:
+        return 0.0
+    value, base = own[column], reference[column].reindex(own.index)
+    # where neither reaches the fraction they agree; where one does, they could not differ more
+    apart = (value / base - 1).abs().fillna(math.inf).where(value.notna() | base.notna(), 0.0)
+    return float(apart.max())

@@ -1,0 +1,101 @@
+"""Run an experiment in a directory of its own, to its tables and its page."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from orchestrator import case as case_states
+from orchestrator import pipeline
+from orchestrator.case import Case
+from orchestrator.experiments import ladder, maps, naive, pages, ranking, stability
+from orchestrator.files import write_durably
+from orchestrator.pipeline import Finished
+from orchestrator.plan import of
+from orchestrator.report import experiment
+from orchestrator.report.experiment import Section
+from orchestrator.study import TIME_LIMIT_S, Study
+from orchestrator.workspace import Workspace
+
+
+def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
+    """Measure what each rung costs and how far it is off, on the piles of a study.
+
+    Raises
+    ------
+    InputError
+        If the study has no pile that is answered by DEM, or the directory cannot be used.
+    SolverError
+        If a solver is missing.
+    """
+    beside = naive.answers(naive.small(study))
+    planned = of({**ladder.answers(study), **beside}, study.name)
+    space = Workspace(out.absolute())
+    with space.held():
+        space.claim("ladder", list(planned.cases))
+        todo = pipeline.missing(planned, space)
+        failures = (
+            pipeline.complete(todo, space, workers=workers, limit_s=study.time_limit_s)
+            if todo
+            else {}
+        )
+        states = planned.done(space.cases)
+        found = ladder.points(study, planned, space.cases, states)
+        tables = {
+            "points": ranking.with_front(ranking.errors(found)),
+            "rungs": ranking.known(found),
+            "naive": naive.costs(
+                {name: planned.piles[name] for name in beside},
+                planned.piles[ladder.fast(study)],
+                space.cases,
+                {name: state["cpu_s"] for name, state in states.items()},
+            ),
+        }
+        _write(tables, space)
+        _page("Speed against accuracy", pages.of_ladder(tables), space)
+    return Finished(space.page, len(todo), failures)
+
+
+def run_stability(out: Path, *, workers: int) -> Finished:
+    """Run every map and say where each method fails.
+
+    Raises
+    ------
+    InputError
+        If the directory cannot be used.
+    SolverError
+        If a solver is missing.
+    """
+    drawn = maps.load_all()
+    planned = stability.plan(drawn)
+    space = Workspace(out.absolute())
+    with space.held():
+        space.claim("stability", list(planned.cases))
+        todo = {
+            name: one
+            for name, one in pipeline.missing(planned, space).items()
+            if not _is_verdict(one, space)
+        }
+        if todo:
+            pipeline.complete(todo, space, workers=workers, limit_s=TIME_LIMIT_S)
+        answers = stability.Answers(planned, space.cases, planned.done(space.cases))
+        judged = {one.name: stability.judge(one, answers) for one in drawn}
+        table = pd.concat(judged.values(), ignore_index=True)
+        _write({"maps": table}, space)
+        _page("Where each method fails", pages.of_stability(drawn, judged), space)
+    return Finished(space.page, len(todo), {})
+
+
+def _is_verdict(one: Case, space: Workspace) -> bool:
+    """Whether the case failed in a way that is an answer: it would do so again."""
+    return case_states.ended(space.cases / one.name)[0] in stability.VERDICTS
+
+
+def _write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
+    space.tables.mkdir(exist_ok=True)
+    for name, table in tables.items():
+        write_durably(space.tables / f"{name}.csv", table.to_csv(index=False))
+
+
+def _page(title: str, sections: Sequence[Section], space: Workspace) -> None:
+    experiment.write(title, sections, space.root, case_states.programs(space.cases))

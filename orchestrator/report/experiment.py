@@ -1,0 +1,93 @@
+"""The page of an experiment: what was run, figures, tables, limits; one file like a study’s."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from orchestrator.files import write_durably
+from orchestrator.report import FIGURES, PAGE, facts, page, style
+from orchestrator.report.facts import Sheet
+from orchestrator.report.figure import Figure
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page.
+
+    Attributes
+    ----------
+    title, text : str
+        Its heading and what it says; an empty line parts paragraphs.
+    figures : sequence of Figure
+        With canvases that were made under `style.RC`.
+    tables : sequence of Sheet
+        As `sheet` makes them.
+    limits : sequence of str
+        What a reader must not conclude.
+    """
+
+    title: str
+    text: str = ""
+    figures: Sequence[Figure] = field(default_factory=tuple)
+    tables: Sequence[Sheet] = field(default_factory=tuple)
+    limits: Sequence[str] = field(default_factory=tuple)
+
+
+def write(title: str, sections: Sequence[Section], root: Path, solvers: Mapping[str, str]) -> Path:
+    """Write the page of an experiment, and its figures beside it.
+
+    Parameters
+    ----------
+    title : str
+        Of the page.
+    sections : sequence of Section
+        Its parts, in their order.
+    root : Path
+        The directory that gets the page and ``figures``.
+    solvers : mapping of str to str
+        The programs that ran, with their versions.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    folder = root / FIGURES
+    folder.mkdir(parents=True, exist_ok=True)
+    html = page.fill(
+        "experiment.html.j2",
+        title=title,
+        sections=[_drawn(section, folder) for section in sections],
+        programs=facts.versions(solvers),
+        links={},
+    )
+    write_durably(root / PAGE, html)
+    return root / PAGE
+
+
+def _drawn(section: Section, folder: Path) -> dict[str, Any]:
+    """A section as the template needs it, its figures as entries with images."""
+    images = [
+        page.entry(figure, style.save(figure.canvas, folder, figure.name))
+        for figure in section.figures
+        if figure.canvas
+    ]
+    names = ("title", "text", "tables", "limits")
+    return {**{name: getattr(section, name) for name in names}, "figures": images}
+
+
+def sheet(table: pd.DataFrame) -> Sheet:
+    """A table for the page: numbers to four digits, a dash where nothing is known."""
+    rows = (tuple(_cell(value) for value in row) for row in table.itertuples(index=False))
+    return Sheet(tuple(str(column) for column in table), tuple(rows))
+
+
+def _cell(value: Any) -> str:
+    if pd.isna(value):
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

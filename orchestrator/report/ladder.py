@@ -1,0 +1,311 @@
+"""What a study's speed costs in accuracy: rungs of cheaper models against the dearest one."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from orchestrator.report import labels, style, tags
+from orchestrator.report.results import split
+from orchestrator.report.style import Look
+from orchestrator.report.tags import Tag
+
+ERRORS = ("error_10", "error_30", "error_50", "error_70")
+HEADS = {
+    **{name: labels.written("fraction", int(name[-2:]) / 100) for name in ERRORS},
+    "error_curve": "whole curve",
+}
+"""Columns of errors and the heads of their panels."""
+FLOOR = 1e-4
+"""Errors below it are drawn on it."""
+TOLERANCES = (0.05, 0.2)
+HIGH, LOW, MISSING = "^", "v", "X"
+"""Markers: the threshold is too high, too low; a fraction was not reached."""
+REFERENCE: Look = {"color": "0.88", "lw": 0}
+MEASURED: Look = {"fc": "#0072b2", "ec": "#0072b2", "lw": 0.8}
+EXTRAPOLATED: Look = {"fc": "white", "ec": "#0072b2", "lw": 0.8, "hatch": "////"}
+FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
+RUNG = ["flow_rung", "grain_rung"]
+UNITS = {"years": 3.156e7, "days": 86400.0, "h": 3600.0, "min": 60.0}
+NOTHING = "no rung has been run"
+
+
+def against_cost(rungs: pd.DataFrame) -> Canvas:
+    """The largest error over the fractions against the cost, a panel for each packing.
+
+    Parameters
+    ----------
+    rungs : DataFrame
+        A row for each rung and scene: scene, packing, flow_rung, grain_rung; cost_core_s, s of
+        one core; error_10 … error_70 and error_curve, relative and signed, of the threshold
+        stress at a fraction and of the whole curve, NaN where it is not reached;
+        reference_error, how well the reference itself is known; same_model, whether the
+        turbulence model is the reference's; pareto, whether no other rung is both cheaper and
+        better.
+    """
+    table = _marked(rungs)
+    parts = [_worst(part) for _, part in split(table, "packing")]
+    figure = style.canvas(2.6 * len(parts) + 1.0)
+    axes = list(figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0])
+    for ax, part in zip(axes, parts, strict=False):
+        _points(ax, part)
+        _front(ax, part)
+        ax.set_title(_title(part), loc="left")
+        _left_out(ax, part)
+    for ax in axes:
+        ax.set_ylabel("largest error of $τ_c$, %")
+    axes[-1].set_xlabel("cost, s of one core")
+    _scales(axes, axes, parts)
+    front = [Line2D([], [], label="no rung is cheaper and better", **FRONT)]
+    looks = [*_look_entries(parts), *(front if table["pareto"].any() else [])]
+    style.legends(figure, _flow_entries(table), looks)
+    figure.draw_without_rendering()  # tags are written into a finished layout
+    for ax, part in zip(axes, parts, strict=False):
+        _write_tags(ax, part, 6.0, named=True)
+    return figure
+
+
+def by_fraction(rungs: pd.DataFrame) -> Canvas:
+    """The error at each fraction and of the whole curve against the cost; rungs are numbered.
+
+    The columns are those of `against_cost`; a row of panels for each packing.
+    """
+    table = _marked(rungs)
+    packings = [part for _, part in split(table, "packing")]
+    figure = style.canvas(1.7 * len(packings) + 0.06 * table["number"].nunique() + 1.3)
+    grid = figure.subplots(
+        max(len(packings), 1), len(HEADS), sharex=True, sharey=True, squeeze=False
+    )
+    parts = [_one(part, column) for part in packings for column in HEADS]
+    for ax, part in zip(grid.ravel(), parts, strict=False):
+        _points(ax, part)
+    for ax, part in zip(grid[:, 0], packings, strict=False):
+        ax.set_ylabel(f"{part['packing'].iloc[0]}\nerror of $τ_c$, %")
+    for ax, head in zip(grid[0], HEADS.values(), strict=True):
+        ax.set_title(head)
+    grid[-1, 2].set_xlabel("cost, s of one core")
+    _scales(list(grid.ravel()), list(grid[:, -1]), parts)
+    style.legends(figure, _flow_entries(table), [*_key(table), *_look_entries(parts)])
+    figure.draw_without_rendering()
+    for ax, part in zip(grid.ravel(), parts, strict=False):
+        _write_tags(ax, part, 5.5, named=False)
+    return figure
+
+
+def gains(routes: pd.DataFrame) -> Canvas:
+    """How many times cheaper each route is than the naive one.
+
+    Parameters
+    ----------
+    routes : DataFrame
+        route, core_s, extrapolated; the first row is the naive route. A NaN was not measured.
+    """
+    figure = style.canvas(0.34 * max(len(routes), 1) + 0.75)
+    ax = figure.subplots()
+    if routes.empty:
+        _empty(ax)
+        return figure
+    factor = float(routes["core_s"].iloc[0]) / routes["core_s"].to_numpy(float)
+    ax.set(xscale="log", xlabel="times cheaper than the naive route")
+    for y, (row, gain) in enumerate(zip(_each(routes), factor, strict=True)):
+        _bar(ax, y, float(gain), float(row.core_s), bool(row.extrapolated))
+    ax.set_yticks(range(len(routes)), routes["route"])
+    ax.invert_yaxis()
+    known = factor[np.isfinite(factor)]
+    # the texts beyond the bars need a third of the width
+    ax.set_xlim(min(0.8, *known), max(10.0, *known) ** 1.5)
+    ax.spines[["top", "right"]].set_visible(False)
+    if routes["extrapolated"].any():
+        style.legends(figure, [], [Patch(label="extrapolated, not run", **EXTRAPOLATED)])
+    return figure
+
+
+def _bar(ax: Axes, y: int, gain: float, cost: float, extrapolated: bool) -> None:
+    if not np.isfinite(gain):
+        ax.text(1, y, " not measured", va="center", **style.NOTE)
+        return
+    look = EXTRAPOLATED if extrapolated else MEASURED
+    ax.barh(y, gain - 1, left=1, height=0.62, gid="gain", **look)
+    ax.axvline(1, color="0.3", lw=0.6)
+    text = f" {_rounded(gain)} × ({duration(cost)})"
+    ax.text(max(gain, 1), y, text, va="center", fontsize=7, gid="gain's text")
+
+
+def duration(seconds: float) -> str:
+    """A time of one core, in the unit that suits it."""
+    for unit, size in UNITS.items():
+        if seconds >= 1.5 * size:
+            return f"{_rounded(seconds / size)} {unit}"
+    return f"{_rounded(seconds)} s"
+
+
+def _rounded(value: float) -> str:
+    """A number to two digits, such as 0.35, 12 or 46 000."""
+    return f"{float(f'{value:.2g}'):,.0f}".replace(",", " ") if value >= 10 else f"{value:.2g}"
+
+
+def _marked(rungs: pd.DataFrame) -> pd.DataFrame:
+    """With a number, a name and a colour for each rung, in the order in which they come."""
+    flows = list(dict.fromkeys(rungs["flow_rung"]))
+    colours = dict(zip(flows, style.palette("d_m", range(len(flows))).values(), strict=True))
+    parts = [column for column in RUNG if rungs[column].nunique() > 1] or RUNG[-1:]
+    return rungs.assign(
+        number=rungs.groupby(RUNG, sort=False).ngroup() + 1,
+        name=rungs[parts].astype(str).agg(", ".join, axis=1) if len(rungs) else "",
+        colour=rungs["flow_rung"].map(colours),
+    )
+
+
+def _worst(rows: pd.DataFrame) -> pd.DataFrame:
+    """With the error that is largest in size; whether no other scene has a larger one."""
+    errors = rows[list(ERRORS)].to_numpy(float)
+    known = np.isfinite(errors)
+    largest = np.abs(np.where(known, errors, 0)).argmax(axis=1)
+    error = np.take_along_axis(errors, largest[:, None], axis=1)[:, 0]
+    found = rows.assign(error=error, complete=known.all(axis=1))
+    of_rung = found["error"].abs().groupby(found["number"]).transform("max")
+    return found.assign(worst=found["error"].abs() == of_rung)
+
+
+def _one(rows: pd.DataFrame, column: str) -> pd.DataFrame:
+    """With one of the errors as the one to be drawn."""
+    found = rows.assign(error=rows[column], complete=True)
+    of_rung = found["error"].abs().groupby(found["number"]).transform("max")
+    return found.assign(worst=found["error"].abs() == of_rung)
+
+
+def _shown(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows that have a place in a panel: x, and y on the floor at least."""
+    known = rows[(rows["cost_core_s"] > 0) & rows["error"].notna()]
+    sign = np.where(known["error"] < 0, LOW, HIGH)
+    return known.assign(
+        x=known["cost_core_s"],
+        y=known["error"].abs().clip(lower=FLOOR),
+        marker=np.where(known["complete"], sign, MISSING),
+    )
+
+
+def _points(ax: Axes, rows: pd.DataFrame) -> None:
+    shown = _shown(rows)
+    for _, own in split(shown, "number"):
+        ax.plot(own["x"], own["y"], color="0.75", lw=0.6, zorder=1, gid="rung")
+    for (colour, marker, same, worst), own in split(
+        shown, "colour", "marker", "same_model", "worst"
+    ):
+        look: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
+        alpha = 1.0 if worst else 0.45
+        ax.plot(
+            own["x"], own["y"], ls="", ms=5, mew=0.9, alpha=alpha, zorder=3, gid="point", **look
+        )
+    reference = float(rows["reference_error"].max())
+    if reference > FLOOR:
+        ax.axhspan(0, reference, zorder=0, gid="reference", **REFERENCE)
+
+
+def _front(ax: Axes, rows: pd.DataFrame) -> None:
+    shown = _shown(rows)
+    for _, own in split(shown[shown["pareto"].astype(bool)], "scene"):
+        front = own.sort_values("x")
+        ax.step(front["x"], front["y"], where="post", **FRONT)
+
+
+def _title(rows: pd.DataFrame) -> str:
+    scenes = list(dict.fromkeys(rows["scene"]))
+    return f"{rows['packing'].iloc[0]} packing: {'; '.join(scenes)}"
+
+
+def _left_out(ax: Axes, rows: pd.DataFrame) -> None:
+    """Say which rungs have no place in a panel, and why."""
+    texts = []
+    for why, which in (
+        ("cost not measured", rows["cost_core_s"].isna()),
+        ("no fraction reached", rows["error"].isna()),
+    ):
+        if which.any():
+            texts.append(f"{why}: {'; '.join(dict.fromkeys(rows['name'][which]))}")
+    ax.text(1, 1.02, "\n".join(texts), ha="right", transform=ax.transAxes, **style.NOTE)
+
+
+def _scales(axes: Sequence[Axes], last: Sequence[Axes], parts: Sequence[pd.DataFrame]) -> None:
+    """Logarithmic, and the lines of tolerance, named at the right of some panels."""
+    shown = pd.concat([_shown(part) for part in parts]) if parts else pd.DataFrame()
+    if shown.empty:
+        for ax in axes:
+            _empty(ax)
+        return
+    x, y = shown["x"], shown["y"]
+    for ax in axes:
+        ax.set(xscale="log", yscale="log", xlim=(x.min() / 1.8, x.max() * 1.8))
+        ax.set_ylim(FLOOR / 1.5, max(1.0, 2 * y.max()))
+        ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g}")
+        style.plain_ticks(ax.xaxis)
+        for tolerance in TOLERANCES:
+            ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1, gid="tolerance")
+    for ax in last:
+        for tolerance in TOLERANCES:
+            place = ax.get_yaxis_transform()
+            text = f" {tolerance:.0%}"
+            ax.text(1, tolerance, text, va="center", transform=place, **style.NOTE)
+
+
+def _each(table: pd.DataFrame) -> Iterator[Any]:
+    """Rows with their columns as attributes."""
+    yield from table.itertuples(index=False)
+
+
+def _empty(ax: Axes) -> None:
+    ax.text(0.5, 0.5, NOTHING, ha="center", va="center", transform=ax.transAxes, **style.NOTE)
+    ax.set(xticks=[], yticks=[])
+
+
+def _write_tags(ax: Axes, rows: pd.DataFrame, size: float, *, named: bool) -> None:
+    shown = _shown(rows)
+    worst = shown[shown["worst"]].drop_duplicates("number").sort_values("x")
+    written = [
+        Tag(f"{row.number}: {row.name}" if named else str(row.number), row.x, row.y, row.colour)
+        for row in _each(worst)
+    ]
+    tags.write(ax, written, shown[["x", "y"]].to_numpy(float), size)
+
+
+def _flow_entries(table: pd.DataFrame) -> list[Artist]:
+    first = table.drop_duplicates("flow_rung")
+    return [style.entry(row.flow_rung, row.colour) for row in _each(first)]
+
+
+def _key(table: pd.DataFrame) -> list[Artist]:
+    first = table.drop_duplicates("number")
+    return [
+        Line2D([], [], ls="", marker=f"${row.number}$", color=row.colour, ms=5, label=row.name)
+        for row in _each(first)
+    ]
+
+
+def _look_entries(parts: Sequence[pd.DataFrame]) -> list[Artist]:
+    """What markers and lines mean, of those that are there."""
+    if not parts:
+        return []
+    rows = _shown(pd.concat(parts))
+    marks = {
+        HIGH: "threshold too high",
+        LOW: "threshold too low",
+        MISSING: "not all fractions reached",
+    }
+    shared: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
+    entries: list[Artist] = [
+        Line2D([], [], marker=marker, mfc="0.2", label=label, **shared)
+        for marker, label in marks.items()
+        if (rows["marker"] == marker).any()
+    ]
+    if not rows["same_model"].all():
+        label = "hollow: another turbulence model"
+        entries.append(Line2D([], [], marker=HIGH, mfc="white", label=label, **shared))
+    if (rows["reference_error"] > FLOOR).any():
+        entries.append(Patch(label="error of the reference itself", **REFERENCE))
+    return entries

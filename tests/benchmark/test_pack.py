@@ -1,0 +1,115 @@
+"""A pack says all that a solver needs, and is refused when it is not what was exported."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from orchestrator.benchmark import pack
+from orchestrator.benchmark.export import export
+from orchestrator.benchmark.problem import EXPECTED
+from orchestrator.errors import InputError
+from tests.conftest import Command
+
+
+def test_levels_of_a_study(all_levels: Path) -> None:
+    found = pack.read(all_levels)
+    levels = [told["level"] for told in found.scenes.values()]
+    assert sorted(set(levels)) == [1, 2, 3, 4, 5]
+    assert list(found.expected.columns) == ["scene", *EXPECTED]
+    assert set(found.expected["scene"]) == set(found.scenes)
+    judged = found.expected[found.expected["tolerance"].notna()]
+    # our own answer is within what is expected of others
+    known = judged[judged["ours"].notna()]
+    margin = (known["tolerance"] + 1e-8) * known["value"].abs()
+    assert (known["ours"] >= known["low"] - margin).all()
+    assert (known["ours"] <= known["high"] + margin).all()
+
+
+def test_a_scene_is_flat_and_asks_what_is_expected(all_levels: Path) -> None:
+    found = pack.read(all_levels)
+    for name in found.scenes:
+        told = json.loads((found.directory(name) / "scene.json").read_text())
+        assert {"schema", "scene", "level", "kind"} <= told.keys()
+        assert all(isinstance(value, int | float | str) for value in told.values())
+        asked = pd.read_csv(found.directory(name) / "ask.csv", dtype=str).fillna("")
+        expected = found.expected[found.expected["scene"] == name]
+        assert asked["quantity"].tolist() == expected["quantity"].tolist()
+        assert asked["at"].tolist() == expected["at"].tolist()
+
+
+def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path, finished: Path) -> None:
+    found = pack.read(all_levels)
+    name = next(name for name in found.scenes if name.startswith("4-"))
+    told = found.scenes[name]
+    grains = pd.read_csv(found.directory(name) / "grains.csv")
+    (case,) = (finished / "cases").glob("pile-*")
+    rows = (case / "grains.data").read_text().partition("Atoms\n\n")[2].split("\n")
+    deck = pd.DataFrame([row.split() for row in rows if row]).astype(float)
+    kinds = grains["kind"].map({"fixed": 1, "mobile": 2, "counted": 3, "pushed": 4})
+    assert kinds.tolist() == deck[1].tolist()
+    for column, name in ((4, "x_m"), (6, "z_m")):
+        # in parts of the diameter: nine digits of the longest coordinate
+        assert (grains[name] - deck[column]).abs().max() < 1e-6 * told["d_m"]
+    assert (grains["kind"] == "counted").sum() == told["count"]
+    forced = grains["kind"].isin(["counted", "pushed"])
+    assert grains.loc[forced, ["slope_deg", "ustar_over_ustar0"]].notna().all(axis=None)
+
+
+def test_derived_parameters_agree(all_levels: Path) -> None:
+    for told in pack.read(all_levels).scenes.values():
+        if told["kind"] == "flow":
+            continue
+        weight = told["mass_kg"] * told["reduced_gravity_m_s2"]
+        assert told["weight_n"] == pytest.approx(weight, rel=1e-12)
+        assert told["spring_n_m"] == pytest.approx(told["stiffness"] * weight / told["d_m"])
+        unit = math.sqrt(told["d_m"] / told["reduced_gravity_m_s2"])
+        assert told["time_unit_s"] == pytest.approx(unit)
+
+
+@pytest.mark.parametrize("harm", ["changed", "removed", "added"])
+def test_a_pack_that_was_touched_is_refused(formulas: Path, tmp_path: Path, harm: str) -> None:
+    root = tmp_path / "pack"
+    shutil.copytree(formulas, root)
+    victim = root / "scenes" / "2-incline-20" / "scene.json"
+    if harm == "changed":
+        victim.write_text(victim.read_text().replace("20.0", "21.0"))
+    elif harm == "removed":
+        victim.unlink()
+    else:
+        victim.with_name("more.csv").write_text("1\n")
+    with pytest.raises(InputError, match=r"scenes/2-incline-20/.*the pack is not used"):
+        pack.read(root)
+
+
+def test_a_pack_of_another_schema_is_refused(formulas: Path, tmp_path: Path) -> None:
+    manifest = json.loads((formulas / pack.MANIFEST).read_text())
+    (tmp_path / pack.MANIFEST).write_text(json.dumps({**manifest, "schema": 0}))
+    with pytest.raises(InputError, match="schema"):
+        pack.read(tmp_path)
+
+
+def test_export_twice_gives_the_same_pack(formulas: Path, tmp_path: Path) -> None:
+    export(tmp_path / "again", None, ())
+    export(tmp_path / "again", None, ())
+    assert (tmp_path / "again" / pack.MANIFEST).read_text() == (
+        formulas / pack.MANIFEST
+    ).read_text()
+
+
+def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("\\end")
+    for arguments, words in (
+        (("new", "--level", "3"), ("--level", "--from")),
+        (("mine",), ("thesis.tex", "name a new one")),
+        (("new", "--from", "mine"), ("no study",)),
+    ):
+        ended = orchestrator("benchmark", "export", *arguments)
+        assert ended.returncode == 2
+        assert "Traceback" not in ended.stderr
+        assert all(word in ended.stderr for word in words), ended.stderr
+    assert (tmp_path / "mine" / "thesis.tex").is_file()

@@ -1,0 +1,226 @@
+"""Solvers as real processes: a right one passes, each wrong one is caught and told by name."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from orchestrator.benchmark import runner
+from orchestrator.benchmark.report import Found
+from orchestrator.benchmark.runner import Choice
+from orchestrator.errors import InputError
+from tests.benchmark.conftest import NATIVE
+from tests.conftest import Command
+
+HEAD = """
+import math, os, sys, time
+from pathlib import Path
+sys.path.insert(0, {native!r})
+import solver
+case, out = map(Path, sys.argv[1:])
+"""
+TAIL = "\nsys.exit(solver.main(case, out))\n"
+AFTER = "\ncode = solver.main(case, out)\ntext = out.read_text()\n"
+"""What follows changes the answer of the right solver."""
+
+
+def _program(folder: Path, body: str) -> str:
+    """A solver that is the example but for something."""
+    path = folder / "my solver.py"
+    path.write_text(HEAD.format(native=str(NATIVE)) + body)
+    return f"'{sys.executable}' '{path}' {{case}} {{out}}"
+
+
+def _run(pack: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
+    return runner.run(
+        pack, _program(folder, body), folder / "results", Choice(patterns=scenes), limit_s
+    )
+
+
+CONTACT = """
+init = solver.Contact.__init__
+def contact(self, scene, mass):
+    init(self, scene, mass)
+    {}
+solver.Contact.__init__ = contact
+"""
+WRONG = {
+    "drag 5 % high": (
+        "forces = solver.forces\n"
+        "solver.forces = lambda scene, u: (1.05 * forces(scene, u)[0], forces(scene, u)[1])" + TAIL,
+        "1-6*",
+        "drag_n .* 3 more are off: [+]5 % at each of 4 places: one factor is wrong|"
+        "drag_n .* are off: [+]5 % at each of 4 places: one factor is wrong",
+    ),
+    "wrong units": (
+        "forces = solver.forces\n"
+        "solver.forces = lambda scene, u: tuple(1e3 * f for f in forces(scene, u))" + TAIL,
+        "1-6*",
+        r"10\^3 times too large: another unit",
+    ),
+    "friction left out": (
+        CONTACT.format("self.friction = 0.0") + TAIL,
+        "2-incline-20",
+        "there is no friction",
+    ),
+    "a disc": ("solver.INERTIA = 0.5" + TAIL, "2-incline-45", "the inertia of a disc"),
+    "a disc that slides": (
+        "solver.INERTIA = 0.5" + TAIL,
+        "2-sliding-2",
+        "speed_over_start|spin_over_start .* the inertia of a disc",
+    ),
+    "no damping": (CONTACT.format("self.gamma = 0.0") + TAIL, "2-collision-0.1", "no damping"),
+    "NaN": (
+        "solver.threshold = lambda scene: math.nan" + TAIL,
+        "1-6*",
+        "answer.csv, line 10: ustar_m_s is nan, not finite",
+    ),
+    "a line cut short": (
+        AFTER + "out.write_text(text[: text.rindex(',')])",
+        "1-6*",
+        "cut short: line 12 has 2 of 3 fields",
+    ),
+    "a file cut short": (AFTER + "out.write_text(text[:-3])", "1-6*", "line 12 has no end"),
+    "half a file": (
+        AFTER + "out.write_text(text[: text.index('lift_n')])",
+        "1-6*",
+        "lacks lift_n at .* and 6 more",
+    ),
+    "another name": (
+        AFTER + "out.write_text(text.replace('ustar_m_s', 'ustar_cm_s'))",
+        "1-6*",
+        "lacks ustar_m_s; is ustar_cm_s meant[?]",
+    ),
+    "no head": (AFTER + "out.write_text(text[text.index('drag_n') :])", "1-6*", "begins with"),
+    "no answer": ("sys.exit(0)", "1-6*", "it wrote no answer.csv"),
+    "exit 1": ("sys.exit('the mesh is inverted')", "1-6*", "ended with 1: the mesh is inverted"),
+    "hangs": ("time.sleep(1000)", "1-6*", "did not end within 2 s and was killed"),
+    "changes its case": (
+        "(case / 'scene.json').open('a').write(' ')" + TAIL,
+        "1-6*",
+        "changed the files of its case",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_solver_is_caught_and_named(formulas: Path, tmp_path: Path, name: str) -> None:
+    body, scene, message = WRONG[name]
+    found = _run(formulas, tmp_path, body, scene, limit_s=2.0 if name == "hangs" else 60.0)
+    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+    assert not verdicts["passed"].any()
+    assert verdicts["message"].str.contains(message).all(), verdicts["message"].tolist()
+    assert len(found.failures) == len(verdicts) >= 1
+    assert found.failures[0].split(": ")[0] in found.page.read_text()
+
+
+def test_a_lost_grain_is_caught(all_levels: Path, tmp_path: Path) -> None:
+    body = "pile = solver.pile\n" + (
+        "solver.KINDS['pile'] = lambda scene, case: (lambda ask: lambda quantity, at:"
+        " ask(quantity, at) - (quantity == 'not_moved'))(pile(scene, case))" + TAIL
+    )
+    found = _run(all_levels, tmp_path, body, "4-*")
+    assert len(found.failures) == 1
+    assert "grains are lost" in found.failures[0]
+
+
+def test_a_solver_that_changes_the_pack_stops_the_run(formulas: Path, tmp_path: Path) -> None:
+    root = tmp_path / "pack"
+    shutil.copytree(formulas, root)
+    body = f"Path({str(root / 'expected.csv')!r}).open('a').write('x')" + TAIL
+    with pytest.raises(InputError, match=r"changed expected.csv of the pack.*not used further"):
+        _run(root, tmp_path, body, "2-incline-*")
+    with pytest.raises(InputError, match=r"expected.csv is not what was exported"):
+        runner.compare(root, tmp_path / "results", Choice())
+
+
+def test_a_solver_that_changes_another_answer_is_named(formulas: Path, tmp_path: Path) -> None:
+    body = (
+        "for other in out.parent.parent.glob('*/answer.csv'):\n"
+        "    other.write_text('quantity,at,value\\n')\n" + TAIL
+    )
+    found = _run(formulas, tmp_path, body, "2-collision-0.1", "2-collision-0.3")
+    (failure,) = found.failures
+    assert failure == (
+        "2-collision-0.3: it changed the answer of 2-collision-0.1, which was put back"
+    )
+
+
+def test_the_example_passes(all_levels: Path, tmp_path: Path) -> None:
+    levels = Choice(levels=(1, 2, 4))
+    found = runner.run(all_levels, _program(tmp_path, TAIL), tmp_path / "results", levels, 60.0)
+    assert found.failures == []
+    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+    assert set(verdicts["level"]) == {1, 2, 4}
+    assert (verdicts["seconds"] > 0).all()
+    assert (verdicts["peak_mib"] > 1).all()
+    assert verdicts.loc[verdicts["level"] > 1, "ratio"].gt(0).all()
+    exact = verdicts[verdicts["level"] == 1]
+    assert (exact["worst"] < 1e-8).all()
+    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
+    assert numbers.loc[numbers["scene"].str.startswith("2-incline"), "ours"].notna().all()
+
+
+def test_ours_answers_as_exported(all_levels: Path, tmp_path: Path) -> None:
+    # a solver that knows no kind: only our own runs answer
+    _run(all_levels, tmp_path, "sys.exit(2)", "[345]-*")
+    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
+    assert set(numbers["scene"].str[0]) == {"3", "4", "5"}
+    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
+
+
+def test_compare_gives_the_same_verdicts(formulas: Path, orchestrator: Command) -> None:
+    command = f"'{sys.executable}' '{NATIVE / 'solver.py'}' {{case}} {{out}}"
+    arguments = (str(formulas), "--scene", "2-incline-[27]0", "--solver", command, "--out", "r")
+    ran = orchestrator("benchmark", "run", *arguments)
+    assert ran.returncode == 0, ran.stderr
+    compared = orchestrator(
+        "benchmark", "compare", str(formulas), "r", "--scene", "2-incline-[27]0"
+    )
+    assert compared.returncode == 0
+    # the last line is the page's path
+    assert compared.stdout.splitlines()[:-1] == ran.stdout.splitlines()[:-1]
+    more = orchestrator("benchmark", "compare", str(formulas), "r", "--scene", "2-incline-*")
+    assert more.returncode == 1
+    assert "2-incline-5: it wrote no answer.csv" in more.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("true {case}", "no {out}"),
+        ("no-such-solver {case} {out}", "no program no-such-solver"),
+        ("'open {case} {out}", "cannot be read"),
+    ],
+)
+def test_a_command_that_cannot_work(
+    formulas: Path, tmp_path: Path, command: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        runner.run(formulas, command, tmp_path / "results", Choice(), 60.0)
+
+
+def test_no_shell_reads_the_command(formulas: Path, tmp_path: Path) -> None:
+    command = _program(tmp_path, TAIL) + "; touch $HOME `touch shell`"
+    runner.run(formulas, command, tmp_path / "results", Choice(patterns=("2-incline-5",)), 60.0)
+    assert not list(tmp_path.rglob("shell"))
+
+
+def test_the_start_in_c(formulas: Path, tmp_path: Path) -> None:
+    compiler = shutil.which("g++")
+    if compiler is None:
+        pytest.skip("there is no g++")
+    program = tmp_path / "solver"
+    source = NATIVE / "solver.cpp"
+    subprocess.run([compiler, "-std=c++17", "-Wall", "-Werror", "-o", program, source], check=True)
+    found = runner.run(
+        formulas,
+        f"{program} {{case}} {{out}}",
+        tmp_path / "results",
+        Choice(levels=(1,), patterns=("1-[0-4]*",)),
+        60.0,
+    )
+    assert found.failures == []

@@ -1,0 +1,162 @@
+"""A small study that faults are injected into, its driver as a process, its undisturbed tables."""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+HEAD = """
+time_limit = 30
+[protocol]
+step = 0.1
+quiet = 3.0
+timestep = 0.3
+until = 0.8
+fractions = [0.3, 0.5]
+[grain]
+stiffness = 1e3
+"""
+CELLS = """
+[[group]]
+name = "cells"
+[group.axes]
+"grain.diameter" = [7e-4, 1e-3]
+"""
+PILE = """
+[[group]]
+name = "pile"
+grain = { diameter = 2e-3 }
+bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30", mobile_layers = 1 }
+flow = { cells_per_face = 10 }
+"""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A directory with one study file, and the tables of its undisturbed run.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the file `small.toml` is, and where the study goes, in `out`.
+    undisturbed : Path
+        The directory of the undisturbed run.
+    """
+
+    folder: Path
+    undisturbed: Path
+
+    @property
+    def out(self) -> Path:
+        """The study's directory."""
+        return self.folder / "out"
+
+    def start(self, *, programs: Path | None = None) -> "subprocess.Popen[str]":
+        """Start the study's driver; `programs` holds programs that stand before the real ones."""
+        paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
+        return subprocess.Popen(
+            [sys.executable, "-m", "orchestrator", "study", "small.toml", "--out", str(self.out)],
+            cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def study(self, *, programs: Path | None = None) -> tuple[int, str]:
+        """Run the study to its end; its exit code and what it said."""
+        return ended(self.start(programs=programs))
+
+    def check_finished(self) -> None:
+        """See that the same command ends well, with the tables of the undisturbed run."""
+        code, said = self.study()
+        assert code == 0, said
+        assert (self.out / "report.html").is_file()
+        assert same_tables(self.out, self.undisturbed)
+        assert not list(self.out.rglob("*.tmp"))
+
+
+def ended(driver: "subprocess.Popen[str]", limit_s: float = 120.0) -> tuple[int, str]:
+    """Wait for a driver; its exit code and all that it said, which holds no traceback."""
+    out, said = driver.communicate(timeout=limit_s)
+    assert "Traceback" not in said
+    return driver.returncode, out + said
+
+
+def same_tables(one: Path, other: Path) -> bool:
+    """Whether two studies have the same tables of results, byte for byte."""
+    names = {path.name for path in (one / "tables").iterdir()}
+    return names == {path.name for path in (other / "tables").iterdir()} and all(
+        (one / "tables" / name).read_bytes() == (other / "tables" / name).read_bytes()
+        for name in names
+    )
+
+
+def wait_for(seen: Callable[[], bool], driver: "subprocess.Popen[str]") -> bool:
+    """Wait until something is seen; False if the driver ends before that."""
+    limit = time.monotonic() + 60.0
+    while not seen():
+        if driver.poll() is not None or time.monotonic() > limit:
+            return False
+        time.sleep(0.001)
+    return True
+
+
+def processes_in(folder: Path) -> dict[int, str]:
+    """Names of the living processes that work below a folder, by their number."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                inside = Path(os.readlink(entry / "cwd")).is_relative_to(folder)
+                alive = (entry / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+                if inside and alive:
+                    found[int(entry.name)] = (entry / "comm").read_text().strip()
+            except OSError:
+                continue
+    return found
+
+
+def none_left_in(folder: Path) -> bool:
+    """Whether every process that works below a folder ends within a moment."""
+    for _ in range(100):
+        if not processes_in(folder):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def kill_program(cases: Path, kind: str, name: str, number: signal.Signals) -> bool:
+    """Send a signal to the program of a name in a case of a kind; whether there was one."""
+    pids = [
+        pid
+        for case in cases.glob(f"{kind}-*")
+        for pid, found in processes_in(case).items()
+        if found == name
+    ]
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
+    return bool(pids)
+
+
+def wrapper(folder: Path, program: str, before: str) -> Path:
+    """A folder with a program that does something first, and then becomes the real one."""
+    folder.mkdir(exist_ok=True)
+    path = folder / program
+    path.write_text(f'#!/bin/sh\n{before}\nexec {shutil.which(program)} "$@"\n')
+    path.chmod(0o755)
+    return folder
+
+
+def case_of(out: Path, kind: str) -> Iterator[Path]:
+    """The directories of the cases of a kind."""
+    return out.glob(f"cases/{kind}-*")

@@ -1,0 +1,159 @@
+"""Drivers, workers and solvers that are killed, at each stage of a study."""
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from orchestrator import retry
+from tests.faults.bench import (
+    Bench,
+    case_of,
+    ended,
+    kill_program,
+    none_left_in,
+    processes_in,
+    same_tables,
+    wait_for,
+    wrapper,
+)
+from tests.faults.ledger import Ledger
+
+Seen = Callable[[Path], bool]
+SINCE = ".started"
+"""A file in the study's parent: what is younger is of the driver that runs."""
+
+
+def _young(out: Path, pattern: str) -> list[Path]:
+    """Files of the driver that runs now, which are not empty."""
+    since = (out.parent / SINCE).stat().st_mtime_ns
+    found = []
+    for path in out.glob(pattern):
+        with contextlib.suppress(FileNotFoundError):
+            state = path.stat()
+            if state.st_mtime_ns > since and state.st_size:
+                found.append(path)
+    return found
+
+
+def _collecting(out: Path) -> bool:
+    logs = _young(out, "cases/pile-*/log.liggghts")
+    return any(b"the protocol has ended" in log.read_bytes() for log in logs)
+
+
+STAGES: dict[str, tuple[Seen, str]] = {
+    "mesh": (lambda out: bool(_young(out, "cases/flow-*/parameters")), "cases/flow-*/case.json"),
+    "flow": (
+        lambda out: bool(_young(out, "cases/flow-*/log.simpleFoam")),
+        "cases/flow-*/done.json",
+    ),
+    "grains": (
+        lambda out: bool(_young(out, "cases/pile-*/log.liggghts")),
+        "cases/pile-*/done.json",
+    ),
+    "collecting": (_collecting, "cases/pile-*/done.json"),
+    "tables": (lambda out: bool(_young(out, "tables/*.csv")), "report.html"),
+    "figures": (lambda out: bool(_young(out, "figures/*")), "report.html"),
+}
+"""For each: how it is seen, and what there is only after its end."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_driver_that_is_ended_at_each_stage_in_turn(
+    pile: Bench, ledger: Ledger, number: signal.Signals
+) -> None:
+    with contextlib.ExitStack() as faults:
+        for stage, (seen, after) in STAGES.items():
+            faults.enter_context(ledger.fault(f"{number.name} to the driver", stage))
+            (pile.folder / SINCE).touch()
+            driver = pile.start()
+            assert wait_for(partial(seen, pile.out), driver), stage
+            driver.send_signal(number)
+            code, said = ended(driver)
+            assert none_left_in(pile.folder), stage
+            if number == signal.SIGKILL:
+                assert code == -number, said
+                # it was ended in this stage and in no later one
+                assert not list(pile.out.glob(after)), stage
+            else:
+                assert code == 130, said
+                assert "the same command continues" in said
+                assert not (pile.out / "report.json").exists(), stage
+        pile.check_finished()
+
+
+SOLVERS = {"gmshToFoam": "mesh", "simpleFoam": "flow", "liggghts": "grains"}
+"""The solvers of a study, by the stage that they belong to; in their order."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_each_solver_that_is_killed_once_is_run_again(
+    pile: Bench, ledger: Ledger, number: signal.Signals
+) -> None:
+    with contextlib.ExitStack() as faults:
+        for program, stage in SOLVERS.items():
+            faults.enter_context(ledger.fault(f"{number.name} to the solver", stage))
+            # the pause makes a program live long enough to be found
+            pause = 'case "$1" in -h*) ;; *) sleep 0.3;; esac'
+            programs = wrapper(pile.folder / "bin", program, pause)
+        driver = pile.start(programs=programs)
+        cases = pile.out / "cases"
+        for program, stage in SOLVERS.items():
+            kind = "pile" if stage == "grains" else "flow"
+            assert wait_for(partial(kill_program, cases, kind, program, number), driver), program
+        code, said = ended(driver)
+        assert code == 0, said
+        assert same_tables(pile.out, pile.undisturbed)
+        pile.check_finished()
+
+
+def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(
+    pile: Bench, ledger: Ledger
+) -> None:
+    before = '[ "$1" = -help ] || { echo >>../../../tries; kill -KILL $$; }'
+    programs = wrapper(pile.folder / "bin", "simpleFoam", before)
+    with ledger.fault("SIGKILL to the solver, each time", "flow"):
+        code, said = pile.study(programs=programs)
+        assert code == 3, said
+        assert len((pile.folder / "tries").read_text().splitlines()) == retry.MOST
+        assert "simpleFoam" in said
+        assert all((one / "done.json").is_file() for one in case_of(pile.out, "cells"))
+        pile.check_finished()
+
+
+def test_a_process_that_draws_is_killed(pile: Bench, ledger: Ledger) -> None:
+    with ledger.fault("SIGKILL to a worker", "figures"):
+        driver = pile.start()
+        assert wait_for(lambda: len(_workers(driver.pid, pile.folder)) > 0, driver)
+        os.kill(_workers(driver.pid, pile.folder)[0], signal.SIGKILL)
+        code, said = ended(driver)
+        assert code == 0, said
+        assert none_left_in(pile.folder)
+        pile.check_finished()
+
+
+def _workers(driver: int, folder: Path) -> list[int]:
+    """The processes of Python that a driver has forked."""
+    names = processes_in(folder)
+    found = []
+    for pid in names:
+        with contextlib.suppress(OSError):
+            parent = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1]
+            if int(parent) == driver and names[pid] == names.get(driver):
+                found.append(pid)
+    return found
+
+
+def test_the_whole_session_gets_the_users_interrupt(pile: Bench, ledger: Ledger) -> None:
+    with ledger.fault("SIGINT to all", "figures"):
+        driver = pile.start()
+        assert wait_for(lambda: any(pile.out.glob("figures/*")), driver)
+        os.killpg(driver.pid, signal.SIGINT)
+        code, said = ended(driver)
+        assert code == 130, said
+        assert none_left_in(pile.folder)
+        pile.check_finished()

@@ -1,0 +1,72 @@
+"""What a scene's table `flow` does to the stress that its grains feel; no solver is run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import plan, study
+from orchestrator.grains.pile import PileCase
+
+TEXT = """
+[grain]
+diameter = 1e-3
+[bed]
+kind = "pile"
+slope_deg = 15.0
+roughness = "d/30"
+[flow]
+"""
+
+
+def piles(flow: str) -> list[PileCase]:
+    return list(plan.make(study.parse(TEXT + flow, name="knobs", where="test")).piles.values())
+
+
+def test_a_theory_needs_no_case(tmp_path: Path) -> None:
+    flat, hill = piles('[axes]\n"flow.model" = ["flat", "hill"]\n')
+    assert flat.needs == hill.needs == ()
+    np.testing.assert_allclose(flat.face(tmp_path).speed, 1)
+    rising = hill.face(tmp_path).speed
+    assert rising[0] < 0.7
+    assert rising[-1] > 1.5
+    assert (np.diff(rising) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("forced", "without"), [("exposed", []), ("all but crest", [-1]), ("all but toe", [0, 1, 2, 3])]
+)
+def test_which_grains_carry_the_flows_force(
+    tmp_path: Path, forced: str, without: list[int]
+) -> None:
+    (pile,) = piles(f'model = "flat"\nforced = "{forced}"\n')
+    face = pile.face(tmp_path)
+    expected = np.ones(len(face.ids))
+    expected[without] = 0
+    np.testing.assert_allclose(face.speed, expected)
+    if without == [-1]:
+        assert face.ids[-1] == 1 + np.argmax(pile.packing.centres[:, 1])
+
+
+def test_a_longer_average_takes_from_the_crest(tmp_path: Path) -> None:
+    short, long = piles('model = "hill"\n[axes]\n"flow.average" = [0.025, 0.5]\n')
+    crest = [pile.face(tmp_path).speed[-1] for pile in (short, long)]
+    assert crest[1] < 0.8 * crest[0]
+
+
+def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
+    axes = '[axes]\n"bed.roughness" = [3.1e-5, 3.3e-5]\n'
+    assert len({pile.flow.name for pile in piles(axes)}) == 2
+    shared = piles("roughness = 3.2e-5\n" + axes)
+    assert len({pile.flow.name for pile in shared}) == 1
+    assert {pile.flow.roughness_m for pile in shared} == {3.2e-5}
+    assert len({pile.name for pile in shared}) == 2
+
+
+def test_the_solvers_knobs_reach_its_case() -> None:
+    (pile,) = piles('turbulence = "kOmegaSST"\nconvection = "upwind"\ncorrectors = 0\n')
+    assert (pile.flow.turbulence, pile.flow.convection, pile.flow.correctors) == (
+        "kOmegaSST",
+        "upwind",
+        0,
+    )

@@ -1,0 +1,97 @@
+"""Peeling: exact where the pivot is, blocked where a neighbour stands in the way."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from orchestrator.grains import peeling
+from orchestrator.grains.deck import POWERS
+
+FloatArray = NDArray[np.float64]
+SQUARE = POWERS.index(2.0)
+MARKER = 0.3
+
+
+def _flows(
+    centres: FloatArray, drag: FloatArray, *, slope_deg: float = 0.0, lift: float = 0.0
+) -> FloatArray:
+    """Forces drag flow**2 along the bed and lift flow**2 normal to it, over W; 0 drag is fixed."""
+    alpha = math.radians(slope_deg)
+    along = np.array([math.cos(alpha), math.sin(alpha)])
+    force = np.zeros((len(POWERS), len(centres), 2))
+    pushed = drag != 0
+    force[SQUARE] = np.outer(drag, along) + np.outer(pushed * lift, [-along[1], along[0]])
+    return peeling.flows(centres, pushed, force, weight=1.0, along=along, marker=MARKER)
+
+
+def _row(count: int, beta_deg: float, slope_deg: float) -> tuple[FloatArray, int]:
+    """Exposed grains in the pockets of a fixed row, along a slope; how many."""
+    alpha, beta = math.radians(slope_deg), math.radians(beta_deg)
+    along = np.array([math.cos(alpha), math.sin(alpha)])
+    outward = np.array([-along[1], along[0]])
+    upper = np.outer(2 * math.cos(beta) * np.arange(count), along)
+    lower = np.outer(math.cos(beta) * (2 * np.arange(count + 1) - 1), along)
+    return np.vstack([upper, lower - math.sin(beta) * outward]), count
+
+
+@given(
+    slope_deg=st.floats(0, 29),
+    beta_deg=st.floats(45, 60),
+    drag=st.floats(0.1, 10),
+    lift=st.floats(0, 3),
+)
+def test_one_grain_leaves_at_the_pivot_of_eq_1(
+    slope_deg: float, beta_deg: float, drag: float, lift: float
+) -> None:
+    centres, _ = _row(1, beta_deg, slope_deg)
+    found = _flows(centres, np.array([drag, 0.0, 0.0]), slope_deg=slope_deg, lift=lift)
+    alpha, beta = math.radians(slope_deg), math.radians(beta_deg)
+    moment = drag * math.sin(beta) + lift * math.cos(beta)
+    assert found[0] == pytest.approx(math.sqrt(math.cos(alpha - beta) / moment), rel=1e-9)
+    assert np.isinf(found[1:]).all()
+
+
+def test_a_row_empties_from_its_end_where_the_stress_is_highest() -> None:
+    centres, count = _row(6, 60, 15)
+    drag = np.append(np.linspace(0.5, 1.5, count), np.zeros(count + 1))
+    found = _flows(centres, drag, slope_deg=15)[:count]
+    alone = np.sqrt(math.cos(math.radians(45)) / (drag[:count] * math.sin(math.radians(60))))
+    np.testing.assert_allclose(found, alone, rtol=1e-9)
+    assert (np.diff(found) < 0).all()
+
+
+def test_a_grain_waits_for_the_one_in_front_that_feels_less() -> None:
+    centres, count = _row(2, 60, 15)
+    drag = np.array([2.0, 1.0, 0, 0, 0])
+    found = _flows(centres, drag, slope_deg=15)[:count]
+    assert found[0] == found[1]
+
+
+def test_a_fixed_neighbour_in_front_has_to_be_climbed() -> None:
+    # a grain between two level neighbours: drag alone never lifts it over, lift does
+    centres = np.array([[0, 0], [1, 0], [-0.5, -math.sqrt(3) / 2], [0.5, -math.sqrt(3) / 2]])
+    drag = np.array([1.0, 0, 0, 0])
+    assert math.isinf(_flows(centres, drag)[0])
+    assert _flows(centres, drag, lift=0.25)[0] == pytest.approx(2.0)
+
+
+def test_a_gap_in_front_makes_the_climb_a_little_easier() -> None:
+    beta = math.radians(60)
+    rest = [[-0.5, -math.sin(beta)], [0.5, -math.sin(beta)]]
+    near, far = (np.array([[0, 0], [1 + gap, 0], *rest]) for gap in (0.01, 0.05))
+    drag = np.array([1.0, 0, 0, 0])
+    flows = [_flows(bed, drag, lift=0.25)[0] for bed in (near, far)]
+    assert 2.0 > flows[0] > flows[1]
+
+
+@given(scale=st.floats(0.1, 10))
+def test_flows_scale_with_the_root_of_the_force(scale: float) -> None:
+    centres, count = _row(4, 60, 20)
+    drag = np.append(np.array([1.0, 0.8, 1.3, 1.1]), np.zeros(count + 1))
+    once = _flows(centres, drag, slope_deg=20, lift=0.2)
+    scaled = _flows(centres, drag * scale**2, slope_deg=20, lift=0.2 * scale**2)
+    np.testing.assert_allclose(scaled[:count] * scale, once[:count], rtol=1e-9)
