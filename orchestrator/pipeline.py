@@ -72,7 +72,9 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         started, failures, states = 0, {}, planned.done(space.cases)
         while todo := _without(planned.cases, states):
             started += len(todo)
-            failures = complete(todo, space, workers=workers, limit_s=study.time_limit_s)
+            failures = complete(
+                todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
+            )
             settled = plan.settled(study, space.cases)
             if failures or settled.cases.keys() == planned.cases.keys():
                 states |= planned.done(space.cases, todo)

@@ -182,7 +182,7 @@ def _idle(slurm: Slurm) -> int:
 
 
 def _until(condition: Callable[[], bool], what: str, root: Path) -> None:
-    for _ in range(600):
+    for _ in range(1800):
         if condition():
             return
         time.sleep(0.1)

@@ -15,7 +15,7 @@ ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--work
 
 
 def _until(condition: Callable[[], object]) -> None:
-    for _ in range(1200):
+    for _ in range(6000):
         if condition():
             return
         time.sleep(0.05)
@@ -41,7 +41,7 @@ def _solvers(cases: Path) -> int:
 
 
 def _end(driver: "subprocess.Popen[str]") -> None:
-    _, said = driver.communicate(timeout=200)
+    _, said = driver.communicate(timeout=400)
     assert driver.returncode == 0, said
     assert "Traceback" not in said, said
 
@@ -87,7 +87,7 @@ def test_a_killed_driver_is_continued(
 
 
 def _refused(driver: "subprocess.Popen[str]", *words: str) -> None:
-    _, said = driver.communicate(timeout=100)
+    _, said = driver.communicate(timeout=300)
     assert driver.returncode not in (0, None)
     assert "Traceback" not in said, said
     lines = [line for line in said.splitlines() if line.startswith("orchestrator")]
