@@ -5,17 +5,20 @@ PYTHON = .venv/bin/python
 ARGS =
 
 .DEFAULT_GOAL = help
-.PHONY: help study test lint setup lock clean
+.PHONY: help study test test-faults lint setup lock clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-7s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' Makefile
 
 study: setup  ## run the study
 	$(PYTHON) -m orchestrator study $(ARGS)
 
 test: lint  ## lint, then run the tests
-	$(PYTHON) -m pytest $(ARGS)
+	$(PYTHON) -m pytest --ignore=tests/faults $(ARGS)
+
+test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
+	$(PYTHON) -m pytest tests/faults $(ARGS)
 
 lint:  ## ruff and mypy
 	@sh tools/setup.sh test
