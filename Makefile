@@ -5,17 +5,28 @@ PYTHON = .venv/bin/python
 ARGS =
 
 .DEFAULT_GOAL = help
-.PHONY: help study test lint setup lock clean
+.PHONY: help study test test-faults known lint setup lock clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-7s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' Makefile
 
 study: setup  ## run the study
 	$(PYTHON) -m orchestrator study $(ARGS)
 
 test: lint  ## lint, then run the tests
-	SKIP_NOTHING=1 $(PYTHON) -m pytest $(ARGS)
+	SKIP_NOTHING=1 $(PYTHON) -m pytest --ignore=tests/faults $(ARGS)
+
+test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
+	$(PYTHON) -m pytest tests/faults $(ARGS)
+
+known: setup  ## measure the ladder and the maps anew, for the package and its docs
+	$(PYTHON) -m orchestrator ladder
+	$(PYTHON) -m orchestrator stability
+	cp results/ladder/tables/rungs.csv results/stability/tables/maps.csv orchestrator/known/
+	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
+	cp results/ladder/figures/gains.png docs/gains.png
+	cp results/stability/figures/maps.png docs/stability.png
 
 lint:  ## ruff and mypy
 	@sh tools/setup.sh test

@@ -7,8 +7,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -48,21 +48,26 @@ class Bench:
         Where the file `small.toml` is, and where the study goes, in `out`.
     undisturbed : Path
         The directory of the undisturbed run.
+    drivers : list of subprocess.Popen
+        All that were started.
     """
 
     folder: Path
     undisturbed: Path
+    drivers: "list[subprocess.Popen[str]]" = field(default_factory=list)
 
     @property
     def out(self) -> Path:
         """The study's directory."""
         return self.folder / "out"
 
-    def start(self, *, programs: Path | None = None) -> "subprocess.Popen[str]":
+    def start(
+        self, *, programs: Path | None = None, python: Sequence[str] = ("-m", "orchestrator")
+    ) -> "subprocess.Popen[str]":
         """Start the study's driver; `programs` holds programs that stand before the real ones."""
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
-        return subprocess.Popen(
-            [sys.executable, "-m", "orchestrator", "study", "small.toml", "--out", str(self.out)],
+        driver = subprocess.Popen(
+            [sys.executable, *python, "study", "small.toml", "--out", str(self.out)],
             cwd=self.folder,
             env={**os.environ, "PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)},
             stdout=subprocess.PIPE,
@@ -70,6 +75,14 @@ class Bench:
             text=True,
             start_new_session=True,
         )
+        self.drivers.append(driver)
+        return driver
+
+    def close(self) -> None:
+        """End what a test that failed has left."""
+        for driver in self.drivers:
+            with driver:
+                driver.kill()
 
     def study(self, *, programs: Path | None = None) -> tuple[int, str]:
         """Run the study to its end; its exit code and what it said."""

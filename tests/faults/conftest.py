@@ -1,5 +1,7 @@
 """The studies that faults are injected into, and the count of the faults."""
 
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -46,14 +48,16 @@ def finished_cells(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def pile(tmp_path: Path, finished_pile: Path) -> Bench:
+def pile(tmp_path: Path, finished_pile: Path) -> Iterator[Bench]:
     """The study of a pile and two cells, not begun."""
     (tmp_path / "small.toml").write_text(HEAD + CELLS + PILE)
-    return Bench(tmp_path, finished_pile)
+    with closing(Bench(tmp_path, finished_pile)) as bench:
+        yield bench
 
 
 @pytest.fixture
-def cells(tmp_path: Path, finished_cells: Path) -> Bench:
+def cells(tmp_path: Path, finished_cells: Path) -> Iterator[Bench]:
     """The study of two cells, not begun."""
     (tmp_path / "small.toml").write_text(HEAD + CELLS)
-    return Bench(tmp_path, finished_cells)
+    with closing(Bench(tmp_path, finished_cells)) as bench:
+        yield bench

@@ -128,7 +128,7 @@ def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(
 def test_a_process_that_draws_is_killed(pile: Bench, ledger: Ledger) -> None:
     with ledger.fault("SIGKILL to a worker", "figures"):
         driver = pile.start()
-        assert wait_for(lambda: len(_workers(driver.pid, pile.folder)) > 0, driver)
+        assert wait_for(lambda: any(pile.out.glob("figures/*")), driver)
         os.kill(_workers(driver.pid, pile.folder)[0], signal.SIGKILL)
         code, said = ended(driver)
         assert code == 0, said

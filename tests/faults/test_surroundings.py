@@ -137,45 +137,33 @@ def test_two_drivers_at_once(pile: Bench, ledger: Ledger) -> None:
         pile.check_finished()
 
 
-WITHOUT_LOCKS = """
+WITHOUT_LOCKS = (
+    "-c",
+    """
 import errno, fcntl, sys
 from orchestrator import cli, lock
 def flock(*_):
     raise OSError(errno.ENOLCK, "No locks available")
 fcntl.flock, lock.BEAT_S = flock, 0.5
 sys.exit(cli.main(sys.argv[1:]))
-"""
+""",
+)
 """A driver on a file system that knows no locks."""
-
-
-def _without_locks(bench: Bench) -> "subprocess.Popen[str]":
-    import sys
-
-    from tests.faults.bench import ROOT
-
-    return subprocess.Popen(
-        [sys.executable, "-c", WITHOUT_LOCKS, "study", "small.toml", "--out", str(bench.out)],
-        cwd=bench.folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
 
 
 def test_two_drivers_where_the_file_system_knows_no_locks(cells: Bench, ledger: Ledger) -> None:
     with ledger.fault("two drivers, no locks", "begin"):
-        drivers = [_without_locks(cells), _without_locks(cells)]
+        drivers = [cells.start(python=WITHOUT_LOCKS), cells.start(python=WITHOUT_LOCKS)]
         ends = [ended(driver) for driver in drivers]
         assert sorted(code for code, _ in ends) == [0, 1], ends
         cells.check_finished()
     with ledger.fault("SIGKILL to the driver, no locks", "grains"):
         (cells.out / "report.json").unlink()
-        driver = _without_locks(cells)
+        driver = cells.start(python=WITHOUT_LOCKS)
         assert wait_for(lambda: not _same_or_empty(cells.out / ".lock", b""), driver)
         driver.kill()
         ended(driver)
-        code, said = ended(_without_locks(cells))
+        code, said = ended(cells.start(python=WITHOUT_LOCKS))
         assert code == 0, said
         cells.check_finished()
 
@@ -193,7 +181,7 @@ def test_a_holder_on_another_machine_is_believed_while_it_lives(
     path = cells.out / ".lock"
     path.write_text(note.format(0))
     with ledger.fault("another machine, no locks", "living" if beats else "gone"):
-        driver = _without_locks(cells)
+        driver = cells.start(python=WITHOUT_LOCKS)
         for count in range(1, 200):
             if driver.poll() is not None:
                 break
