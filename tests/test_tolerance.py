@@ -59,7 +59,7 @@ def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_rung(
 ) -> None:
     # told that the pivot of each grain is good for level rows, which it is not
     wrong = {
-        (part, one.name, like): {0.5: Known(0.01, cost)}
+        (part, one.name, like): {0.5: Known(0.01, 0.0, cost)}
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
         for cost, one in enumerate(rungs.LADDER[part])  # type: ignore[index]
         if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")

@@ -86,10 +86,9 @@ def costs(
         Solver's seconds by case.
     """
     runs = len(Motion.from_csv(cases / fast.name).flow) - 1
-    rows: list[dict[str, Any]] = [
-        {"route": FAST, "core_s": seconds[fast.name], "extrapolated": False}
-    ]
-    for name, pile in piles.items():
+    rows: list[dict[str, Any]] = []
+    # the dearest first: the others are compared with it
+    for name, pile in reversed(list(piles.items())):
         holds = len(Motion.from_csv(cases / pile.name).flow) - 1
         whole = PileCase(rungs.rung("grains", "full pile, fast").of(fast.scene))
         grains = whole.packing.mobile.sum() / pile.packing.mobile.sum()
@@ -100,4 +99,5 @@ def costs(
                 "extrapolated": True,
             }
         )
+    rows.append({"route": FAST, "core_s": seconds[fast.name], "extrapolated": False})
     return pd.DataFrame(rows)

@@ -1,5 +1,6 @@
 """What the pages of the experiments say around their figures and tables."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
@@ -23,7 +24,7 @@ def of_ladder(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
 
 
 def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> Iterator[Section]:
-    by_dem = points[points["asked"] == "dem"]
+    by_dem = together(points[points["asked"] == "dem"])
     yield Section(
         "Speed against accuracy",
         "Every scene is answered on many pairs of rungs, one for the flow and one for the grains. "
@@ -56,7 +57,7 @@ def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> 
     )
     yield Section(
         "The rungs, and what is known of them",
-        "The largest error over the scenes of a kind, the reference's own uncertainty included. "
+        "The largest error over the scenes of a kind, %, without the reference's own uncertainty. "
         "From this table `study --tolerance` chooses.",
         tables=(experiment.sheet(_meanings()), experiment.sheet(_wide(known))),
         limits=(
@@ -73,20 +74,32 @@ _CAPTION = (
 )
 
 
-def _means(points: pd.DataFrame) -> pd.DataFrame:
-    """The largest errors in %, and the mean cost, of each pair and packing."""
-    keys = ["packing", "flow_rung", "grain_rung"]
-    groups = points.groupby(keys, sort=False)
-    errors = groups[list(ERROR_COLUMNS)].agg(_worst)
-    table = groups["cost_core_s"].mean().to_frame("core-s").join(errors).reset_index()
+def together(points: pd.DataFrame) -> pd.DataFrame:
+    """One row for each pair and packing: the mean cost, the largest errors with their signs."""
+    groups = points.groupby(["packing", "flow_rung", "grain_rung"], sort=False)
+    table = groups[list(ERROR_COLUMNS)].agg(_worst)
+    table = table.assign(
+        scene=[f"{count} piles" for count in groups.size()],
+        cost_core_s=groups["cost_core_s"].mean(),
+        reference_error=groups["reference_error"].max(),
+        same_model=groups["same_model"].first(),
+        pareto=groups["pareto"].first(),
+    )
+    return table.reset_index()
+
+
+def _means(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows of `together` for people: errors in %."""
+    table = rows[["packing", "flow_rung", "grain_rung", "scene", "cost_core_s"]]
+    table = table.assign(**{name: 100 * rows[name] for name in ERROR_COLUMNS})
     heads = {name: f"{name.removeprefix('error_')} %" for name in ERROR_COLUMNS}
-    heads = {**heads, "error_curve": "curve, %", "flow_rung": "flow", "grain_rung": "grains"}
+    heads |= {"cost_core_s": "core-s", "flow_rung": "flow", "grain_rung": "grains", "scene": "of"}
     return table.rename(columns=heads).sort_values(["packing", "core-s"])
 
 
 def _worst(values: pd.Series) -> float:
-    """In %; NaN where a fraction was not reached in one of the scenes."""
-    return 100 * float(values.abs().max(skipna=False))
+    """The value of the largest size; NaN where a fraction was not reached in one of the scenes."""
+    return math.nan if values.isna().any() else float(max(values, key=abs))
 
 
 def _meanings() -> pd.DataFrame:

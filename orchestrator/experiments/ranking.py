@@ -86,8 +86,8 @@ def _undominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 def known(found: pd.DataFrame) -> pd.DataFrame:
     """What is known of each rung, for each kind of scene and fraction: `rungs.known` reads it.
 
-    The error is the largest over the scenes, the reference's own uncertainty included; it is
-    infinite where one of the two did not reach the fraction.
+    The error is the largest over the scenes, infinite where one of the two did not reach the
+    fraction; the uncertainty is how far the reference itself moved on scenes of that kind.
     """
     grains = found[(found["flow_rung"] == REFERENCE[0]) & (found["asked"] == "dem")]
     flow = found[(found["grain_rung"] == BESIDE) & found["same_model"]]
@@ -103,13 +103,13 @@ def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str)
         by_rung = {rung: rows.set_index("scene_id") for rung, rows in alike.groupby(name)}
         for rung, rows in by_rung.items():
             for column in _columns(table, TAU):
-                unsure = _shift(by_rung.get(again), by_rung[dearest], column)
                 yield {
                     "part": part,
                     "rung": rung,
                     "like": like,
                     "fraction": float(column[len(TAU) :]),
-                    "error": _shift(rows, by_rung[dearest], column) + unsure,
+                    "error": _shift(rows, by_rung[dearest], column),
+                    "uncertainty": _shift(by_rung.get(again), by_rung[dearest], column),
                     "cost_core_s": float(rows[f"{part}_s"].mean()),
                     "scenes": len(rows),
                 }

@@ -155,8 +155,8 @@ class PileCase(GrainCase):
         speed = self._speed(cases)
         rules = self.scene.protocol
         thresholds = np.sort(self._peeled(speed))
-        if not 0 < thresholds[0] < np.inf:
-            # a bed that rolls by itself, or is blocked throughout: the deck will tell
+        if not 0 < thresholds[0] < np.inf or self.scene.flow.forced != "exposed":
+            # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
             thresholds = self.pivot_thresholds(speed[self.packing.windward])
         last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
         if not np.isfinite(last):
