@@ -153,8 +153,8 @@ def _wedged(scene: Scene) -> str | None:
     if not bed or bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
         return None
     return (
-        f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those under"
-        " the gaps are exposed too, and a mobile row is wedged apart by the one on it"
+        f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those"
+        " under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
     )
 
 
