@@ -14,6 +14,7 @@ from orchestrator.files import (
     digest_file,
     digest_files,
     digest_text,
+    discard,
     read_json,
     write_json,
 )
@@ -163,7 +164,7 @@ def draw(
 
     The states are those of the cases that are done, by name, as `Plan.done` gives them.
     """
-    space.drawn.unlink(missing_ok=True)
+    discard(space.drawn)
     states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)

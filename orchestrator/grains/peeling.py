@@ -169,7 +169,7 @@ def _root(coefficients: Sequence[float], goal: float) -> float:
         return 0.0
     if excess(high) < 0:
         return math.inf
-    flow = min(max(math.sqrt(goal / sum(abs(c) for c, _ in terms)), low), high)
+    flow = min(max(math.sqrt(abs(goal) / sum(abs(c) for c, _ in terms)), low), high)
     for _ in range(ITERATIONS):
         value = excess(flow)
         low, high = (flow, high) if value < 0 else (low, flow)

@@ -155,6 +155,9 @@ class PileCase(GrainCase):
         speed = self._speed(cases)
         rules = self.scene.protocol
         thresholds = np.sort(self._peeled(speed))
+        if not 0 < thresholds[0] < np.inf:
+            # a bed that rolls by itself, or is blocked throughout: the deck will tell
+            thresholds = self.pivot_thresholds(speed[self.packing.windward])
         last = thresholds[int(np.ceil(rules.until * self.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.files import write_durably
+from orchestrator.files import discard, write_durably
 from orchestrator.plan import Plan
 from orchestrator.study import Study
 from orchestrator.tables import piles, scenes, single
@@ -81,7 +81,7 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
     """Write each table as CSV and as Parquet, and what the columns mean; nothing else stays."""
     folder.mkdir(exist_ok=True)
     for old in folder.iterdir():
-        old.unlink()
+        discard(old)
     for name, table in tables.items():
         write_durably(folder / f"{name}.csv", table.to_csv(index=False))
         write_durably(folder / f"{name}.parquet", table.to_parquet(index=False))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 HEAD = """
-time_limit = 30
+time_limit = 300
 [protocol]
 step = 0.1
 quiet = 3.0
@@ -97,7 +97,7 @@ class Bench:
         assert not list(self.out.rglob("*.tmp"))
 
 
-def ended(driver: "subprocess.Popen[str]", limit_s: float = 120.0) -> tuple[int, str]:
+def ended(driver: "subprocess.Popen[str]", limit_s: float = 600.0) -> tuple[int, str]:
     """Wait for a driver; its exit code and all that it said, which holds no traceback."""
     out, said = driver.communicate(timeout=limit_s)
     assert "Traceback" not in said
@@ -115,7 +115,7 @@ def same_tables(one: Path, other: Path) -> bool:
 
 def wait_for(seen: Callable[[], bool], driver: "subprocess.Popen[str]") -> bool:
     """Wait until something is seen; False if the driver ends before that."""
-    limit = time.monotonic() + 60.0
+    limit = time.monotonic() + 300.0
     while not seen():
         if driver.poll() is not None or time.monotonic() > limit:
             return False
