@@ -46,7 +46,7 @@ def draw(results: Results) -> Iterator[Figure]:
     panels = figure.subfigures(rows, 2 if len(chosen) > 1 else 1, squeeze=False).ravel()
     for panel, pile in zip(panels, chosen, strict=False):
         _panel(panel, results, pile)
-    _legend(figure, felt=len(results.tables["pile_grain"]) > 0)
+    _legend(figure, felt="pile_grain" in results.tables)
     names = tuple(pile.flow.name for pile in chosen)
     caption = captions.stress(results, chosen)
     yield Figure("wall-stress", "Friction velocity over the pile", caption, names, figure)

@@ -78,17 +78,11 @@ def _again(bench: Bench, capsys: pytest.CaptureFixture[str]) -> str:
     return said.err
 
 
-def _named(how: str) -> str:
-    return (
-        f"a file {how}" if how in ("emptied", "removed") or "truncated" in how else f"a file: {how}"
-    )
-
-
 @contextlib.contextmanager
-def _faults(ledger: Ledger, how: str, paths: Sequence[Path]) -> Iterator[None]:
+def _faults(ledger: Ledger, paths: Sequence[Path]) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         for path in paths:
-            stack.enter_context(ledger.fault(_named(how), path.name))
+            stack.enter_context(ledger.fault("a harmed file", path.name))
         yield
 
 
@@ -104,7 +98,7 @@ def test_harmed_files_of_the_study(
     shutil.copytree(cells.undisturbed, cells.out)
     (cells.out / ".lock").write_text('{"host": "elsewhere", "pid": 1, "started": ""}\n')
     paths = [cells.out / name for name in OF_A_STUDY]
-    with _faults(ledger, how, paths):
+    with _faults(ledger, paths):
         for path in paths:
             HARMS[how](path)
         _heals(cells, capsys)
@@ -118,7 +112,7 @@ def test_harmed_files_of_a_case(
     shutil.copytree(cells.undisturbed, cells.out)
     (directory,) = case_of(cells.out, "cells")
     paths = [directory / name for name in OF_CELLS]
-    with _faults(ledger, how, paths):
+    with _faults(ledger, paths):
         for path in paths:
             whole = path.read_bytes()
             HARMS[how](path)
@@ -144,7 +138,7 @@ def test_a_harmed_note_of_failure(
     shutil.copytree(cells.undisturbed, cells.out)
     (directory,) = case_of(cells.out, "cells")
     path = directory / case.FAILED
-    with _faults(ledger, how, [path]):
+    with _faults(ledger, [path]):
         (directory / case.DONE).unlink()
         case.fail(directory, SolverError("for this test"))
         HARMS[how](path)
@@ -163,7 +157,7 @@ def test_harmed_files_of_a_flow_and_a_pile(
     shutil.copytree(pile.undisturbed, pile.out)
     paths = [path for name in OF_A_PILE for path in pile.out.glob(f"cases/{name}")]
     assert len(paths) == len(OF_A_PILE)
-    with _faults(ledger, how, paths):
+    with _faults(ledger, paths):
         for path in paths:
             HARMS[how](path)
         _heals(pile, capsys)
