@@ -58,9 +58,13 @@ class Results:
         """The values that the study's scenes have in a column, rising."""
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
+    def by_dem(self, scene_id: str) -> PileCase:
+        """The pile that shows how a scene's grains move: where DEM only checked it, the check."""
+        return self.plan.checks.get(scene_id, self.plan.piles[scene_id])
+
     def has_files(self, pile: PileCase) -> bool:
-        """Whether a pile and its flow still have the files that pictures are drawn from."""
-        return all(is_whole(one, self.cases) for one in (pile, *pile.needs))
+        """Whether a pile was run, and it and its flow still have the files of pictures."""
+        return pile in pile.runs and all(is_whole(one, self.cases) for one in pile.runs)
 
     @cached_property
     def flows(self) -> dict[str, PileCase]:
