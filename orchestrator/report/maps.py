@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
-from orchestrator.report import labels, style
+from orchestrator.report import style
 from orchestrator.report.style import Look
 
 VERDICTS: dict[str, tuple[str, str, str]] = {
@@ -40,7 +40,7 @@ class Size:
 
 
 ALONE = Size(cell=0.42, widest=1.0, letters=115, font=9)
-ON_SHEET = Size(cell=0.31, widest=1.0, letters=56, font=6.5)
+ON_SHEET = Size(cell=0.31, widest=1.0, letters=44, font=6.5)
 PER_ROW = 2
 """Maps side by side on a sheet."""
 AROUND, LINE = 0.62, 0.115
@@ -233,7 +233,7 @@ def _written(value: object) -> str:
         return value
     number = float(str(value))
     plain = number <= 0 or 1e-3 <= number < 1e5
-    return f"{number:g}" if plain else labels.power_of_ten(number)
+    return f"{number:g}" if plain else f"{number:.3g}".replace("e-0", "e-").replace("e+0", "e")
 
 
 def _colour_entries(listed: Sequence[Cells]) -> list[Artist]:
