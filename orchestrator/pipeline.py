@@ -70,20 +70,18 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
     with space.held():
         planned = plan.settled(study, space.cases)
         _claim(space, study, planned)
-        started, failures, states = 0, {}, planned.done(space.cases)
-        while todo := _without(planned.cases, states):
+        started, states = 0, planned.done(space.cases)
+        failures: dict[str, OrchestratorError] = {}
+        while todo := _without(planned.cases, {*states, *failures}):
             started += len(todo)
-            failures = complete(
+            failures |= complete(
                 todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
             )
-            settled = plan.settled(study, space.cases)
-            if failures or settled.cases.keys() == planned.cases.keys():
-                states |= planned.done(space.cases, todo)
-                break
-            # a check has overruled a cheap rung
-            planned = settled
+            # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
+            planned = plan.settled(study, space.cases)
             _claim(space, study, planned)
             states |= planned.done(space.cases, _without(planned.cases, states))
+        failures = {name: error for name, error in failures.items() if name in planned.cases}
         if started or not _is_drawn(study, planned, space):
             draw(study, planned, space, states, failures)
         return Finished(space.page, started, failures)

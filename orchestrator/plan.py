@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator import checks, rungs
-from orchestrator.case import Case, done_state
+from orchestrator.case import Case, done_state, failure
 from orchestrator.errors import InputError
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import PileCase
@@ -97,17 +97,29 @@ def of(answers: Mapping[str, Scene], name: str, tolerance: float | None = None) 
 
 
 def settled(study: Study, directory: Path) -> Plan:
-    """The plan after what the finished checks say: where they overrule a rung, a dearer one."""
+    """The plan after what the runs say: dearer rungs where cheap ones failed or DEM overrules them."""
     escalated: dict[str, checks.Above] = {}
     while True:
         planned = make(study, escalated)
-        if study.tolerance is None or not planned.checks:
+        if study.tolerance is None:
             return planned
         done = planned.done(directory)
-        more = checks.overruled(planned.piles, planned.checks, study.tolerance, directory, done)
+        more = {
+            **_failed(planned, directory),
+            **checks.overruled(planned.piles, planned.checks, study.tolerance, directory, done),
+        }
         if not more:
             return planned
         escalated |= more
+
+
+def _failed(planned: Plan, directory: Path) -> dict[str, checks.Above]:
+    """The piles that were not asked for as they are and whose runs failed, with their rungs."""
+    return {
+        asked: rungs.names(pile.scene)
+        for asked, pile in planned.piles.items()
+        if pile.scene.id != asked and any(failure(directory / run.name) for run in pile.runs)
+    }
 
 
 def _in_order(cases: Iterable[Case]) -> dict[str, Case]:

@@ -19,6 +19,10 @@ Part = Literal["flow", "grains"]
 QUIET_ENOUGH = 6.0
 """A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and
 its rate is a part of what is asked."""
+LIFTS = 0.95
+"""Lift over the weight at a grain's own threshold from which grains fly before they roll, which DEM
+alone shows: of the piles of the preset `paper` those below 0.93 have thresholds, those above 0.98
+have none."""
 OCTAVES = 2.0
 """Flows are shared within this ratio of z0."""
 DISORDERS = (0.02, 0.05, 0.2)
@@ -238,6 +242,7 @@ def is_open(scene: Scene) -> bool:
         scene.protocol.method == "dem"
         and scene.flow.model == "solve"
         and scene.protocol.quiet >= QUIET_ENOUGH
+        and float(scene.closed_form(scene.closure).lift) < LIFTS * scene.weight
     )
 
 
