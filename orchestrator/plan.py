@@ -97,7 +97,7 @@ def of(answers: Mapping[str, Scene], name: str, tolerance: float | None = None) 
 
 
 def settled(study: Study, directory: Path) -> Plan:
-    """The plan after what the runs say: dearer rungs where cheap ones failed or DEM overrules them."""
+    """The plan after what the runs say: dearer rungs where one failed or DEM overrules it."""
     escalated: dict[str, checks.Above] = {}
     while True:
         planned = make(study, escalated)
