@@ -12,7 +12,7 @@ from orchestrator import rungs as ladder
 from orchestrator.case import IDENTITY
 from orchestrator.files import read_json
 from orchestrator.report import labels
-from orchestrator.report.results import Results, held, split, valid, varying
+from orchestrator.report.results import Results, by_dem, held, split, valid, varying
 from orchestrator.tables import COLUMNS
 
 PACKAGES = (
@@ -105,7 +105,7 @@ def _threshold(row: pd.Series) -> str:
 
 def single_grains(results: Results) -> Sheet | None:
     """How far DEM is from the closed form, by closure, whether it holds, and protocol."""
-    found = results.joined("single_grain")
+    found = by_dem(results.joined("single_grain"))
     if found.empty:
         return None
     ratio = found["ustar_m_s"] / found["ustar_closed_form_m_s"]
@@ -229,7 +229,7 @@ def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
 
 
 def _stray_grains(results: Results) -> list[str]:
-    grains = results.joined("single_grain")
+    grains = by_dem(results.joined("single_grain"))
     if grains.empty:
         return []
     ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]

@@ -96,6 +96,11 @@ def held(table: pd.DataFrame) -> pd.Series:
     return table["quiet"] >= RAMP_BELOW
 
 
+def by_dem(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows that DEM found; those of a formula hold nothing that was measured."""
+    return table[table["method"] == "dem"] if "method" in table else table
+
+
 def valid(table: pd.DataFrame) -> pd.Series:
     """Whether the closure of each row holds at its scene's own single-grain threshold."""
     return pd.Series(np.asarray(table["closure"] == table["regime"]), index=table.index)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from orchestrator.report import captions, labels, shields, style, theory
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, held, split, valid, varying
+from orchestrator.report.results import Results, by_dem, held, split, valid, varying
 
 CROSS = "beyond the paper"
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
@@ -21,7 +21,7 @@ def draw(results: Results) -> Iterator[Figure]:
     """The figures that the study's single grains give, one at a time; ramps are not thresholds."""
     grains = results.beds("grain")
     grains = grains[held(grains)]
-    dem = results.joined("single_grain")
+    dem = by_dem(results.joined("single_grain"))
     dem = dem[held(dem)] if len(dem) else dem
     flat = grains[grains["alpha_deg"] == 0]
     if len(flat):

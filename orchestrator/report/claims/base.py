@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.closures import Closure
-from orchestrator.report.results import split, valid
+from orchestrator.report.results import by_dem, split, valid
 from orchestrator.tables import Tables
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
@@ -23,6 +23,8 @@ BY_SHARE = (
 QUIET = 5.0
 """Least quiet time of what is a hold rather than a ramp, sqrt(d/g')."""
 NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
+ANSWERS = ("pile_threshold", "wall_stress")
+"""Tables that are answers by whatever method; the others show what DEM alone measures."""
 SCENE = (
     "alpha_deg",
     "beta_deg",
@@ -108,7 +110,8 @@ class Evidence:
             columns = [*self.scenes, *SCENE, *EMPTY]
             return pd.DataFrame(columns=list(dict.fromkeys(columns))).astype(object)
         extra = [column for column in self.scenes if column not in table or column == "scene_id"]
-        return table.merge(self.scenes[extra], on="scene_id", how="inner", validate="many_to_one")
+        table = table.merge(self.scenes[extra], on="scene_id", how="inner", validate="many_to_one")
+        return table if name in ANSWERS else by_dem(table)
 
     @cached_property
     def grains(self) -> pd.DataFrame:
