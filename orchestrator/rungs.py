@@ -20,8 +20,7 @@ QUIET_ENOUGH = 6.0
 """A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and
 its rate is a part of what is asked."""
 LIFTS = 0.95
-"""Lift over the weight at a grain's own threshold from which grains fly before they roll, which DEM
-alone shows: of the piles of the preset `paper` those below 0.93 have thresholds, those above 0.98
+"""Lift over the weight at a grain's own threshold from which grains fly before they roll: of the piles of the preset `paper` those below 0.93 have thresholds, those above 0.98
 have none."""
 OCTAVES = 2.0
 """Flows are shared within this ratio of z0."""
@@ -228,7 +227,8 @@ def choose(scene: Scene, tolerance: float, *, above: Mapping[Part, str] | None =
     if not isinstance(scene.bed, PileBed):
         # the closed form is exact for one grain in a held flow
         return changed(scene, {"protocol.method": "pivot"})
-    pairs = sorted(_pairs(scene, above or {}), key=lambda pair: pair.cost)
+    least: Mapping[Part, str] = {"grains": "peeling"} if flies(scene) else {}
+    pairs = sorted(_pairs(scene, above or least), key=lambda pair: pair.cost)
     within = (pair for pair in pairs if pair.error <= tolerance)
     best = next(within, None) or min(pairs, key=lambda pair: pair.error, default=None)
     if best is None or math.isinf(best.error):
@@ -242,8 +242,12 @@ def is_open(scene: Scene) -> bool:
         scene.protocol.method == "dem"
         and scene.flow.model == "solve"
         and scene.protocol.quiet >= QUIET_ENOUGH
-        and float(scene.closed_form(scene.closure).lift) < LIFTS * scene.weight
     )
+
+
+def flies(scene: Scene) -> bool:
+    """Whether the lift carries a grain before it rolls, which DEM alone shows."""
+    return float(scene.closed_form(scene.closure).lift) >= LIFTS * scene.weight
 
 
 def meaning(part: Part, name: str) -> str:
