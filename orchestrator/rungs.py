@@ -20,8 +20,8 @@ QUIET_ENOUGH = 6.0
 """A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and
 its rate is a part of what is asked."""
 LIFTS = 0.95
-"""Lift over the weight at a grain's own threshold from which grains fly before they roll: of the piles of the preset `paper` those below 0.93 have thresholds, those above 0.98
-have none."""
+"""Lift over the weight at a grain's own threshold from which grains fly before they roll: of the
+piles of the preset `paper` those below 0.93 have thresholds, those above 0.98 none."""
 OCTAVES = 2.0
 """Flows are shared within this ratio of z0."""
 DISORDERS = (0.02, 0.05, 0.2)

@@ -80,7 +80,7 @@ def piles(results: Results) -> Sheet | None:
         first = own.iloc[0]
         cells = {row["fraction"]: _threshold(row) for _, row in own.iterrows()}
         reached = (cells.get(fraction, "—") for fraction in fractions)
-        rows.append((*_pile(first, extra), str(first["count"]), *reached, str(first["case"])))
+        rows.append((*_pile(first, extra), str(first["count"]), *reached, _case(first["case"])))
     return Sheet(head, tuple(rows))
 
 
@@ -101,6 +101,11 @@ def _threshold(row: pd.Series) -> str:
         return f"not reached\n(highest n/N {row['highest_fraction']:.0%})"
     low, high = sorted((row["shields_low"], row["shields_high"]))
     return f"{row['shields']:.4f}\n({low:.4f} … {high:.4f})\nu*₀ {row['ustar0_m_s']:.3f} m/s"
+
+
+def _case(name: object) -> str:
+    """The case's name; nothing for an answer without a run of its own."""
+    return name if isinstance(name, str) else ""
 
 
 def single_grains(results: Results) -> Sheet | None:

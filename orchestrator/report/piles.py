@@ -25,7 +25,7 @@ def fractions(results: Results) -> Iterator[Figure]:
             f"fractions-alpha{alpha:g}",
             f"Fraction of moving grains, α = {alpha:g}°",
             captions.fractions(rows),
-            tuple(sorted(set(rows["case"]))),
+            tuple(sorted(set(rows["case"].dropna()))),
             _fractions(results, rows),
         )
 
@@ -40,7 +40,7 @@ def extended(results: Results) -> Iterator[Figure]:
             f"extended-shields-{written.replace('/', '').replace(' ', '')}",
             f"Extended Shields diagram, z₀ = {written}",
             captions.extended(rows),
-            tuple(sorted(set(rows["case"]))),
+            tuple(sorted(set(rows["case"].dropna()))),
             _extended(results, rows),
         )
 

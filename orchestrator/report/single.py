@@ -52,7 +52,7 @@ def _pair(
             f"dem-{stem}",
             f"DEM: one grain on a {bed}",
             captions.grain_dem(points, number + 1),
-            tuple(sorted(set(points["case"]))),
+            tuple(sorted(set(points["case"].dropna()))),
             _diagram(results, scenes, points, by),
         )
 

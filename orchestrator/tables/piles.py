@@ -119,7 +119,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "flow_rung": rung["flow"],
             "grain_rung": rung["grains"],
             "error_estimate": error if math.isfinite(error) else None,
-            "case": pile.name if pile in pile.runs else None,
+            "case": pile.runs[-1].name if pile.runs else None,
         }
 
 
