@@ -38,7 +38,7 @@ def test_a_foreign_solver_declines_what_it_is_not_for(
 ) -> None:
     if shutil.which(program) is None:
         pytest.skip(f"{program} is not installed")
-    choice = Choice(patterns=("1-006*",))
+    choice = Choice(patterns=(min(path.name for path in (formulas / "scenes").glob("1-*")),))
     found = runner.run(formulas, COMMANDS[program], tmp_path / "results", choice, 60.0)
     assert all("it ended with 2" in line for line in found.failures)
     assert found.failures
