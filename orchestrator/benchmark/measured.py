@@ -30,7 +30,7 @@ GRAINS, LINE = 0.03, 0.10
 """Relative tolerances of a pile's thresholds under the given stress, and with one's own flow."""
 SCATTER = 0.10
 """Of the count, that the number of moved grains may differ by besides one hold: three engines with
-one contact law do so by up to 7 % where a chain of grains goes at once (docs/benchmark.md)."""
+one contact law do so by up to 13 % where a chain of grains goes at once (docs/benchmark.md)."""
 UPSTREAM, DOWNSTREAM, LID = 10.0, 20.0, 10.0
 """Ends of the flow's domain, h."""
 
