@@ -43,8 +43,9 @@ class Answers:
         lost = next((run for run in runs if run not in self.done), None)
         if lost is None:
             return None
-        ended = case_states.ended(self.cases / lost)
-        return ended if ended[0] in VERDICTS else ("stalled", ended[1] or "it did not run")
+        verdict, why = case_states.ended(self.cases / lost)
+        why = why.replace(f"{self.cases}/", "") or "it did not run"
+        return verdict if verdict in VERDICTS else "stalled", why
 
     def _runs(self, scene: Scene) -> list[str]:
         if scene.id in self.planned.piles:
