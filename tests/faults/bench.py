@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 HEAD = """
 time_limit = 300
 [protocol]
-step = 0.06
+step = 0.05
 quiet = 3.0
 timestep = 0.3
 until = 0.8
