@@ -68,6 +68,17 @@ def compare(
         yield Comparison(own, dem, within or neither)
 
 
+def ready(
+    piles: Mapping[str, PileCase], checks: Mapping[str, PileCase], done: Container[str]
+) -> dict[str, PileCase]:
+    """The checks whose runs are done, and those of the answers that they check."""
+    return {
+        asked: check
+        for asked, check in checks.items()
+        if all(run.name in done for run in (*check.runs, *piles[asked].runs))
+    }
+
+
 def overruled(
     piles: Mapping[str, PileCase],
     checks: Mapping[str, PileCase],
@@ -78,8 +89,7 @@ def overruled(
     """For each pile of a group whose check disagrees, the rungs that are not good enough."""
     lost = {
         group(piles[asked].scene)
-        for asked, check in checks.items()
-        if all(run.name in done for run in (*check.runs, *piles[asked].runs))
+        for asked, check in ready(piles, checks, done).items()
         if not all(one.agree for one in compare(piles[asked], check, tolerance, cases))
     }
     return {

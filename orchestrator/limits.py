@@ -74,8 +74,7 @@ def _solved(scene: Scene) -> PileBed | None:
 
 
 def _slope(scene: Scene) -> str | None:
-    slope, bed = scene.bed.slope_deg, scene.bed
-    limit = min(scene.grain.friction_angle_deg, 90 - bed.entrainment_angle_deg)
+    slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
     if slope <= limit + 1e-9:
         return None
     return (

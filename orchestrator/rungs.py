@@ -297,8 +297,7 @@ def likeness(part: Part, scene: Scene) -> str:
     slope is the limiting one, on which a row waits for a touch.
     """
     assert isinstance(scene.bed, PileBed)
-    limit = min(scene.grain.friction_angle_deg, 90 - scene.bed.entrainment_angle_deg)
-    ending = ", limiting slope" if scene.bed.slope_deg > limit - 1 else ""
+    ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
     if part == "flow":
         return scene.flow.stress + ending
     packing: str = scene.bed.packing

@@ -205,6 +205,11 @@ class Scene(Part):
         )
 
     @property
+    def limiting_slope_deg(self) -> float:
+        """Slope beyond which a grain slides or rolls back without any flow, degrees."""
+        return min(self.grain.friction_angle_deg, 90 - self.bed.entrainment_angle_deg)
+
+    @property
     def solve_roughness(self) -> float:
         """z0 at which the flow over a pile is solved, m."""
         return self.flow.roughness or self.bed.roughness

@@ -60,6 +60,16 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     assert math.isnan(bad["error"])
 
 
+def _tables_of_a_pile() -> dict[str, dict[str, object]]:
+    return {
+        "grain": {"diameter": 1e-3},
+        "bed": {"kind": "pile", "slope_deg": 15.0},
+        "protocol": {},
+        "fluid": {},
+        "flow": {},
+    }
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [
@@ -73,13 +83,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
 def test_a_study_beyond_a_limit_is_refused_with_the_map(
     change: dict[str, dict[str, float]], field: str
 ) -> None:
-    parts: dict[str, dict[str, object]] = {
-        "grain": {"diameter": 1e-3},
-        "bed": {"kind": "pile", "slope_deg": 15.0},
-        "protocol": {},
-        "fluid": {},
-        "flow": {},
-    }
+    parts = _tables_of_a_pile()
     for part, fields in change.items():
         parts[part].update(fields)
     with pytest.raises(InputError, match="map") as caught:
@@ -100,13 +104,7 @@ def test_a_study_beyond_a_limit_is_refused_with_the_map(
 def test_a_study_whose_answer_is_merely_worse_is_warned(
     part: str, field: str, value: object
 ) -> None:
-    parts: dict[str, dict[str, object]] = {
-        "grain": {"diameter": 1e-3},
-        "bed": {"kind": "pile", "slope_deg": 15.0},
-        "protocol": {},
-        "fluid": {},
-        "flow": {},
-    }
+    parts = _tables_of_a_pile()
     parts[part][field] = value
     with pytest.warns(UserWarning, match="map"):
         study.make_scene(parts, "test")

@@ -136,7 +136,6 @@ def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[st
     for fraction in key.scene.protocol.fractions:
         found = of_pile(motion, speed, fraction, key.scene.fluid.density)
         row[f"tau_{fraction:g}"] = found.tau
-        row[f"half_{fraction:g}"] = (found.tau_high - found.tau_low) / 2 / found.tau
     for fraction in CURVE:
         found = of_pile(motion, speed, float(fraction), key.scene.fluid.density)
         row[f"curve_{fraction:.2f}"] = found.tau

@@ -23,6 +23,7 @@ degrees and zero from 25 on. The bare triangle without the streamline is 17 to 3
 mean at 15 degrees already, 64 to 103 % at 30. docs/flow.md has the numbers.
 """
 
+from functools import cache
 from itertools import pairwise
 from math import ceil, log, pi, radians, sqrt, tan
 
@@ -47,12 +48,14 @@ STEEPEST = 0.25
 """Slope of the separation streamline."""
 
 
+@cache
 def flat(slope_deg: float, height_m: float) -> WallStress:
     """The undisturbed stress, tau = tau_0, on the bed of a pile (height in m)."""
     edges = _edges(slope_deg, height_m)
     return _wall_stress(slope_deg, height_m, edges, np.ones(len(edges) - 1))
 
 
+@cache
 def hill(slope_deg: float, height_m: float, roughness_m: float) -> WallStress:
     """The stress on the bed of a pile by the linear theory, averaged over each face exactly.
 

@@ -70,7 +70,7 @@ def chosen(results: Results) -> Iterator[PileCase]:
         order = rows.assign(valid=valid(rows)).sort_values(
             ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
-        piles = (results.by_dem(str(scene_id)) for scene_id in order["scene_id"])
+        piles = (results.shown(str(scene_id)) for scene_id in order["scene_id"])
         yield from itertools.islice(filter(results.has_files, piles), 1)
 
 

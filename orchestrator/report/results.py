@@ -58,7 +58,7 @@ class Results:
         """The values that the study's scenes have in a column, rising."""
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
-    def by_dem(self, scene_id: str) -> PileCase:
+    def shown(self, scene_id: str) -> PileCase:
         """The pile that shows how a scene's grains move: where DEM only checked it, the check."""
         return self.plan.checks.get(scene_id, self.plan.piles[scene_id])
 

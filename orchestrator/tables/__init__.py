@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from orchestrator import checks
 from orchestrator.errors import OrchestratorError
 from orchestrator.files import discard, write_durably
 from orchestrator.plan import Plan
@@ -49,12 +50,8 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
 def _checks(
     study: Study, plan: Plan, cases: Path, done: Container[str]
 ) -> Iterator[dict[str, Any]]:
-    ready = {
-        asked: pile
-        for asked, pile in plan.checks.items()
-        if all(one.name in done for one in (*pile.runs, *plan.piles[asked].runs))
-    }
     if study.tolerance is not None:
+        ready = checks.ready(plan.piles, plan.checks, done)
         yield from piles.check_rows(plan.piles, ready, study.tolerance, cases)
 
 
