@@ -1,11 +1,12 @@
 """Where the templates and presets lie: beside the package in a checkout, inside it in a wheel."""
 
-import shutil
-import tempfile
+import stat
+from fnmatch import fnmatchcase
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
-from orchestrator.files import canonical_json, digest_files, digest_text
+from orchestrator.files import canonical_json, digest_text
 
 PACKAGE = Path(__file__).resolve().parent
 
@@ -35,14 +36,30 @@ GENERATED = (
 
 def copy_template(name: str, folder: Path) -> None:
     """Make a folder as a fresh copy of a template."""
-    shutil.copytree(templates() / name, folder, ignore=shutil.ignore_patterns(*GENERATED))
+    folder.mkdir(parents=True)
+    for path, mode, content in _files(name):
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
+        (folder / path).chmod(mode)
 
 
 @cache
 def template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
-    with tempfile.TemporaryDirectory(prefix="orchestrator-") as scratch:
-        folder = Path(scratch) / "template"
-        copy_template(name, folder)
-        files = [path for path in folder.rglob("*") if path.is_file()]
-        return digest_text(canonical_json(digest_files(files, root=folder)))
+    digests = {path: sha256(content).hexdigest() for path, _, content in _files(name)}
+    return digest_text(canonical_json(digests))
+
+
+@cache
+def _files(name: str) -> tuple[tuple[str, int, bytes], ...]:
+    """Path, mode and content of each file; read once, so that all copies are what was digested."""
+    root = templates() / name
+    paths = (path.relative_to(root) for path in sorted(root.rglob("*")) if path.is_file())
+    own = [path for path in paths if not any(map(_is_generated, path.parts))]
+    modes = (stat.S_IMODE((root / path).stat().st_mode) for path in own)
+    contents = ((root / path).read_bytes() for path in own)
+    return tuple(zip((path.as_posix() for path in own), modes, contents, strict=True))
+
+
+def _is_generated(name: str) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in GENERATED)

@@ -47,7 +47,7 @@ def read_track(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> Trac
 
 
 def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> FloatArray:
-    """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (T + 1, N, 5).
+    """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (5, T + 1, N).
 
     First after settling, then at each look. NaN of a grain that is gone; one that the deck does
     not list and that ``bed.dump`` has at the end of the hold is at rest where it had settled.
@@ -78,13 +78,17 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
         if rows.empty:
             raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
         raise SolverError("it is not of these grains", where=str(path), remedy="run the case again")
-    state = np.full((len(dump.steps), len(ids), len(PASSAGE_COLUMNS) - 1), np.nan)
+    state = np.full((len(PASSAGE_COLUMNS) - 1, len(dump.steps), len(ids)), np.nan)
     row, column = np.searchsorted(dump.steps, rows["step"]), np.searchsorted(ids, rows["id"])
-    state[row, column] = rows[list(PASSAGE_COLUMNS[1:])]
-    listed = ~np.isnan(state[1:, :, 0])
+    for part, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
+        part[row, column] = rows[name]
+    listed = ~np.isnan(state[0, 1:])
     resting = ~listed & _there(listed, _left(directory, ids, looks), looks)
-    at_rest = np.pad(state[0, :, :2], ((0, 0), (0, 3)))
-    state[1:] = np.where(resting[:, :, None], at_rest, state[1:])
+    places, motion = state[:2], state[2:]
+    for part in places:
+        np.copyto(part[1:], part[0], where=resting)
+    for part in motion:
+        part[1:][resting] = 0.0
     return state
 
 
@@ -114,15 +118,14 @@ def _there(
 
 
 def _track(state: FloatArray, along: FloatArray, diameter: float) -> Track:
-    shift = (state[1:, :, :2] - state[0, :, :2]) / diameter
-    outward = np.column_stack([-along[:, 1], along[:, 0]])
-    speed = np.hypot(state[1:, :, 2], state[1:, :, 3])
+    right, up = (state[:2, 1:] - state[:2, :1]) / diameter
+    vx, vz, spin = state[2:, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):
-        roll = np.abs(state[1:, :, 4]) * diameter / 2 / speed
+        roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
     return Track(
-        stayed=~np.isnan(state[0, :, 0]),
-        travel=np.einsum("tnk,nk->tn", shift, along),
-        rise=np.einsum("tnk,nk->tn", shift, outward),
+        stayed=~np.isnan(state[0, 0]),
+        travel=right * along[:, 0] + up * along[:, 1],
+        rise=up * along[:, 0] - right * along[:, 1],
         roll=roll,
     )
 

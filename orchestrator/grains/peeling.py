@@ -65,19 +65,21 @@ def flows(
         Infinite for grains that never leave.
     """
     places = [(x, z) for x, z in centres.tolist()]
-    near = {i: _neighbours(centres, i) for i in np.flatnonzero(pushed).tolist()}
+    near = dict(_neighbours(centres, pushed))
     vectors = (force / weight).transpose(1, 0, 2).tolist()
     up = (float(along[0]), float(along[1]))
     present = np.ones(len(centres), bool)
     left = np.full(len(centres), np.inf)
 
-    def needed(i: int) -> float:
-        others = [places[k] for k in near[i] if present[k]]
-        return _Climb(places[i], others, vectors[i], up, marker).needed()
-
     next_flow = np.full(len(centres), np.inf)
+    ways: dict[int, list[Place]] = {}
+
+    def look(i: int) -> None:
+        others = [places[k] for k in near[i] if present[k]]
+        next_flow[i], ways[i] = _Climb(places[i], others, vectors[i], up, marker).needed()
+
     for i in near:
-        next_flow[i] = needed(i)
+        look(i)
     reached = 0.0
     while np.isfinite(lowest := float(next_flow.min())):
         i = int(next_flow.argmin())
@@ -85,15 +87,22 @@ def flows(
         reached = max(reached, lowest)
         left[i], next_flow[i], present[i] = reached, np.inf, False
         for k in near[i]:
-            if k in near and present[k]:
-                next_flow[k] = needed(k)
+            # whom it would not have rolled over was not on its way
+            if k in near and present[k] and places[i] in ways[k]:
+                look(k)
     return left
 
 
-def _neighbours(centres: FloatArray, i: int) -> list[int]:
-    near = np.hypot(*(centres - centres[i]).T) < REACH
-    near[i] = False
-    return [int(k) for k in np.flatnonzero(near)]
+def _neighbours(centres: FloatArray, chosen: BoolArray) -> Iterator[tuple[int, list[int]]]:
+    """Some grains, each with those within its reach, in order of their numbers."""
+    order = np.argsort(centres[:, 0], kind="stable")
+    x, z = centres[order].T
+    ranks = np.flatnonzero(chosen[order])
+    first, last = np.searchsorted(x, x[ranks] - REACH), np.searchsorted(x, x[ranks] + REACH)
+    for rank, a, b in zip(ranks.tolist(), first.tolist(), last.tolist(), strict=True):
+        near = np.hypot(x[a:b] - x[rank], z[a:b] - z[rank]) < REACH
+        near[rank - a] = False
+        yield int(order[rank]), np.sort(order[a:b][near]).tolist()
 
 
 @dataclass(frozen=True)
@@ -106,19 +115,20 @@ class _Climb:
     along: Place
     marker: float
 
-    def needed(self) -> float:
-        """The least flow that takes it to the marker."""
+    def needed(self) -> tuple[float, list[Place]]:
+        """The least flow that takes it to the marker, and the neighbours that it rolls over."""
         place, pivot = self.start, self._foremost()
-        flow = 0.0
-        for _ in range(MOST_STEPS):
-            if pivot is None:
-                return flow
+        flow, way = 0.0, []
+        while pivot is not None:
+            way.append(pivot)
+            if len(way) > MOST_STEPS:
+                return math.inf, way
             flow = max(flow, self._flow_to_leave(place, pivot))
             met = self._next(place, pivot)
             if met is None or math.isinf(flow):
-                return flow
+                break
             place, pivot = met
-        return math.inf
+        return flow, way
 
     def _foremost(self) -> Place | None:
         """The contact that lies farthest round towards downstream, from below."""
@@ -161,20 +171,25 @@ def _root(coefficients: Sequence[float], goal: float) -> float:
     """The flow at which sum_p c_p flow**p reaches a goal; 0 or infinite if always or never."""
     terms = [(c, p) for c, p in zip(coefficients, POWERS, strict=True) if c != 0]
 
-    def excess(flow: float) -> float:
-        return sum(c * math.pow(flow, p) for c, p in terms) - goal
+    def excess(flow: float) -> tuple[float, float]:
+        """Above the goal, and its slope in the logarithm of the flow."""
+        value = slope = 0.0
+        for c, p in terms:
+            raised = math.pow(flow, p)
+            value += c * raised
+            slope += c * p * raised
+        return value - goal, slope
 
     low, high = LEAST, MOST
-    if excess(low) >= 0:
+    if excess(low)[0] >= 0:
         return 0.0
-    if excess(high) < 0:
+    if excess(high)[0] < 0:
         return math.inf
     flow = min(max(math.sqrt(abs(goal) / sum(abs(c) for c, _ in terms)), low), high)
     for _ in range(ITERATIONS):
-        value = excess(flow)
+        value, slope = excess(flow)
         low, high = (flow, high) if value < 0 else (low, flow)
         # Newton in the logarithm of the flow; where it leaves what encloses the root, halving
-        slope = sum(c * p * math.pow(flow, p) for c, p in terms)
         step = value / slope if slope > 0 else math.inf
         guess = flow * math.exp(-step) if abs(step) < 20 else 0.0
         if abs(step) < CLOSE:

@@ -1,6 +1,6 @@
 """A pile of grains under the flow over it: one case of LIGGGHTS for each scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -181,11 +181,10 @@ class PileCase(GrainCase):
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
-        grains = self._grains(self._speed(directory.parent))
         grain = self.scene.grain
-        rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
-        found = motion.read(directory, grains, self.scene.protocol.marker)
-        found.to_csv(directory, grains)
+        rest.check(directory, self._bare, self.scene.weight, grain.stiffness, all_rest=True)
+        found = motion.read(directory, self._bare, self.scene.protocol.marker)
+        found.to_csv(directory, self._bare)
 
     def motion(self, cases: Path) -> Motion:
         """What the windward grains do, by the scene's method; from the finished cases.
@@ -267,24 +266,29 @@ class PileCase(GrainCase):
         return np.zeros_like(windward)
 
     def _grains(self, speed: FloatArray) -> deck.GrainTable:
+        """The grains of the deck, with the flow's forces."""
+        lee, up = self.packing.lee[:, None], self.triangle.tangent
+        along = np.where(lee, up * [1, -1], up)
+        outward = np.where(lee, *reversed(self.triangle.normals))
+        force = deck.force_table(*self.scene.powers(), speed, along, outward)
+        force[:, self._bare.kind < deck.COUNTED] = 0
+        return replace(self._bare, force=force)
+
+    @cached_property
+    def _bare(self) -> deck.GrainTable:
+        """The grains of the deck, without forces."""
         bed, d = self.packing, self.scene.grain.diameter
-        up = self.triangle.tangent
-        along = np.where(bed.lee[:, None], up * [1, -1], up)
-        outward = np.where(bed.lee[:, None], *reversed(self.triangle.normals))
         kind = np.select(
             [~bed.mobile, bed.windward, bed.lee],
             [deck.FIXED, deck.COUNTED, deck.PUSHED],
             deck.MOBILE,
         )
-        drag, lift = self.scene.powers()
-        force = deck.force_table(drag, lift, speed, along, outward)
-        force[:, kind < deck.COUNTED] = 0
         x, z = bed.centres.T * d
         return deck.GrainTable(
             position=np.column_stack([x, np.zeros_like(x), z]),
             kind=kind,
-            along=np.tile(up, (len(x), 1)),
-            force=force,
+            along=np.tile(self.triangle.tangent, (len(x), 1)),
+            force=np.zeros((len(deck.POWERS), len(x), 2)),
             diameter=d,
             density=self.scene.grain.density,
         )

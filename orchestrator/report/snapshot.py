@@ -114,7 +114,7 @@ def read(pile: PileCase, cases: Path) -> Passage:
     directory, d = cases / pile.name, pile.scene.grain.diameter
     looks = pd.read_csv(directory / motion.LEVELS)
     counted = np.flatnonzero(pile.packing.windward) + 1
-    exposed = dump.read_passage(directory, counted, looks)[..., :2] / d
+    exposed = np.moveaxis(dump.read_passage(directory, counted, looks)[:2], 0, -1) / d
     ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
     bed = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS)
     rest = np.full((len(ends), len(pile.packing.centres), 2), np.nan)
