@@ -2,6 +2,7 @@
 
 import shutil
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,6 +16,7 @@ from orchestrator.files import (
     digest_text,
     read_json,
     remove_empty_folders,
+    size_of,
     write_durably,
     write_json,
 )
@@ -142,6 +144,7 @@ def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s
             "results_sha256": results,
             "derived_sha256": derived,
             "stamps": stamps,
+            "bytes": size_of(directory),
         },
     )
 
@@ -158,11 +161,13 @@ def failure(directory: Path) -> str | None:
     The word for its end comes first where it says more than that it failed.
     """
     path = directory / FAILED
+    if not path.is_file():
+        return None
     state = read_json(path)
-    if isinstance(state, dict):
-        ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
-        return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
-    return "its note of failure cannot be read" if path.is_file() else None
+    if not isinstance(state, dict):
+        return "its note of failure cannot be read"
+    ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
+    return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
 
 
 def ended(directory: Path) -> tuple[str, str]:
@@ -198,12 +203,23 @@ def prune(case: Case, cases: Path) -> None:
         return
     files = _matching(directory, case.bulky)
     names = {path.relative_to(directory).as_posix() for path in files}
-    # first what makes up for the files: killed in between, the case is still done
     pruned = sorted(names.union(state.get("pruned", [])))
-    write_json(directory / DONE, {**state, "pruned": pruned})
+    marker = directory / DONE
+    left = size_of(directory) - sum(path.stat().st_size for path in (*files, marker))
+    # first what makes up for the files: killed in between, the case is still done
+    write_json(marker, {**state, "pruned": pruned, "bytes": left})
     for path in files:
         path.unlink()
     remove_empty_folders(directory, (path.parent for path in files))
+
+
+def size(directory: Path, state: Mapping[str, Any]) -> int:
+    """Bytes on disk of the case in a directory, whose marker says what it came to at its end."""
+    told = state.get("bytes")
+    try:
+        return told + (directory / DONE).stat().st_size if type(told) is int else size_of(directory)
+    except OSError:
+        return size_of(directory)
 
 
 def is_whole(case: Case, cases: Path) -> bool:

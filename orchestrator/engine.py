@@ -15,7 +15,7 @@ from orchestrator import case as case_states
 from orchestrator import retry
 from orchestrator.agenda import Agenda
 from orchestrator.case import Case
-from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_system
+from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_fault, of_system
 from orchestrator.solvers import process
 
 LOG = "log.Allrun"
@@ -234,6 +234,8 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
         return Outcome(case, error=of_system(error, case.name))
     except pool.lost as error:
         return Outcome(case, error=_loss(error, case.name))
+    except Exception as error:  # one case is lost by it, not the study
+        return Outcome(case, error=of_fault(error, case.name))
 
 
 def _loss(error: Exception, where: str) -> SolverError:

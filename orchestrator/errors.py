@@ -3,7 +3,9 @@
 import difflib
 import errno
 import shutil
+import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import ClassVar
 
 MOST = 400
@@ -90,6 +92,17 @@ def of_system(error: OSError, where: str = "") -> OrchestratorError:
         "no space is left on the disk" if full else said or str(error),
         where=where or str(error.filename or ""),
         remedy="make room, then the same command continues" if full else "see the file system",
+    )
+
+
+def of_fault(error: Exception, where: str) -> OrchestratorError:
+    """The message of an exception that nobody foresaw: a fault of this program."""
+    frames = traceback.extract_tb(error.__traceback__)
+    at = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+    return OrchestratorError(
+        f"a fault of this program: {type(error).__name__}: {error}{at}",
+        where=where,
+        remedy="report it, with the study file",
     )
 
 

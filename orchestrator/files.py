@@ -65,11 +65,13 @@ def remove_empty_folders(root: Path, folders: Iterable[Path]) -> None:
             folder = folder.parent
 
 
-def size_of(directory: Path) -> int:
-    """Size of all files below a directory, bytes; what vanishes meanwhile does not count."""
+def size_of(path: Path) -> int:
+    """Size of a file, or all files below a directory, bytes; what vanishes does not count."""
     total = 0
     try:
-        with os.scandir(directory) as entries:
+        if path.is_symlink() or not path.is_dir():
+            return path.lstat().st_size
+        with os.scandir(path) as entries:
             for entry in entries:
                 if entry.is_dir(follow_symlinks=False):
                     total += size_of(Path(entry.path))

@@ -6,6 +6,7 @@ grains. Their errors against the dearest pair are measured by ``orchestrator lad
 """
 
 import csv
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -57,10 +58,13 @@ class Rung:
 
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
     """A scene with some fields changed, named as in a study file."""
-    parts = {name: getattr(scene, name) for name in Scene.model_fields}
+    updates: dict[str, dict[str, Any]] = {}
     for key, value in changes.items():
         part, _, field = key.partition(".")
-        parts[part] = parts[part].model_copy(update={field: value})
+        updates.setdefault(part, {})[field] = value
+    parts = {name: getattr(scene, name) for name in Scene.model_fields}
+    for part, update in updates.items():
+        parts[part] = parts[part].model_copy(update=update)
     return Scene(**parts)
 
 
@@ -228,12 +232,11 @@ def choose(scene: Scene, tolerance: float, *, above: Mapping[Part, str] | None =
         # the closed form is exact for one grain in a held flow
         return changed(scene, {"protocol.method": "pivot"})
     least: Mapping[Part, str] = {"grains": "peeling"} if flies(scene) else {}
-    pairs = sorted(_pairs(scene, above or least), key=lambda pair: pair.cost)
-    within = (pair for pair in pairs if pair.error <= tolerance)
-    best = next(within, None) or min(pairs, key=lambda pair: pair.error, default=None)
-    if best is None or math.isinf(best.error):
-        return scene
-    return best.grains.of(best.flow.of(scene))
+    like = tuple((part, likeness(part, scene)) for part in LADDER)
+    fractions, beyond = tuple(scene.protocol.fractions), tuple((above or least).items())
+    for chosen in _cheapest(like, fractions, beyond, tolerance):
+        scene = chosen.of(scene)
+    return scene
 
 
 def is_open(scene: Scene) -> bool:
@@ -255,24 +258,40 @@ def meaning(part: Part, name: str) -> str:
     return next((one.meaning for one in LADDER[part] if one.name == name), "")
 
 
+@cache  # a study has thousands of scenes of a few kinds
+def _cheapest(
+    like: tuple[tuple[Part, str], ...],
+    fractions: tuple[float, ...],
+    above: tuple[tuple[Part, str], ...],
+    tolerance: float,
+) -> tuple[Rung, ...]:
+    """A rung for each part, the cheapest of those within; none where nothing is known."""
+    pairs = sorted(_pairs(like, fractions, dict(above)), key=lambda pair: pair.cost)
+    within = (pair for pair in pairs if pair.error <= tolerance)
+    best = next(within, None) or min(pairs, key=lambda pair: pair.error, default=None)
+    return () if best is None or math.isinf(best.error) else best.rungs
+
+
 @dataclass(frozen=True)
 class _Pair:
-    flow: Rung
-    grains: Rung
+    rungs: tuple[Rung, ...]
     error: float
     cost: float
 
 
-def _pairs(scene: Scene, above: Mapping[Part, str]) -> Iterator[_Pair]:
-    for flow in _open_rungs("flow", above):
-        for grains in _open_rungs("grains", above):
-            chosen: dict[Part, str] = {"flow": flow.name, "grains": grains.name}
-            at = [
-                [known_at(part, name, scene, fraction) for part, name in chosen.items()]
-                for fraction in scene.protocol.fractions
+def _pairs(
+    like: tuple[tuple[Part, str], ...], fractions: tuple[float, ...], above: Mapping[Part, str]
+) -> Iterator[_Pair]:
+    for pair in itertools.product(*(_open_rungs(part, above) for part, _ in like)):
+        at = [
+            [
+                _known_of(part, one.name, kind, fraction)
+                for one, (part, kind) in zip(pair, like, strict=True)
             ]
-            error = max(sum(one.error for one in both) for both in at)
-            yield _Pair(flow, grains, error, sum(one.cost_core_s for one in at[0]))
+            for fraction in fractions
+        ]
+        error = max(sum(one.error for one in both) for both in at)
+        yield _Pair(pair, error, sum(one.cost_core_s for one in at[0]))
 
 
 def _open_rungs(part: Part, above: Mapping[Part, str]) -> tuple[Rung, ...]:
@@ -283,7 +302,11 @@ def _open_rungs(part: Part, above: Mapping[Part, str]) -> tuple[Rung, ...]:
 
 def known_at(part: Part, name: str, scene: Scene, fraction: float) -> "Known":
     """What is known of a rung on a pile at a fraction; infinite errors where nothing is."""
-    rows = known().get((part, name, likeness(part, scene)), {})
+    return _known_of(part, name, likeness(part, scene), fraction)
+
+
+def _known_of(part: Part, name: str, like: str, fraction: float) -> "Known":
+    rows = known().get((part, name, like), {})
     if fraction in rows or not rows:
         return rows.get(fraction, UNKNOWN)
     # between the fractions that were measured the worst of them has to do

@@ -6,7 +6,7 @@ names; everything else is in SI units or, where the comment says so, in units of
 
 import re
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -26,6 +26,8 @@ Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+
+_threshold = cache(closures.threshold)  # thousands of scenes have the same grain
 
 
 class Part(BaseModel):
@@ -224,7 +226,7 @@ class Scene(Part):
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
-        return closures.threshold(closure, **self._exposed())
+        return _threshold(closure, **self._exposed())
 
     def _exposed(self) -> dict[str, float]:
         """All that the closed form depends on."""

@@ -1,10 +1,12 @@
 """How far a study came, read from its directory alone."""
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from orchestrator.case import DONE, failure
+from orchestrator.case import DONE, failure, size
 from orchestrator.files import read_json, size_of
 from orchestrator.workspace import Workspace
 
@@ -49,7 +51,8 @@ def read(directory: Path) -> Status:
     """
     space = Workspace(directory.absolute())
     about = space.description()
-    states = {str(name): _state(space.cases / str(name)) for name in about["cases"]}
+    markers = _markers(space)
+    states = {name: _state(space.cases / name, markers) for name in map(str, about["cases"])}
     return Status(
         name=str(about["name"]),
         running=space.is_held(),
@@ -58,17 +61,35 @@ def read(directory: Path) -> Status:
         waiting=_with(states, "waiting"),
         failed={name: failure(space.cases / name) or "" for name in _with(states, "failed")},
         page=space.page if space.drawn.is_file() and space.page.is_file() else None,
-        sizes=sizes(space),
+        sizes=_sizes(space, markers),
     )
 
 
 def sizes(space: Workspace) -> dict[str, int]:
-    """Bytes on disk, by the kind of case, and of tables, figures and page together."""
+    """Bytes on disk, by the kind of case, and of tables, figures and page together.
+
+    Those of a finished case are of the time when it ended, or was pruned.
+    """
+    return _sizes(space, _markers(space))
+
+
+Markers = dict[str, dict[str, Any]]
+"""What the markers of all directories of cases say, by name; empty where a case is not done."""
+
+
+def _markers(space: Workspace) -> Markers:
+    names = sorted(os.listdir(space.cases)) if space.cases.is_dir() else []
+    states = ((name, read_json(space.cases / name / DONE)) for name in names)
+    return {name: state if isinstance(state, dict) else {} for name, state in states}
+
+
+def _sizes(space: Workspace, markers: Markers) -> dict[str, int]:
     found: dict[str, int] = {}
-    for directory in sorted(space.cases.iterdir()) if space.cases.is_dir() else ():
-        kind = f"{directory.name.partition('-')[0]} cases"
-        found[kind] = found.get(kind, 0) + size_of(directory)
-    found["tables, figures and page"] = size_of(space.root) - sum(found.values())
+    for name, state in markers.items():
+        kind = f"{name.partition('-')[0]} cases"
+        found[kind] = found.get(kind, 0) + size(space.cases / name, state)
+    beside = (path for path in space.root.iterdir() if path != space.cases)
+    found["tables, figures and page"] = sum(map(size_of, beside))
     return found
 
 
@@ -76,12 +97,12 @@ def _with(states: dict[str, str], wanted: str) -> tuple[str, ...]:
     return tuple(name for name, state in states.items() if state == wanted)
 
 
-def _state(directory: Path) -> str:
-    if isinstance(read_json(directory / DONE), dict):
+def _state(directory: Path, markers: Markers) -> str:
+    if directory.name not in markers:
+        return "waiting"
+    if markers[directory.name]:
         return "done"
-    if failure(directory) is not None:
-        return "failed"
-    return "unfinished" if directory.is_dir() else "waiting"
+    return "unfinished" if failure(directory) is None else "failed"
 
 
 def text(status: Status) -> str:
