@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+import meshio
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
@@ -15,7 +16,6 @@ from orchestrator.report import captions, flow_picture, stress, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.flow_field import Window
 from orchestrator.report.results import Results
-from orchestrator.solvers.openfoam import read_last_time
 
 FloatArray = NDArray[np.float64]
 
@@ -35,16 +35,13 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def read_edges(case: Path) -> FloatArray:
     """The edges of a mesh one cell deep, seen across the flow: x and z of ends, (E, 2, 2), m."""
-    _, cells = read_last_time(case, "bed", ["U"])
-    points = np.asarray(cells.points, float)
-    front = points[:, 1] < points[:, 1].mean()
-    corners = cells.cell_connectivity.reshape(-1, 8)
-    # of VTK's hexahedron: around the one face, around the other, and from one to the other
-    across = ((0, 4), (1, 5), (2, 6), (3, 7))
-    around = [*pairwise((0, 1, 2, 3, 0)), *pairwise((4, 5, 6, 7, 4)), *across]
-    ends = np.concatenate([corners[:, list(pair)] for pair in around])
-    seen = np.unique(np.sort(ends[front[ends].all(axis=1)], axis=1), axis=0)
-    return np.asarray(points[seen][:, :, [0, 2]])
+    mesh = meshio.read(case / "pile.msh")
+    front = mesh.points[:, 1] < mesh.points[:, 1].mean()
+    corners = mesh.cells_dict["quad"]
+    side = corners[front[corners].all(axis=1)]
+    ends = np.concatenate([side[:, list(pair)] for pair in pairwise((0, 1, 2, 3, 0))])
+    seen = np.unique(np.sort(ends, axis=1), axis=0)
+    return np.asarray(mesh.points[seen][:, :, [0, 2]])
 
 
 def _frame(pile: PileCase, edges: FloatArray) -> Canvas:
