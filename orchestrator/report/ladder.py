@@ -32,6 +32,8 @@ MEASURED: Look = {"fc": "#0072b2", "ec": "#0072b2", "lw": 0.8}
 EXTRAPOLATED: Look = {"fc": "white", "ec": "#0072b2", "lw": 0.8, "hatch": "////"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
 RUNG = ["flow_rung", "grain_rung"]
+METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
+"""How the grains were answered; colours that are told apart by all."""
 UNITS = {"years": 3.156e7, "days": 86400.0, "h": 3600.0, "min": 60.0}
 NOTHING = "no rung has been run"
 
@@ -51,7 +53,7 @@ def against_cost(rungs: pd.DataFrame) -> Canvas:
     """
     table = _marked(rungs)
     parts = [_worst(part) for _, part in split(table, "packing")]
-    figure = style.canvas(2.6 * len(parts) + 1.0)
+    figure = style.canvas(2.6 * len(parts) + 0.06 * table["number"].nunique() + 1.0)
     axes = list(figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0])
     for ax, part in zip(axes, parts, strict=False):
         _points(ax, part)
@@ -64,10 +66,10 @@ def against_cost(rungs: pd.DataFrame) -> Canvas:
     _scales(axes, axes, parts)
     front = [Line2D([], [], label="no rung is cheaper and better", **FRONT)]
     looks = [*_look_entries(parts), *(front if table["pareto"].any() else [])]
-    style.legends(figure, _flow_entries(table), looks)
+    style.legends(figure, _method_entries(table), [*_key(table), *looks])
     figure.draw_without_rendering()  # tags are written into a finished layout
     for ax, part in zip(axes, parts, strict=False):
-        _write_tags(ax, part, 6.0, named=True)
+        _write_tags(ax, part, 6.0, part["pareto"])
     return figure
 
 
@@ -91,10 +93,10 @@ def by_fraction(rungs: pd.DataFrame) -> Canvas:
         ax.set_title(head)
     grid[-1, 2].set_xlabel("cost, s of one core")
     _scales(list(grid.ravel()), list(grid[:, -1]), parts)
-    style.legends(figure, _flow_entries(table), [*_key(table), *_look_entries(parts)])
+    style.legends(figure, _method_entries(table), [*_key(table), *_look_entries(parts)])
     figure.draw_without_rendering()
     for ax, part in zip(grid.ravel(), parts, strict=False):
-        _write_tags(ax, part, 5.5, named=False)
+        _write_tags(ax, part, 5.5)
     return figure
 
 
@@ -151,14 +153,12 @@ def _rounded(value: float) -> str:
 
 
 def _marked(rungs: pd.DataFrame) -> pd.DataFrame:
-    """With a number, a name and a colour for each rung, in the order in which they come."""
-    flows = list(dict.fromkeys(rungs["flow_rung"]))
-    colours = dict(zip(flows, style.palette("d_m", range(len(flows))).values(), strict=True))
+    """With a number and a name for each rung, in the order in which they come, and its method."""
     parts = [column for column in RUNG if rungs[column].nunique() > 1] or RUNG[-1:]
     return rungs.assign(
         number=rungs.groupby(RUNG, sort=False).ngroup() + 1,
         name=rungs[parts].astype(str).agg(", ".join, axis=1) if len(rungs) else "",
-        colour=rungs["flow_rung"].map(colours),
+        method=[name if name in METHODS else "DEM" for name in rungs["grain_rung"]],
     )
 
 
@@ -195,9 +195,10 @@ def _points(ax: Axes, rows: pd.DataFrame) -> None:
     shown = _shown(rows)
     for _, own in split(shown, "number"):
         ax.plot(own["x"], own["y"], color="0.75", lw=0.6, zorder=1, gid="rung")
-    for (colour, marker, same, worst), own in split(
-        shown, "colour", "marker", "same_model", "worst"
+    for (method, marker, same, worst), own in split(
+        shown, "method", "marker", "same_model", "worst"
     ):
+        colour = METHODS[str(method)]
         look: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
         alpha = 1.0 if worst else 0.45
         ax.plot(
@@ -264,26 +265,36 @@ def _empty(ax: Axes) -> None:
     ax.set(xticks=[], yticks=[])
 
 
-def _write_tags(ax: Axes, rows: pd.DataFrame, size: float, *, named: bool) -> None:
-    shown = _shown(rows)
-    worst = shown[shown["worst"]].drop_duplicates("number").sort_values("x")
+def _write_tags(
+    ax: Axes, rows: pd.DataFrame, size: float, named: "pd.Series | None" = None
+) -> None:
+    """Number the rungs, and name some."""
+    shown = _shown(rows.assign(named=False if named is None else named))
+    worst = shown[shown["worst"]].drop_duplicates("number")
+    # the long ones first: the short ones fit in between
+    worst = worst.sort_values(["named", "x"], ascending=[False, True])
     written = [
-        Tag(f"{row.number}: {row.name}" if named else str(row.number), row.x, row.y, row.colour)
+        Tag(
+            f"{row.number}: {row.name}" if row.named else str(row.number),
+            row.x,
+            row.y,
+            METHODS[row.method],
+        )
         for row in _each(worst)
     ]
     tags.write(ax, written, shown[["x", "y"]].to_numpy(float), size)
 
 
-def _flow_entries(table: pd.DataFrame) -> list[Artist]:
-    first = table.drop_duplicates("flow_rung")
-    return [style.entry(row.flow_rung, row.colour) for row in _each(first)]
+def _method_entries(table: pd.DataFrame) -> list[Artist]:
+    used = set(table["method"])
+    return [style.entry(name, colour) for name, colour in METHODS.items() if name in used]
 
 
 def _key(table: pd.DataFrame) -> list[Artist]:
     first = table.drop_duplicates("number")
     return [
-        Line2D([], [], ls="", marker=f"${row.number}$", color=row.colour, ms=5, label=row.name)
-        for row in _each(first)
+        Line2D([], [], ls="", marker=f"${r.number}$", ms=5, label=r.name, color=METHODS[r.method])
+        for r in _each(first)
     ]
 
 
