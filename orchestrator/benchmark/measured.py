@@ -167,7 +167,7 @@ def _grains(one: Answered) -> pd.DataFrame:
             "d_m": scene.grain.diameter,
             "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
             "slope_deg": np.where(forced, slope, np.nan),
-            "ustar_over_ustar0": np.where(forced, one.pile._speed(one.cases), np.nan),
+            "ustar_over_ustar0": np.where(forced, one.pile.ustar_over_ustar0(one.cases), np.nan),
         }
     )
 

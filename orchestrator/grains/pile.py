@@ -152,7 +152,7 @@ class PileCase(GrainCase):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the holds of the protocol."""
-        speed = self._speed(cases)
+        speed = self.ustar_over_ustar0(cases)
         rules = self.scene.protocol
         thresholds = np.sort(self._peeled(speed))
         if not 0 < thresholds[0] < np.inf or self.scene.flow.forced != "exposed":
@@ -181,7 +181,7 @@ class PileCase(GrainCase):
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
-        grains = self._grains(self._speed(directory.parent))
+        grains = self._grains(self.ustar_over_ustar0(directory.parent))
         grain = self.scene.grain
         rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
         found = motion.read(directory, grains, self.scene.protocol.marker)
@@ -194,7 +194,7 @@ class PileCase(GrainCase):
         """
         if self.scene.protocol.method == "dem":
             return Motion.from_csv(cases / self.name)
-        speed = self._speed(cases)
+        speed = self.ustar_over_ustar0(cases)
         if self.scene.protocol.method == "pivot":
             return Motion.of_flows(self._alone(speed[self.packing.windward]))
         return Motion.of_flows(self._peeled(speed))
@@ -218,7 +218,7 @@ class PileCase(GrainCase):
         return Face(
             ids=np.flatnonzero(chosen) + 1,
             arc_length=self.packing.arc_length[chosen] * self.scene.grain.diameter,
-            speed=self._speed(cases)[chosen],
+            speed=self.ustar_over_ustar0(cases)[chosen],
         )
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
@@ -249,8 +249,14 @@ class PileCase(GrainCase):
             case "solve":
                 return WallStress.from_csv(cases / self.flow.name / WALL_STRESS)
 
-    def _speed(self, cases: Path) -> FloatArray:
-        """Signed friction velocity that drives each grain over the undisturbed one."""
+    def ustar_over_ustar0(self, cases: Path) -> FloatArray:
+        """Signed friction velocity that drives each grain over the undisturbed one.
+
+        Parameters
+        ----------
+        cases : Path
+            Holds the finished flow case; positive is downstream.
+        """
         flow, d = self.scene.flow, self.scene.grain.diameter
         length = max(d, flow.average * self.bed.height)
         tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)
