@@ -79,7 +79,7 @@ class Ours:
         told = self.pack.scenes[name]
         kind = told["kind"]
         if kind in ("collision", "incline", "sliding"):
-            return self._check(kind, told)
+            return check(kind, told, self.root / "checks")
         scene = self._scene(name.partition("-")[2], kind)
         asked = replace(self.study, groups=(Group("benchmark", (scene,)),))
         planned = plan.make(asked)
@@ -133,32 +133,50 @@ class Ours:
             engine.execute(one, self.root, LIMIT_S, threading.Event())
         return Took(sum(_seconds(one, self.root) for one in cases), _cpu_s() - before)
 
-    def _check(self, kind: str, told: Mapping[str, Any]) -> Given:
-        """Run one of the decks for the contact law."""
-        folder = self.root / "checks"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(assets.templates() / "liggghts", folder)
+
+def check(kind: str, told: Mapping[str, Any], folder: Path) -> Given:
+    """Run one of the decks for the contact law.
+
+    Parameters
+    ----------
+    kind : str
+        ``collision``, ``incline`` or ``sliding``.
+    told : mapping
+        The parameters of the scene.
+    folder : Path
+        Where it runs; what is there is removed.
+
+    Raises
+    ------
+    SolverError
+        If it did not come to its end.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(assets.templates() / "liggghts", folder)
+    command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
+    for name, value in _variables(kind, told).items():
+        command += ["-var", name, repr(value)]
+    log, before = folder / "log.check", _cpu_s()
+    ended = process.run(
+        command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
+    )
+    said = log.read_text(errors="replace")
+    if ended.returncode != 0 or "the check has ended" not in said:
+        raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
+    found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
+    rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
+    took = Took(ended.seconds, _cpu_s() - before)
+    return pd.DataFrame(rows, columns=["quantity", "at", "value"]), took
+
+
+def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
+    own = {"damping": told["damping"], "timestep": told["timestep"]}
+    if kind == "incline":
+        own["incline"] = told["incline_deg"]
+    if kind == "sliding":
         unit = np.sqrt(told["d_m"] * told["reduced_gravity_m_s2"])
-        variables = {"damping": told["damping"], "timestep": told["timestep"]}
-        if kind == "incline":
-            variables["incline"] = told["incline_deg"]
-        if kind == "sliding":
-            variables["speed"] = float(told["speed_m_s"] / unit)
-        command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
-        for name, value in variables.items():
-            command += ["-var", name, repr(value)]
-        log, before = folder / "log.check", _cpu_s()
-        ended = process.run(
-            command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
-        )
-        said = log.read_text(errors="replace")
-        if ended.returncode != 0 or "the check has ended" not in said:
-            raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
-        found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
-        rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
-        return pd.DataFrame(rows, columns=["quantity", "at", "value"]), Took(
-            ended.seconds, _cpu_s() - before
-        )
+        own["speed"] = float(told["speed_m_s"] / unit)
+    return own
 
 
 def _given(problem: Problem) -> pd.DataFrame:
