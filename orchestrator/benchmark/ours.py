@@ -15,6 +15,7 @@ import pandas as pd
 
 from orchestrator import assets, engine, plan, study, tables
 from orchestrator.benchmark import exact, measured
+from orchestrator.benchmark.answer import STEPS
 from orchestrator.benchmark.measured import Answered
 from orchestrator.benchmark.pack import STUDY, Pack
 from orchestrator.benchmark.problem import Problem
@@ -123,7 +124,7 @@ class Ours:
         if kind == "flow":
             return _given(measured.flow(one)), flow_took
         if kind == "pile":
-            return _given(measured.pile(one)), pile_took
+            return _with_steps(_given(measured.pile(one)), self.root / pile.name), pile_took
         return _given(measured.line(one)), flow_took + pile_took
 
     def _run(self, *cases: Case) -> Took:
@@ -181,6 +182,13 @@ def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
 
 def _given(problem: Problem) -> pd.DataFrame:
     return problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
+
+
+def _with_steps(given: pd.DataFrame, case: Path) -> pd.DataFrame:
+    """With the time steps of the run: those of the last look at the grains."""
+    steps = pd.read_csv(case / "levels.csv")["step"].iloc[-1]
+    row = dict(zip(given.columns, (*STEPS, float(steps)), strict=True))
+    return pd.concat([given, pd.DataFrame([row])], ignore_index=True)
 
 
 def _cpu_s() -> float:
