@@ -16,8 +16,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import door
 
-# one process needs no MPI daemon and no search for fast networks, which take 0.3 s, and no directory
-# that all such processes of a user share: one removes it while another starts
+# one process needs no MPI daemon and no search for fast networks, which take 0.3 s, and no
+# directory that all such processes of a user share: one removes it while another starts
 ENVIRONMENT = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_orte_create_session_dirs": "0",

@@ -26,7 +26,7 @@ def thresholds(pack: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
                 one.name: _marked(one.rows["found"][asked.index], asked)
                 for one in (ours(contenders), *contenders)
             },
-            "interval": [f"{low:.3g} ... {high:.3g}" for low, high in ends],
+            "interval": [f"{low:#.3g} ... {high:#.3g}" for low, high in ends],
         }
     )
 
@@ -35,7 +35,7 @@ def _marked(found: "pd.Series[float]", expected: pd.DataFrame) -> list[str]:
     inside, tolerated = (within(found, expected, t) for t in (0.0, expected["tolerance"]))
     marks = np.select([found.isna() | inside, tolerated], ["", " *"], " **")
     return [
-        "—" if x != x else f"{x:.3g}{mark}" for x, mark in zip(found.tolist(), marks, strict=True)
+        "—" if x != x else f"{x:#.3g}{mark}" for x, mark in zip(found.tolist(), marks, strict=True)
     ]
 
 

@@ -19,8 +19,8 @@ ENVIRONMENT = {
 }
 """One process needs no MPI daemon: without the first a run starts one, and waits 5 s for the name
 of a machine that resolves nowhere; without the last it looks for fast networks for 0.2 s. Without
-the second all such processes of a user share a directory, and one may remove it while another starts:
-of 2000 short runs, four at a time, 16 failed."""
+the second all such processes of a user share a directory, which one may remove while another
+starts: of 2000 short runs, four at a time, 16 failed."""
 LAST_WORDS = "the protocol has ended"
 
 
