@@ -112,11 +112,13 @@ class _Answer:
         return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
 
 
-def write(case, out, answer):
-    """Write the answer to each question of a scene."""
+def write(case, out, answer, steps=None):
+    """Write the answer to each question of a scene, and how many time steps it took if known."""
     with out.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(["quantity", "at", "value"])
         for asked in table(case / "ask.csv"):
             quantity, at = asked["quantity"], asked["at"]
             writer.writerow([quantity, at, repr(float(answer(quantity, at)))])
+        if steps is not None:
+            writer.writerow(["steps", "", steps])

@@ -219,7 +219,7 @@ def main(case, out):
     if scene["kind"] not in KINDS:
         print(f"YADE is not asked for the kind {scene['kind']}", file=sys.stderr)
         return 2
-    door.write(case, out, KINDS[scene["kind"]](scene, case))
+    door.write(case, out, KINDS[scene["kind"]](scene, case), O.iter)
     return 0
 
 

@@ -14,6 +14,8 @@ COLUMNS = ("quantity", "at", "value")
 FILE = "answer.csv"
 Key = tuple[str, str]
 """Quantity, and the text of its `at` with seven digits."""
+STEPS: Key = ("steps", "")
+"""What a solver may add to any answer: how many time steps it took."""
 
 
 class AnswerError(OrchestratorError):

@@ -1,17 +1,17 @@
-"""The figures of a comparison: the solver's answers over the expected ones."""
+"""The figures of a comparison: the solvers' answers over the expected ones."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator import curves
 from orchestrator.benchmark.pack import Pack
-from orchestrator.benchmark.verdict import COUNTS, Verdict
+from orchestrator.benchmark.verdict import Contender, ours
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
 
@@ -19,23 +19,45 @@ PANELS = 6
 """Most scenes of a kind that are drawn; they are spread over the pack."""
 FLOOR = 1e-6
 """Least error that a logarithmic axis shows: exact formulas and reruns have less."""
-EXPECTED, SOLVER = "0.25", "#d55e00"
-LEVELS = {1: "#0072b2", 2: "#009e73", 3: "#56b4e9", 4: "#d55e00", 5: "#cc79a7"}
+EXPECTED = "0.25"
+"""Colour of what is expected, and of ours."""
+LEVELS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
+"""Markers."""
+Answers = Sequence[tuple["pd.Series[float]", style.Look]]
+"""Each solver's numbers, and how they look."""
+Panel = Callable[[Axes, pd.DataFrame, Answers], None]
+"""Draws a scene: what is expected, and the answers."""
 
 
-def draw(pack: Pack, verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Iterator[Figure]:
-    """The figures for which there are answers."""
-    answered = rows[rows["found"].notna()]
-    found = {"flow": _along_bed, "pile": _moved, "line": _moved}
-    for kind, panel in found.items():
-        names = [v.scene for v in verdicts if v.kind == kind]
-        drawn = [name for name in names if name in set(answered["scene"])]
+def beds(pack: Pack, contenders: Sequence[Contender]) -> Iterator[Figure]:
+    """The figures of flows and piles for which there are answers."""
+    panels: Mapping[str, Panel] = {"flow": _along_bed, "pile": _moved, "line": _moved}
+    for kind, panel in panels.items():
+        names = [v.scene for v in contenders[0].verdicts if v.kind == kind]
+        drawn = [name for name in names if name in _answered(contenders)]
         if drawn:
-            yield _panels(pack, answered, kind, drawn, panel)
-    if (answered["quantity"] == "shields").any():
-        yield _shields(pack, answered)
-    if any(v.seconds > 0 and v.worst == v.worst for v in verdicts):
-        yield _speed(verdicts, rows)
+            yield _panels(pack, contenders, kind, drawn, panel)
+    if (contenders[0].rows["quantity"] == "shields").any():
+        yield _shields(pack, contenders)
+
+
+def _answered(contenders: Sequence[Contender]) -> set[str]:
+    return {name for one in contenders for name in one.rows["scene"][one.rows["found"].notna()]}
+
+
+def _looks(contenders: Sequence[Contender]) -> list[style.Look]:
+    """A colour for each solver, and rings one in the other: equal answers hide none."""
+    colours = style.palette("d_m", range(len(contenders))).values()
+    sizes = range(2 * len(contenders), 0, -2)
+    return [
+        {"color": colour, "ms": size, "mfc": "none", "mew": 0.7}
+        for colour, size in zip(colours, sizes, strict=True)
+    ]
+
+
+def _names(contenders: Sequence[Contender]) -> list[Artist]:
+    looks = zip(contenders, _looks(contenders), strict=True)
+    return [style.entry(one.name, look["color"]) for one, look in looks]
 
 
 TITLES = {
@@ -45,129 +67,121 @@ TITLES = {
 }
 
 
-def _panels(pack: Pack, rows: pd.DataFrame, kind: str, names: Sequence[str], panel: Any) -> Figure:
+def _panels(
+    pack: Pack, contenders: Sequence[Contender], kind: str, names: Sequence[str], panel: Panel
+) -> Figure:
     chosen = [names[i] for i in np.unique(np.linspace(0, len(names) - 1, PANELS).astype(int))]
     columns = min(len(chosen), 3)
     lines = -(-len(chosen) // columns)
-    canvas = style.canvas(0.4 + 2.0 * lines)
+    canvas = style.canvas(0.6 + 2.0 * lines)
     axes = np.atleast_1d(canvas.subplots(lines, columns, squeeze=False)).ravel()
     for ax, name in zip(axes, chosen, strict=False):
-        panel(ax, rows[rows["scene"] == name])
-        told = pack.scenes[name]
-        size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
-        ax.set_title(f"{name}: {told['alpha_deg']:g}°, {size}", size=6.5)
+        rows = contenders[0].rows[contenders[0].rows["scene"] == name]
+        found = [one.rows["found"][rows.index] for one in contenders]
+        panel(ax, rows, list(zip(found, _looks(contenders), strict=True)))
+        ax.set_title(f"{name}\n{pack.about(name)}", size=6.5)
     for ax in axes[len(chosen) :]:
         ax.remove()
-    style.legends(canvas, [], _legend())
+    expected = Line2D([], [], color=EXPECTED, label="expected, interval")
+    style.legends(canvas, [*_names(contenders), expected], [])
     stem, title = TITLES[kind]
     caption = (
         f"{len(chosen)} of {len(names)} scenes. The line and its band are the expected answer and"
-        " its interval, the points are the solver's."
+        " its interval, the rings are the solvers'."
     )
     return Figure(stem, title, caption, (), canvas)
 
 
-def _legend() -> list[Line2D]:
-    return [
-        Line2D([], [], color=EXPECTED, label="expected"),
-        Line2D([], [], color=SOLVER, marker="o", ls="none", ms=3, label="solver"),
-    ]
-
-
-def _along_bed(ax: Axes, rows: pd.DataFrame) -> None:
+def _along_bed(ax: Axes, rows: pd.DataFrame, answers: Answers) -> None:
     here = rows[rows["quantity"] == "ustar_over_ustar0"]
     s = here["at"].astype(float)
     ax.plot(s, here["value"], color=EXPECTED)
-    ax.plot(s, here["found"], "o", color=SOLVER, ms=2)
+    for found, look in answers:
+        ax.plot(s, found[here.index], "o", **look)
     ax.set(xlim=(-3, 12), xlabel="s/h", ylabel="u*/u*₀")
 
 
-def _moved(ax: Axes, rows: pd.DataFrame) -> None:
+def _moved(ax: Axes, rows: pd.DataFrame, answers: Answers) -> None:
     here = rows[rows["quantity"] == "moved"]
     hold = here["at"].astype(float)
     rest = rows[rows["quantity"] == "not_moved"]["value"].iloc[-1]
     total = here["value"].iloc[-1] + rest
     ax.fill_between(hold, here["low"] / total, here["high"] / total, color="0.85", lw=0)
     ax.plot(hold, here["value"] / total, color=EXPECTED)
-    ax.plot(hold, here["found"] / total, "o", color=SOLVER, ms=2)
+    for found, look in answers:
+        ax.plot(hold, found[here.index] / total, "o", **look)
     ax.set(ylim=(0, 1), xlabel="hold", ylabel="n/N")
 
 
-def _shields(pack: Pack, rows: pd.DataFrame) -> Figure:
+def _shields(pack: Pack, contenders: Sequence[Contender]) -> Figure:
+    rows = contenders[0].rows
     here = rows[rows["quantity"] == "shields"]
     told = [pack.scenes[name] for name in here["scene"]]
     # of theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu
     unit = np.array([_velocity(one) * one["d_m"] / one["nu_m2_s"] for one in told])
     level = np.array([one["level"] for one in told])
-    canvas = style.canvas(3.6)
+    canvas = style.canvas(3.8)
     ax = canvas.subplots()
     for curve in curves.WATER:
         x, y = curve.points()
         ax.plot(x, y, color=style.WATER, lw=0.8)
-    for one in sorted(set(level)):
-        chosen = here[level == one]
-        scale = unit[level == one]
-        theta = chosen["value"].to_numpy(float)
-        spread = np.abs(chosen[["low", "high"]].to_numpy(float).T - theta)
-        x = scale * np.sqrt(theta)
-        ax.errorbar(x, theta, spread, fmt="o", color=LEVELS[one], mfc="none", ms=5, lw=0.6, mew=0.6)
-        found = chosen["found"].to_numpy(float)
-        found = np.where(found > 0, found, np.nan)
-        ax.plot(scale * np.sqrt(found), found, "x", color=LEVELS[one], ms=3, mew=0.8)
-    ax.set(xscale="log", yscale="log", xlabel=labels.RE_AXIS, ylabel=labels.TAU_AXIS)
     theta = here["value"].to_numpy(float)
+    spread = np.abs(here[["low", "high"]].to_numpy(float).T - theta)
+    ax.errorbar(unit * np.sqrt(theta), theta, spread, fmt="none", ecolor=EXPECTED, elinewidth=0.7)
+    for one, look in zip(contenders, _looks(contenders), strict=True):
+        found = one.rows["found"][here.index].to_numpy(float)
+        found = np.where(found > 0, found, np.nan)
+        for number in sorted(set(level)):
+            at = level == number
+            ax.plot(unit[at] * np.sqrt(found[at]), found[at], LEVELS[number], **look)
+    ax.set(xscale="log", yscale="log", xlabel=labels.RE_AXIS, ylabel=labels.TAU_AXIS)
     reynolds = unit * np.sqrt(theta)
     ax.set_xlim(reynolds.min() / 3, reynolds.max() * 3)
     ax.set_ylim(min(theta.min(), 0.02) / 2, max(theta.max(), 0.2) * 2)
     style.plain_ticks(ax.xaxis)
     style.plain_ticks(ax.yaxis)
-    samples = [style.entry(f"level {one}", LEVELS[one]) for one in sorted(set(level))]
-    marks = [
-        Line2D([], [], color="0.3", marker="o", mfc="none", ls="none", label="expected, interval"),
-        Line2D([], [], color="0.3", marker="x", ls="none", label="solver"),
-        Line2D([], [], color=style.WATER, label="curves for water"),
-    ]
-    style.legends(canvas, samples, marks)
-    caption = "Thresholds in the Shields diagram: rings are expected, crosses are the solver's."
+    expected = style.entry("expected, interval", EXPECTED)
+    water = Line2D([], [], color=style.WATER, label="curves for water")
+    style.legends(canvas, [*_names(contenders), expected], [*_level_entries(level), water])
+    caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
     return Figure("shields", "Thresholds", caption, (), canvas)
 
 
-def _velocity(told: Any) -> float:
+def _velocity(told: Mapping[str, Any]) -> float:
     """The u* at which theta is 1, m/s."""
     excess = (told["rho_sol_kg_m3"] - told["rho_f_kg_m3"]) * told["g_m_s2"] * told["d_m"]
     return float(np.sqrt(excess / told["rho_f_kg_m3"]))
 
 
-def _speed(verdicts: Sequence[Verdict], rows: pd.DataFrame) -> Figure:
-    canvas: Canvas = style.canvas(3.4)
-    ax = canvas.subplots()
-    ours = _our_errors(rows)
-    used = sorted({one.level for one in verdicts})
-    for level in used:
-        of = [one for one in verdicts if one.level == level]
-        x = [one.seconds for one in of]
-        y = [max(one.worst, FLOOR) if one.worst == one.worst else np.nan for one in of]
-        ax.plot(x, y, "o", color=LEVELS[level], ms=3.5)
-        x = [one.ours_seconds for one in of]
-        y = [max(ours.get(one.scene, np.nan), FLOOR) for one in of]
-        ax.plot(x, y, "o", color=LEVELS[level], mfc="none", ms=4.5, mew=0.7)
-    ax.set(xscale="log", yscale="log", xlabel="wall time of a scene, s", ylabel="largest error")
-    style.plain_ticks(ax.xaxis)
-    marks = [
-        Line2D([], [], color="0.3", marker="o", ls="none", label="solver"),
-        Line2D([], [], color="0.3", marker="o", mfc="none", ls="none", label="ours"),
+def _level_entries(levels: Any) -> list[Artist]:
+    return [
+        Line2D([], [], color="0.3", marker=LEVELS[n], mfc="none", ls="none", label=f"level {n}")
+        for n in sorted(set(levels))
     ]
-    style.legends(canvas, [style.entry(f"level {n}", LEVELS[n]) for n in used], marks)
+
+
+def speed(contenders: Sequence[Contender]) -> Iterator[Figure]:
+    """Error against CPU time, each solver's and ours, where times are known."""
+    verdicts = [v for one in contenders for v in one.verdicts]
+    if not any(v.cpu_s > 0 and v.worst == v.worst for v in verdicts):
+        return
+    levels = sorted({v.level for v in verdicts})
+    canvas = style.canvas(3.8)
+    ax = canvas.subplots()
+    own: style.Look = {"color": EXPECTED, "ms": 3, "mew": 0.7}
+    looks = [own, *({**look, "ms": 4} for look in _looks(contenders))]
+    for one, look in zip((ours(contenders), *contenders), looks, strict=True):
+        for level in levels:
+            of = [v for v in one.verdicts if v.level == level]
+            error = [max(v.worst, FLOOR) if v.worst == v.worst else np.nan for v in of]
+            ax.plot([v.cpu_s for v in of], error, LEVELS[level], **look)
+    ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
+    style.plain_ticks(ax.xaxis)
+    names = [style.entry("ours", EXPECTED), *_names(contenders)]
+    style.legends(canvas, names, _level_entries(levels))
     caption = (
-        "Each point is a scene: wall time, and largest relative error of its judged numbers. Errors"
-        f" below {FLOOR:g} are drawn there: at levels 3 to 5 the expected answer is our own run."
+        "Each point is a scene: CPU time, and largest relative error of its judged numbers; ours is"
+        f" filled. Errors below {FLOOR:g} are drawn there: at levels 3 to 5 the expected answer is"
+        " our own run."
     )
-    return Figure("speed-accuracy", "Time and error", caption, (), canvas)
-
-
-def _our_errors(rows: pd.DataFrame) -> dict[str, float]:
-    judged = rows[rows["tolerance"].notna() & rows["ours"].notna()]
-    judged = judged[~judged["quantity"].isin(COUNTS)]
-    value = judged["value"].replace(0, 1)
-    error = ((judged["ours"] - judged["value"]) / value).abs()
-    return {str(name): float(e) for name, e in error.groupby(judged["scene"]).max().items()}
+    yield Figure("speed-accuracy", "Speed and accuracy", caption, (), canvas)

@@ -52,9 +52,23 @@ def _add_run(parts: Any) -> None:
 
 
 def _add_compare(parts: Any) -> None:
-    command = parts.add_parser("compare", help="the same for answers that are there already")
+    command = parts.add_parser(
+        "compare", help="the same for answers that are there already, of one solver or several"
+    )
     command.add_argument("pack", type=Path, metavar="PACK")
-    command.add_argument("results", type=Path, metavar="RESULTS", help="holds SCENE/answer.csv")
+    command.add_argument(
+        "results",
+        type=Path,
+        nargs="+",
+        metavar="RESULTS",
+        help="holds SCENE/answer.csv; its name is the solver's",
+    )
+    command.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="of the page; default: the only RESULTS, or results/benchmark-NAME of the pack",
+    )
     _add_choice(command)
     command.set_defaults(run=_compare)
 
@@ -92,7 +106,7 @@ def _export(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     from orchestrator.benchmark import runner
 
-    out = options.out or Path("results") / f"benchmark-{options.pack.absolute().name}"
+    out = options.out or _usual(options.pack)
     choice = runner.Choice(options.level, options.scene)
     return _end(runner.run(options.pack, options.solver, out, choice, options.limit))
 
@@ -100,8 +114,14 @@ def _run(options: argparse.Namespace) -> int:
 def _compare(options: argparse.Namespace) -> int:
     from orchestrator.benchmark import runner
 
+    alone = options.results[0] if len(options.results) == 1 else None
+    out = options.out or alone or _usual(options.pack)
     choice = runner.Choice(options.level, options.scene)
-    return _end(runner.compare(options.pack, options.results, choice))
+    return _end(runner.compare(options.pack, options.results, out, choice))
+
+
+def _usual(pack: Path) -> Path:
+    return Path("results") / f"benchmark-{pack.absolute().name}"
 
 
 def _end(found: Any) -> int:

@@ -1,5 +1,6 @@
 """Levels 1 and 2: scenes whose answers are formulas."""
 
+import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -38,6 +39,7 @@ LEAST_QUIET = 5.0
 
 def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
+    started = time.perf_counter()
     drag, lift = scene.powers()
     found = scene.closed_form(scene.closure)
     flows = [float(f"{x * float(found.friction_velocity):.4g}") for x in FLOWS]
@@ -50,8 +52,9 @@ def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
         "shields": found.shields,
     }
     rows += [exact(name, float(value), FORMULA) for name, value in thresholds.items()]
+    seconds = time.perf_counter() - started
     asked = expectations(rows).assign(ours=lambda table: table["value"])
-    return Problem(1, scene.id, "closed-form", parameters(scene, row), {}, asked)
+    return Problem(1, scene.id, "closed-form", parameters(scene, row), {}, asked, seconds)
 
 
 def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> Problem:

@@ -167,7 +167,7 @@ def _grains(one: Answered) -> pd.DataFrame:
             "d_m": scene.grain.diameter,
             "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
             "slope_deg": np.where(forced, slope, np.nan),
-            "ustar_over_ustar0": np.where(forced, one.pile._speed(one.cases), np.nan),
+            "ustar_over_ustar0": np.where(forced, one.pile.ustar_over_ustar0(one.cases), np.nan),
         }
     )
 
@@ -175,7 +175,8 @@ def _grains(one: Answered) -> pd.DataFrame:
 def _pile_rows(one: Answered, tolerance: float) -> Iterator[Row]:
     yield from _count_rows(one.curve)
     ustar0 = one.curve["ustar0_m_s"].to_numpy(float)
-    for row in one.thresholds.dropna(subset="shields").to_dict("records"):
+    used = ["fraction", "ustar0_m_s", "shields", "shields_low", "shields_high"]
+    for row in one.thresholds[used].dropna(subset="shields").to_dict("records"):
         at, shields, flow = place(row["fraction"]), row["shields"], row["ustar0_m_s"]
         interval = row["shields_low"], row["shields_high"]
         yield expected("shields", at, shields, interval, tolerance, shields)

@@ -15,6 +15,7 @@ import pandas as pd
 
 from orchestrator import assets, engine, plan, study, tables
 from orchestrator.benchmark import exact, measured
+from orchestrator.benchmark.answer import STEPS
 from orchestrator.benchmark.measured import Answered
 from orchestrator.benchmark.pack import STUDY, Pack
 from orchestrator.benchmark.problem import Problem
@@ -79,7 +80,7 @@ class Ours:
         told = self.pack.scenes[name]
         kind = told["kind"]
         if kind in ("collision", "incline", "sliding"):
-            return self._check(kind, told)
+            return check(kind, told, self.root / "checks")
         scene = self._scene(name.partition("-")[2], kind)
         asked = replace(self.study, groups=(Group("benchmark", (scene,)),))
         planned = plan.make(asked)
@@ -123,7 +124,7 @@ class Ours:
         if kind == "flow":
             return _given(measured.flow(one)), flow_took
         if kind == "pile":
-            return _given(measured.pile(one)), pile_took
+            return _with_steps(_given(measured.pile(one)), self.root / pile.name), pile_took
         return _given(measured.line(one)), flow_took + pile_took
 
     def _run(self, *cases: Case) -> Took:
@@ -133,36 +134,61 @@ class Ours:
             engine.execute(one, self.root, LIMIT_S, threading.Event())
         return Took(sum(_seconds(one, self.root) for one in cases), _cpu_s() - before)
 
-    def _check(self, kind: str, told: Mapping[str, Any]) -> Given:
-        """Run one of the decks for the contact law."""
-        folder = self.root / "checks"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(assets.templates() / "liggghts", folder)
+
+def check(kind: str, told: Mapping[str, Any], folder: Path) -> Given:
+    """Run one of the decks for the contact law.
+
+    Parameters
+    ----------
+    kind : str
+        ``collision``, ``incline`` or ``sliding``.
+    told : mapping
+        The parameters of the scene.
+    folder : Path
+        Where it runs; what is there is removed.
+
+    Raises
+    ------
+    SolverError
+        If it did not come to its end.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(assets.templates() / "liggghts", folder)
+    command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
+    for name, value in _variables(kind, told).items():
+        command += ["-var", name, repr(value)]
+    log, before = folder / "log.check", _cpu_s()
+    ended = process.run(
+        command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
+    )
+    said = log.read_text(errors="replace")
+    if ended.returncode != 0 or "the check has ended" not in said:
+        raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
+    found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
+    rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
+    took = Took(ended.seconds, _cpu_s() - before)
+    return pd.DataFrame(rows, columns=["quantity", "at", "value"]), took
+
+
+def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
+    own = {"damping": told["damping"], "timestep": told["timestep"]}
+    if kind == "incline":
+        own["incline"] = told["incline_deg"]
+    if kind == "sliding":
         unit = np.sqrt(told["d_m"] * told["reduced_gravity_m_s2"])
-        variables = {"damping": told["damping"], "timestep": told["timestep"]}
-        if kind == "incline":
-            variables["incline"] = told["incline_deg"]
-        if kind == "sliding":
-            variables["speed"] = float(told["speed_m_s"] / unit)
-        command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
-        for name, value in variables.items():
-            command += ["-var", name, repr(value)]
-        log, before = folder / "log.check", _cpu_s()
-        ended = process.run(
-            command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
-        )
-        said = log.read_text(errors="replace")
-        if ended.returncode != 0 or "the check has ended" not in said:
-            raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
-        found = re.findall(r"^([a-z][a-z ]+): (\S+)$", said, re.MULTILINE)
-        rows = [(*SAID[label], float(number)) for label, number in found if label in SAID]
-        return pd.DataFrame(rows, columns=["quantity", "at", "value"]), Took(
-            ended.seconds, _cpu_s() - before
-        )
+        own["speed"] = float(told["speed_m_s"] / unit)
+    return own
 
 
 def _given(problem: Problem) -> pd.DataFrame:
     return problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
+
+
+def _with_steps(given: pd.DataFrame, case: Path) -> pd.DataFrame:
+    """With the time steps of the run: those of the last look at the grains."""
+    steps = pd.read_csv(case / "levels.csv")["step"].iloc[-1]
+    row = dict(zip(given.columns, (*STEPS, float(steps)), strict=True))
+    return pd.concat([given, pd.DataFrame([row])], ignore_index=True)
 
 
 def _cpu_s() -> float:

@@ -49,6 +49,14 @@ class Pack:
         """What the solver of a scene is given."""
         return self.root / SCENES / scene
 
+    def about(self, scene: str) -> str:
+        """What a reader knows a bed by: slope, diameter or roughness, packing."""
+        told = self.scenes[scene]
+        size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
+        seed = f" {told['seed']}" if "seed" in told else ""
+        packing = f", {told['packing']}{seed}" if "packing" in told else ""
+        return f"{told['alpha_deg']:g}°, {size}{packing}"
+
     def files(self) -> list[Path]:
         """Every file of the pack but the manifest."""
         return _files(self.root)

@@ -1,7 +1,7 @@
 """The page and the tables of a comparison."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,12 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark.pack import Pack
-from orchestrator.benchmark.verdict import Verdict
+from orchestrator.benchmark.verdict import Contender, Verdict
 from orchestrator.files import write_durably
 
 PAGE = "comparison.html"
 NUMBERS = "comparison.csv"
 VERDICTS = "verdicts.csv"
-FIGURES = "figures"
 SAID = 10
 """Most failures that are listed by name on the terminal."""
 ABOUT = {
@@ -38,43 +37,59 @@ class Found:
     page: Path
 
 
-def write(pack: Pack, verdicts: Sequence[Verdict], rows: pd.DataFrame, root: Path) -> Found:
+def write(pack: Pack, contenders: Sequence[Contender], root: Path) -> Found:
     """Write tables, figures and page of a comparison into a directory."""
     # the drawing libraries take half a second to import: only who draws waits for them
     from orchestrator.benchmark import page
 
-    write_durably(root / NUMBERS, rows.to_csv(index=False, float_format="%.9g"))
-    table = pd.DataFrame(
-        [{**asdict(v), "ratio": v.ratio, "cpu_ratio": v.cpu_ratio} for v in verdicts]
-    )
-    write_durably(root / VERDICTS, table.to_csv(index=False, float_format="%.6g"))
-    levels = summary(verdicts)
-    (root / FIGURES).mkdir(exist_ok=True)
-    text = page.render(pack, verdicts, rows, levels, root / FIGURES)
-    write_durably(root / PAGE, text)
-    return Found(_failures(verdicts), _plain(levels), root / PAGE)
+    numbers = pd.concat([one.rows.assign(solver=one.name) for one in contenders])
+    _write(numbers, root / NUMBERS, "%.9g")
+    _write(pd.DataFrame(_verdicts(contenders)), root / VERDICTS, "%.6g")
+    levels = summary(contenders)
+    page.write(pack, contenders, levels, root / PAGE)
+    return Found(_failures(contenders), levels.to_string(index=False), root / PAGE)
 
 
-def _failures(verdicts: Sequence[Verdict]) -> list[str]:
-    lines = [f"{one.scene}: {one.message}" for one in verdicts if not one.passed]
-    more = len(lines) - SAID
-    return lines if more <= 0 else [*lines[:SAID], f"and {more} more scenes: see {VERDICTS}"]
+def _write(table: pd.DataFrame, path: Path, digits: str) -> None:
+    columns = ["solver", *table.columns.drop("solver")]
+    write_durably(path, table[columns].to_csv(index=False, float_format=digits))
 
 
-def summary(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """One row for each level and kind that was asked."""
-    kinds = dict.fromkeys((one.level, one.kind) for one in verdicts)
-    return [
-        _row(level, kind, [v for v in verdicts if (v.level, v.kind) == (level, kind)])
-        for level, kind in kinds
+def _verdicts(contenders: Sequence[Contender]) -> Iterator[dict[str, Any]]:
+    for one in contenders:
+        for v in one.verdicts:
+            yield {"solver": one.name, **asdict(v), "ratio": v.ratio, "cpu_ratio": v.cpu_ratio}
+
+
+def _failures(contenders: Sequence[Contender]) -> list[str]:
+    lines = [
+        f"{f'{one.name}: ' if len(contenders) > 1 else ''}{v.scene}: {v.message}"
+        for one in contenders
+        for v in one.verdicts
+        if not v.passed
     ]
+    more = len(lines) - SAID
+    return lines if more <= 0 else [*lines[:SAID], f"and {more} more: see {VERDICTS}"]
 
 
-def _row(level: int, kind: str, of: Sequence[Verdict]) -> dict[str, Any]:
+def summary(contenders: Sequence[Contender]) -> pd.DataFrame:
+    """One row for each level and kind that was asked, and each solver."""
+    kinds = dict.fromkeys((v.level, v.kind) for v in contenders[0].verdicts)
+    return pd.DataFrame(
+        {
+            "level": f"{level} {ABOUT[level]}",
+            "kind": kind,
+            "solver": one.name,
+            **_row([v for v in one.verdicts if (v.level, v.kind) == (level, kind)]),
+        }
+        for level, kind in kinds
+        for one in contenders
+    )
+
+
+def _row(of: Sequence[Verdict]) -> dict[str, Any]:
     answered = [one for one in of if math.isfinite(one.worst)]
     return {
-        "level": f"{level} {ABOUT[level]}",
-        "kind": kind,
         "scenes": len(of),
         "passed": sum(one.passed for one in of),
         "error, median": _percent([one.error for one in answered]),
@@ -98,7 +113,3 @@ def _median(values: Sequence[float]) -> str:
 def _largest(values: Sequence[float]) -> str:
     known = [value for value in values if math.isfinite(value)]
     return f"{max(known):.0f}" if known else ""
-
-
-def _plain(levels: Sequence[dict[str, Any]]) -> str:
-    return pd.DataFrame(levels).to_string(index=False)

@@ -14,12 +14,11 @@ from orchestrator.benchmark.ours import Ours
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.problem import csv
 from orchestrator.benchmark.report import Found
-from orchestrator.benchmark.verdict import USED, compared
+from orchestrator.benchmark.verdict import OURS, USED, compared
 from orchestrator.errors import InputError
 from orchestrator.files import digest_files, read_json, write_json
 from orchestrator.solvers import process
 
-OURS = "ours"
 LOG = "log.txt"
 LAST_LINES = 200
 """Characters of a log's end that a message repeats."""
@@ -54,13 +53,44 @@ class Choice:
         return named and (not self.levels or level in self.levels)
 
 
-def compare(root: Path, results: Path, choice: Choice) -> Found:
-    """Compare answers that are there, ``RESULTS/SCENE/answer.csv``, with a pack; write the page."""
-    chosen = pack.read(root)
+def compare(root: Path, results: Sequence[Path], out: Path, choice: Choice) -> Found:
+    """Compare answers that are there with a pack; write one page of all solvers.
+
+    Parameters
+    ----------
+    root : Path
+        The pack.
+    results : sequence of Path
+        A directory for each solver, which is named by it: ``RESULTS/SCENE/answer.csv``.
+    out : Path
+        Where page and tables go.
+    choice : Choice
+        Which scenes.
+
+    Raises
+    ------
+    InputError
+        If the pack or a directory cannot be used, or two have one name.
+    """
+    chosen = pack.read(root.absolute())
     names = choice.of(chosen)
-    if not results.is_dir():
-        raise InputError("there is no such directory", where=str(results), remedy="name another")
-    return report.write(chosen, *compared(chosen, names, results, results / OURS), results)
+    for one in results:
+        if not one.is_dir():
+            raise InputError("there is no such directory", where=str(one), remedy="name another")
+    _check_names([one.absolute().name for one in results])
+    _claim(out.absolute(), chosen)
+    return report.write(chosen, [compared(chosen, names, one) for one in results], out)
+
+
+def _check_names(names: Sequence[str]) -> None:
+    """See that no two solvers, nor one and ours, have one name."""
+    twice = next((name for name in names if [OURS, *names].count(name) > 1), None)
+    if twice is not None:
+        raise InputError(
+            f"two solvers have the name {twice}",
+            where="RESULTS",
+            remedy="name each directory of results after its solver",
+        )
 
 
 def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> Found:
@@ -89,6 +119,7 @@ def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> 
     names = choice.of(chosen)
     words = split(command)
     out = out.absolute()
+    _check_names([out.name])
     _claim(out, chosen)
     ours, watch = Ours(chosen, out / OURS / "cases"), _Watch(chosen, out)
     ours.root.mkdir(parents=True, exist_ok=True)
@@ -101,7 +132,7 @@ def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> 
         watch.keep(out / name / FILE)
         watch.keep(out / OURS / name / FILE)
     chosen.verify()
-    return report.write(chosen, *compared(chosen, names, out, out / OURS), out)
+    return report.write(chosen, [compared(chosen, names, out)], out)
 
 
 def split(command: str) -> list[str]:

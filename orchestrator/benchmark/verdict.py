@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +10,15 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark import answer
-from orchestrator.benchmark.answer import FILE, AnswerError
+from orchestrator.benchmark.answer import FILE, STEPS, AnswerError
 from orchestrator.benchmark.mistakes import hint
 from orchestrator.benchmark.pack import Pack
 from orchestrator.files import read_json
 
 USED = "used.json"
 """What a solver took for a scene, beside its answer."""
+OURS = "ours"
+"""Our own answers, in a directory beside the solver's."""
 COUNTS = ("moved", "not_moved")
 """Whole numbers, which may be small: they are judged, but a relative error says little of them."""
 ROUND = 1e-8
@@ -47,6 +49,8 @@ class Verdict:
         Wall time of the solver, and of ours; NaN if it is not known.
     cpu_s, ours_cpu_s : float
         CPU time of both.
+    steps, ours_steps : float
+        Time steps of both, where they are stated.
     peak_mib : float
         Memory of the solver.
     """
@@ -63,6 +67,8 @@ class Verdict:
     ours_seconds: float
     cpu_s: float
     ours_cpu_s: float
+    steps: float
+    ours_steps: float
     peak_mib: float
 
     @property
@@ -76,10 +82,50 @@ class Verdict:
         return self.cpu_s / self.ours_cpu_s
 
 
-def compared(
-    pack: Pack, names: Sequence[str], results: Path, ours: Path
-) -> tuple[list[Verdict], pd.DataFrame]:
-    """Compare the answers of some scenes.
+@dataclass(frozen=True)
+class Contender:
+    """A solver with its answers to some scenes of a pack.
+
+    Attributes
+    ----------
+    name : str
+        That of the directory of its results.
+    verdicts : list of Verdict
+        One for each scene.
+    rows : DataFrame
+        The expectations with ``found``, ``error`` (relative) and ``within``; where there is no
+        tolerance nothing is judged. The index is the same for all solvers.
+    """
+
+    name: str
+    verdicts: list[Verdict]
+    rows: pd.DataFrame
+
+
+def ours(contenders: Sequence[Contender]) -> Contender:
+    """Ourselves as one more of them: our answers beside the first, the mean of our CPU times."""
+    first = contenders[0]
+    found, value = first.rows["ours"], first.rows["value"]
+    rows = first.rows.assign(found=found, error=_relative(found, value))
+    judged = rows[rows["tolerance"].notna() & ~rows["quantity"].isin(COUNTS)]
+    worst = judged["error"].abs().groupby(judged["scene"]).max()
+    turns = [(v.scene, v.ours_cpu_s) for one in contenders for v in one.verdicts]
+    cpu_s = pd.DataFrame(turns, columns=["scene", "s"]).groupby("scene")["s"].mean()
+    verdicts = [
+        replace(
+            v,
+            worst=float(worst.get(v.scene, math.nan)),
+            cpu_s=float(cpu_s[v.scene]),
+            ours_cpu_s=math.nan,
+            steps=v.ours_steps,
+        )
+        for v in first.verdicts
+    ]
+    return Contender(OURS, verdicts, rows)
+
+
+def compared(pack: Pack, names: Sequence[str], results: Path) -> Contender:
+    """Compare the answers of a solver.
 
     Parameters
     ----------
@@ -87,47 +133,55 @@ def compared(
         What is expected.
     names : sequence of str
         The scenes.
-    results, ours : Path
-        Hold ``SCENE/answer.csv`` of the solver, and of our own run where there was one.
-
-    Returns
-    -------
-    list of Verdict
-        One for each scene.
-    DataFrame
-        The expectations with ``found``, ``error`` (relative) and ``within``; where there is no
-        tolerance nothing is judged.
+    results : Path
+        Holds ``SCENE/answer.csv`` of the solver, and ``ours/SCENE/answer.csv`` where ours ran.
     """
     groups = dict(iter(pack.expected.groupby("scene", sort=False)))
-    parts = []
-    verdicts = []
-    for name in names:
-        rows, error = _rows(pack.scenes[name], groups[name], results / name, ours / name)
-        parts.append(rows)
-        verdicts.append(_verdict(pack.scenes[name], rows, error, results / name, ours / name))
-    return verdicts, pd.concat(parts, ignore_index=True)
+    judged = [
+        _judged(pack.scenes[name], groups[name], results / name, results / OURS / name)
+        for name in names
+    ]
+    rows = pd.concat([part for _, part in judged], ignore_index=True)
+    return Contender(results.absolute().name, [verdict for verdict, _ in judged], rows)
 
 
-def _rows(
+def _judged(
     told: Mapping[str, Any], expected: pd.DataFrame, folder: Path, ours: Path
-) -> tuple[pd.DataFrame, str]:
-    found: dict[answer.Key, float] = {}
-    error = str((read_json(folder / USED) or {}).get("error") or "")
-    if not error:
-        try:
-            found = answer.read(folder / FILE, expected, told.get("count"))
-        except AnswerError as wrong:
-            error = str(wrong)
+) -> tuple[Verdict, pd.DataFrame]:
+    used, own_used = (read_json(place / USED) or {} for place in (folder, ours))
+    found, error = _answered(told, expected, folder, str(used.get("error") or ""))
+    own = answer.numbers(ours / FILE) if (ours / FILE).is_file() else {}
     keys = [answer.key(q, at) for q, at in zip(expected["quantity"], expected["at"], strict=True)]
-    value = expected["value"].to_numpy(float)
     given = np.array([found.get(key, math.nan) for key in keys])
     rows = expected.assign(
-        found=given, error=_relative(given, value), within=_within(given, expected)
+        found=given,
+        error=_relative(given, expected["value"].to_numpy(float)),
+        within=within(given, expected, expected["tolerance"]),
     )
-    if (ours / FILE).is_file():
-        run = answer.numbers(ours / FILE)
-        rows = rows.assign(ours=[run.get(key, math.nan) for key in keys])
-    return rows, error
+    if own:
+        rows = rows.assign(ours=[own.get(key, math.nan) for key in keys])
+    took = {
+        "seconds": used.get("seconds"),
+        "ours_seconds": own_used.get("seconds"),
+        "cpu_s": used.get("cpu_s"),
+        "ours_cpu_s": own_used.get("cpu_s"),
+        "steps": found.get(STEPS),
+        "ours_steps": own.get(STEPS),
+        "peak_mib": used.get("peak_mib"),
+    }
+    return _verdict(told, rows, error, took), rows
+
+
+def _answered(
+    told: Mapping[str, Any], expected: pd.DataFrame, folder: Path, error: str
+) -> tuple[dict[answer.Key, float], str]:
+    """The numbers that count, and why there are none."""
+    if error:
+        return {}, error
+    try:
+        return answer.read(folder / FILE, expected, told.get("count")), ""
+    except AnswerError as wrong:
+        return {}, str(wrong)
 
 
 def _relative(found: Any, value: Any) -> Any:
@@ -135,21 +189,20 @@ def _relative(found: Any, value: Any) -> Any:
     return (found - value) / np.where(value == 0, 1.0, value)
 
 
-def _within(found: Any, expected: pd.DataFrame) -> Any:
-    """Whether each number is in its interval, widened by its tolerance; missing ones are not."""
-    margin = (expected["tolerance"] + ROUND) * expected["value"].abs()
+def within(found: Any, expected: pd.DataFrame, tolerance: Any) -> Any:
+    """Whether each number is in its interval, widened by a tolerance; missing ones are not."""
+    margin = (tolerance + ROUND) * expected["value"].abs()
     return (found >= expected["low"] - margin) & (found <= expected["high"] + margin)
 
 
 def _verdict(
-    told: Mapping[str, Any], rows: pd.DataFrame, error: str, folder: Path, ours: Path
+    told: Mapping[str, Any], rows: pd.DataFrame, error: str, took: Mapping[str, Any]
 ) -> Verdict:
     judged = rows[rows["tolerance"].notna()]
     wrong = judged[~judged["within"].astype(bool)]
     signed = judged.loc[~judged["quantity"].isin(COUNTS), "error"]
     errors = signed.abs()
     message = error or (_message(told, rows, wrong) if len(wrong) else "")
-    used, run = (read_json(place / USED) or {} for place in (folder, ours))
     return Verdict(
         scene=str(told["scene"]),
         level=int(told["level"]),
@@ -159,11 +212,7 @@ def _verdict(
         error=float(errors.median()) if not error else math.nan,
         worst=float(errors.max()) if not error else math.nan,
         bias=float(signed.median()) if not error else math.nan,
-        seconds=_number(used.get("seconds")),
-        ours_seconds=_number(run.get("seconds")),
-        cpu_s=_number(used.get("cpu_s")),
-        ours_cpu_s=_number(run.get("cpu_s")),
-        peak_mib=_number(used.get("peak_mib")),
+        **{name: _number(value) for name, value in took.items()},
     )
 
 

@@ -98,4 +98,4 @@ def _write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
 
 
 def _page(title: str, sections: Sequence[Section], space: Workspace) -> None:
-    experiment.write(title, sections, space.root, case_states.programs(space.cases))
+    experiment.write(title, sections, space.page, case_states.programs(space.cases))

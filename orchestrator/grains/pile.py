@@ -152,7 +152,7 @@ class PileCase(GrainCase):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the holds of the protocol."""
-        speed = self._speed(cases)
+        speed = self.ustar_over_ustar0(cases)
         rules = self.scene.protocol
         thresholds = np.sort(self._peeled(speed))
         if not 0 < thresholds[0] < np.inf or self.scene.flow.forced != "exposed":
@@ -193,7 +193,7 @@ class PileCase(GrainCase):
         """
         if self.scene.protocol.method == "dem":
             return Motion.from_csv(cases / self.name)
-        speed = self._speed(cases)
+        speed = self.ustar_over_ustar0(cases)
         if self.scene.protocol.method == "pivot":
             return Motion.of_flows(self._alone(speed[self.packing.windward]))
         return Motion.of_flows(self._peeled(speed))
@@ -217,7 +217,7 @@ class PileCase(GrainCase):
         return Face(
             ids=np.flatnonzero(chosen) + 1,
             arc_length=self.packing.arc_length[chosen] * self.scene.grain.diameter,
-            speed=self._speed(cases)[chosen],
+            speed=self.ustar_over_ustar0(cases)[chosen],
         )
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
@@ -248,8 +248,14 @@ class PileCase(GrainCase):
             case "solve":
                 return WallStress.from_csv(cases / self.flow.name / WALL_STRESS)
 
-    def _speed(self, cases: Path) -> FloatArray:
-        """Signed friction velocity that drives each grain over the undisturbed one."""
+    def ustar_over_ustar0(self, cases: Path) -> FloatArray:
+        """Signed friction velocity that drives each grain over the undisturbed one.
+
+        Parameters
+        ----------
+        cases : Path
+            Holds the finished flow case; positive is downstream.
+        """
         flow, d = self.scene.flow, self.scene.grain.diameter
         length = max(d, flow.average * self.bed.height)
         tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)

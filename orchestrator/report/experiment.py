@@ -8,9 +8,12 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.files import write_durably
-from orchestrator.report import FIGURES, PAGE, facts, page, style
+from orchestrator.report import FIGURES, facts, page, style
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
+
+LONG = 60
+"""Rows of a table that is folded away."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ class Section:
     limits: Sequence[str] = field(default_factory=tuple)
 
 
-def write(title: str, sections: Sequence[Section], root: Path, solvers: Mapping[str, str]) -> Path:
+def write(title: str, sections: Sequence[Section], file: Path, solvers: Mapping[str, str]) -> Path:
     """Write the page of an experiment, and its figures beside it.
 
     Parameters
@@ -45,8 +48,8 @@ def write(title: str, sections: Sequence[Section], root: Path, solvers: Mapping[
         Of the page.
     sections : sequence of Section
         Its parts, in their order.
-    root : Path
-        The directory that gets the page and ``figures``.
+    file : Path
+        The page; its directory gets ``figures``.
     solvers : mapping of str to str
         The programs that ran, with their versions.
 
@@ -55,17 +58,18 @@ def write(title: str, sections: Sequence[Section], root: Path, solvers: Mapping[
     Path
         The page.
     """
-    folder = root / FIGURES
+    folder = file.parent / FIGURES
     folder.mkdir(parents=True, exist_ok=True)
     html = page.fill(
         "experiment.html.j2",
         title=title,
         sections=[_drawn(section, folder) for section in sections],
+        long=LONG,
         programs=facts.versions(solvers),
         links={},
     )
-    write_durably(root / PAGE, html)
-    return root / PAGE
+    write_durably(file, html)
+    return file
 
 
 def _drawn(section: Section, folder: Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """LAMMPS and YADE through the door, where they are installed: three programs, one answer."""
 
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -42,3 +43,17 @@ def test_a_foreign_solver_declines_what_it_is_not_for(
     found = runner.run(formulas, COMMANDS[program], tmp_path / "results", choice, 60.0)
     assert all("it ended with 2" in line for line in found.failures)
     assert found.failures
+
+
+def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:
+    if shutil.which("lmp") is None:
+        pytest.skip("lmp is not installed")
+    folder = tmp_path / "lammps"
+    shutil.copytree(EXAMPLES / "lammps", folder)
+    subprocess.run(["lmp", "-in", "in.bed"], cwd=folder, check=True, capture_output=True)
+    frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
+    x = [float(frame.split()[-2]) for frame in frames]
+    holds = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
+    # W/tan(60 degrees) lies between the forces of holds 2 and 3
+    moved = [hold for hold, now in zip(holds, x[1:], strict=True) if now - x[0] >= 0.3e-3]
+    assert min(moved) == 3

@@ -95,9 +95,30 @@ def test_a_pack_of_another_schema_is_refused(formulas: Path, tmp_path: Path) -> 
 def test_export_twice_gives_the_same_pack(formulas: Path, tmp_path: Path) -> None:
     export(tmp_path / "again", None, ())
     export(tmp_path / "again", None, ())
-    assert (tmp_path / "again" / pack.MANIFEST).read_text() == (
-        formulas / pack.MANIFEST
-    ).read_text()
+    first, again = (pack.read(root).manifest for root in (formulas, tmp_path / "again"))
+    changed = {name for name, found in first["sha256"].items() if again["sha256"][name] != found}
+    assert changed <= {"times.csv"}
+    assert {**first, "sha256": 0} == {**again, "sha256": 0}
+
+
+def test_our_time_and_answer_for_each_scene(all_levels: Path) -> None:
+    found = pack.read(all_levels)
+    times = pd.read_csv(all_levels / "times.csv").set_index("scene")["seconds"]
+    assert set(times.index) == set(found.scenes)
+    assert times.gt(0).all()
+    judged = found.expected[found.expected["tolerance"].notna()]
+    assert judged["ours"].notna().all()
+
+
+def test_a_pack_of_formulas_without_liggghts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    export(tmp_path / "pack", None, (2,))
+    found = pack.read(tmp_path / "pack")
+    assert found.manifest["programs"] == {}
+    assert found.expected["ours"].isna().all()
+    assert pd.read_csv(tmp_path / "pack" / "times.csv").empty
 
 
 def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def test_a_solver_that_changes_the_pack_stops_the_run(formulas: Path, tmp_path: 
     with pytest.raises(InputError, match=r"changed expected.csv of the pack.*not used further"):
         _run(root, tmp_path, body, "2-incline-*")
     with pytest.raises(InputError, match=r"expected.csv is not what was exported"):
-        runner.compare(root, tmp_path / "results", Choice())
+        runner.compare(root, [tmp_path / "results"], tmp_path / "results", Choice())
 
 
 def test_a_solver_that_changes_another_answer_is_named(formulas: Path, tmp_path: Path) -> None:

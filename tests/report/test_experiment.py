@@ -26,7 +26,7 @@ def written(tmp_path: Path) -> Path:
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
         Section("Found", "", figures[1:], [experiment.sheet(table)], ["No more than <this>."]),
     ]
-    return experiment.write(TITLE, sections, tmp_path / "new", {"liggghts": "3.8"})
+    return experiment.write(TITLE, sections, tmp_path / "new" / "page.html", {"liggghts": "3.8"})
 
 
 def test_page_holds_all_of_its_sections(written: Path) -> None:
