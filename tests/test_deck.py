@@ -1,5 +1,6 @@
 """What the decks are given: forces of the grains, files that LIGGGHTS reads."""
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -90,6 +91,16 @@ def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     assert (copy / "levels.csv").read_text().splitlines()[-1].split(",")[3] == "0"
+
+
+def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
+    copy, shared = tmp_path / "bed", tmp_path / "shared"
+    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shared.mkdir()
+    untouched = shared.stat().st_mtime_ns
+    # MPI's own would be made here, and removed while another run starts
+    subprocess.run(["./Allrun"], cwd=copy, check=True, env={**os.environ, "TMPDIR": str(shared)})
+    assert shared.stat().st_mtime_ns == untouched
 
 
 def test_ids_of_the_counted_grains() -> None:
