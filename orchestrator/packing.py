@@ -27,6 +27,9 @@ another, and none stands out too far."""
 DISORDERED = 4
 """Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
 is the same for any number of mobile layers up to it."""
+TWIN = 1e-9
+"""How far the grains of a lattice's twin lie aside, diameters: as far as matters to nothing but
+which grain of a chain goes first."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
 
@@ -135,7 +138,7 @@ def pile(
     disorder : float
         Of a disordered packing: largest gap in the row below the mobile ones, diameters.
     seed : int
-        Of a disordered packing: which of the many.
+        Of a disordered packing: which of the many. Of a lattice: itself, or which of its twins.
     """
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap
@@ -157,8 +160,10 @@ def pile(
     mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
     centres = np.vstack([body, _apron(body, surface)])
     rest = np.zeros(len(centres) - len(body), bool)
+    aside = TWIN if pattern != "disordered" and seed else 0.0
+    shift = np.random.default_rng(seed).uniform(-aside, aside, centres.shape)
     return Packing(
-        centres=centres,
+        centres=centres + shift,
         mobile=np.append(mobile, rest),
         windward=np.append(windward, rest),
         lee=np.append(lee, rest),

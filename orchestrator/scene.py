@@ -90,9 +90,15 @@ class PileBed(Bed):
     disorder: Annotated[float, Field(gt=0, le=0.2)] = 0.02
     """largest gap between two grains of the row under the four uppermost, d; if disordered"""
     seed: Annotated[int, Field(ge=0)] = 0
-    """which of the many disordered packings"""
+    """which of the many disordered packings; of a lattice 0 is itself, any other a twin with grains
+    up to 1e-9 d aside: what its thresholds differ by is decided by round-off"""
     mobile_layers: Annotated[int, Field(ge=1, le=1000)] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
+
+    @property
+    def is_twin(self) -> bool:
+        """Whether it is a lattice but for shifts that matter to nothing but round-off."""
+        return self.packing != "disordered" and self.seed > 0
 
 
 class Flow(Part):

@@ -8,12 +8,13 @@ from orchestrator.tables.scatter import with_scatter
 
 
 def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
-    # three seeds of one disordered pile, one regular pile of the same slope, one of another
-    shields = [0.95, 1.0, 1.05, 2.0, 3.0]
+    # three seeds of one disordered pile, one regular pile of the same slope, one of another, and
+    # two of level rows: a lattice and its twin
+    shields = [0.95, 1.0, 1.05, 2.0, 3.0, 1.8, 2.2]
     thresholds = pd.DataFrame(
         {
-            "scene_id": list("abcde"),
-            "alpha_deg": [15.0, 15.0, 15.0, 15.0, 30.0],
+            "scene_id": list("abcdefg"),
+            "alpha_deg": [15.0, 15.0, 15.0, 15.0, 30.0, 15.0, 15.0],
             "closure": "high",
             "fraction": 0.5,
             "d_m": 1e-3,
@@ -25,9 +26,18 @@ def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
             "shields_high": np.multiply(shields, 1.02),
         }
     )
-    seeds = [0.0, 1.0, 2.0, np.nan, np.nan]
-    disorder = [0.02, 0.02, 0.02, np.nan, np.nan]
-    scenes = pd.DataFrame({"scene_id": list("abcde"), "seed": seeds, "disorder": disorder})
+    scenes = pd.DataFrame(
+        {
+            "scene_id": list("abcdefg"),
+            "group": "piles",
+            "case": [f"pile-{name}" for name in "abcdefg"],
+            "packing": [*["disordered"] * 3, "aligned", "aligned", "horizontal", "horizontal"],
+            "disorder": [*[0.02] * 3, *[np.nan] * 4],
+            "seed": [0.0, 1.0, 2.0, np.nan, np.nan, np.nan, 1.0],
+            "alpha_deg": thresholds["alpha_deg"],
+            "stiffness": 1e3,
+        }
+    )
     return thresholds, scenes
 
 
@@ -36,6 +46,18 @@ def test_half_the_range_widens_the_interval_of_piles_of_the_same_slope() -> None
     assert found.loc["d", "scatter"] == pytest.approx(0.05)
     assert found.loc["d", "shields_low"] == pytest.approx(2.0 * 0.98 * 0.95)
     assert found.loc["d", "shields_high"] == pytest.approx(2.0 * 1.02 * 1.05)
+
+
+def test_twins_of_level_rows_scatter_by_themselves() -> None:
+    found = with_scatter(*_tables()).set_index("scene_id")
+    assert found.loc[["f", "g"], "scatter"].tolist() == pytest.approx([0.1, 0.1])
+    assert found.loc["f", "shields_low"] == pytest.approx(1.8 * 0.98 * 0.9)
+
+
+def test_piles_that_differ_in_more_than_the_seed_are_no_scatter() -> None:
+    thresholds, scenes = _tables()
+    found = with_scatter(thresholds, scenes.assign(stiffness=range(7)))
+    assert found["scatter"].isna().all()
 
 
 def test_without_seeds_there_is_no_scatter() -> None:

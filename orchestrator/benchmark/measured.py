@@ -65,7 +65,10 @@ def answered(
     tables: Tables,
     cases: Path,
 ) -> list[Answered]:
-    """The piles of a study with what its tables say of each; `rows` are its scenes by id."""
+    """The piles of a study with what its tables say of each; `rows` are its scenes by id.
+
+    Twins of lattices are left out: they are in the intervals of the others.
+    """
     if "pile_curve" not in tables:
         return []
     curves = dict(iter(tables["pile_curve"].groupby("scene_id")))
@@ -74,6 +77,7 @@ def answered(
     return [
         Answered(pile, rows[name], curves[name], thresholds[name], stresses[pile.flow.name], cases)
         for pile in piles
+        if not pile.bed.is_twin
         for name in (pile.scene.id,)
     ]
 

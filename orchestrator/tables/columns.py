@@ -19,7 +19,7 @@ COLUMNS: dict[str, str] = {
     "h_m": "height of the pile's bed line",
     "packing": "pattern of the pile's grains",
     "disorder": "largest gap in the row under the four uppermost, d; of disordered packings",
-    "seed": "which of the many disordered packings",
+    "seed": "which of the many disordered packings, or of the twins of a lattice",
     "mobile_layers": "layers of the windward face that may move",
     "closure": "low: Eqs. 2, 3; high: Eqs. 4, 5",
     "regime": "closure that is valid at the scene's single-grain threshold, or transition",
@@ -88,8 +88,8 @@ COLUMNS: dict[str, str] = {
     "error_estimate": "known relative error of the two rungs; empty where it is not known",
     "difference": "shields over shields_dem, less 1",
     "agree": "whether shields lies in the interval of DEM, widened by the tolerance",
-    "scatter": "half the range of shields over the seeds of disordered packings, over its mean; of"
-    " the same slope, closure and fraction",
+    "scatter": "half the range of shields over seeds, over its mean: the largest of the piles whose"
+    " rows lie alike, of the same slope, closure and fraction",
     "pivot_ustar0_m_s": "ustar0_m_s by the closed form with each grain's own stress",
     "kind": "kind of the case",
     "cpu_s": "processor time of the solvers",

@@ -1,35 +1,43 @@
-"""The scatter of a pile's threshold over packings that differ in their disorder alone."""
+"""The scatter of a pile's threshold over packings that differ in their seed alone."""
 
 import pandas as pd
 
-SIMILAR = ["alpha_deg", "closure", "fraction"]
-"""Piles that agree in these are taken to scatter alike."""
+SIMILAR = ["level", "alpha_deg", "closure", "fraction"]
+"""Piles that agree in these are taken to scatter alike; rows are level, or lie along the slope."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
     """Add the scatter over seeds to the thresholds of piles, and widen their intervals by it.
 
-    Half the range over the seeds, relative to their mean, is found for each set of disordered
-    piles that differ in the seed alone. A pile gets the largest one of the same slope, closure and
-    fraction; where the study ran no seeds, none, and its interval stays as it is.
+    Half the range over the seeds, relative to their mean, is found for each set of piles that
+    differ in the seed alone: random gaps, or twins of a lattice, which differ by round-off. A pile
+    gets the largest one of the same rows, slope, closure and fraction; where the study ran no
+    seeds, none, and its interval stays as it is.
     """
     if thresholds.empty:
         return thresholds
-    found = _scatter(thresholds, scenes)
-    table = thresholds.merge(found, on=SIMILAR, how="left", validate="many_to_one")
+    of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
+    ids = thresholds["scene_id"]
+    table = thresholds.assign(
+        level=ids.map(of_scene["packing"]) == "horizontal", twins=ids.map(_twins(of_scene))
+    )
+    table = table.merge(_scatter(table), on=SIMILAR, how="left", validate="many_to_one")
     wider = table["scatter"].fillna(0.0)
-    return table.assign(
+    return table.drop(columns=["level", "twins"]).assign(
         shields_low=table["shields_low"] * (1 - wider),
         shields_high=table["shields_high"] * (1 + wider),
     )
 
 
-def _scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
-    of_scene = scenes.drop_duplicates("scene_id")[["scene_id", "seed", "disorder"]]
-    table = thresholds.merge(of_scene, on="scene_id", validate="many_to_one")
-    seeds = table[table["seed"].notna() & table["shields"].notna()]
-    alike = [*SIMILAR, "d_m", "z0_over_d", "nu_m2_s", "stress", "disorder"]
-    groups = seeds.groupby(alike, sort=True)["shields"]
+def _twins(scenes: pd.DataFrame) -> pd.Series:
+    """A number that scenes share which differ in the seed alone."""
+    same = [name for name in scenes if name not in ("group", "seed", "case")]
+    return scenes.groupby(same, dropna=False).ngroup()
+
+
+def _scatter(table: pd.DataFrame) -> pd.DataFrame:
+    known = table[table["shields"].notna()]
+    groups = known.groupby([*SIMILAR, "twins"])["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
     spread = spread[groups.count() > 1].rename("scatter")

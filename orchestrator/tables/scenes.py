@@ -54,7 +54,7 @@ def _choices(scene: Scene) -> Row:
         "h_m": pile.height if pile else None,
         "packing": pile.packing if pile else None,
         "disorder": pile.disorder if pile and pile.packing == "disordered" else None,
-        "seed": pile.seed if pile and pile.packing == "disordered" else None,
+        "seed": pile.seed if pile and (pile.packing == "disordered" or pile.is_twin) else None,
         "mobile_layers": pile.mobile_layers if pile else None,
         "flow_model": scene.flow.model if pile else None,
         "stress": scene.flow.stress if pile else None,
