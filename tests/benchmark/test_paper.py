@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator import case, engine, plan, study, tables
 from orchestrator.benchmark import measured
+from orchestrator.scene import PileBed
 from orchestrator.study import Group, Study
 from orchestrator.tables import scenes as scene_rows
 from tests.benchmark.conftest import ROOT
@@ -29,8 +30,9 @@ def paper() -> Study:
 
 def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None:
     assert (FOLDER / "study.toml").read_text() == paper.text
-    piles = {scene.id for scene in paper.scenes if scene.bed.kind == "pile"}
-    grains = {scene.id for scene in paper.scenes} - piles
+    beds = {scene.id: scene.bed for scene in paper.scenes}
+    piles = {name for name, bed in beds.items() if isinstance(bed, PileBed) and not bed.is_twin}
+    grains = {name for name, bed in beds.items() if bed.kind == "grain"}
     level = expected["scene"].str[0]
     name = expected["scene"].str[2:]
     for number, wanted in (("1", grains), ("4", piles), ("5", piles)):
