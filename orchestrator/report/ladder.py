@@ -22,7 +22,7 @@ HEADS = {
     "error_curve": "whole curve",
 }
 """Columns of errors and the heads of their panels."""
-FLOOR = 1e-4
+FLOOR = 1e-3
 """Errors below it are drawn on it."""
 TOLERANCES = (0.05, 0.2)
 HIGH, LOW, MISSING = "^", "v", "X"

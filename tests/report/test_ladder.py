@@ -23,7 +23,7 @@ def rungs() -> pd.DataFrame:
     rows = []
     for scene, packing in (("15°", "aligned"), ("30°", "aligned"), ("15°", "disordered")):
         for number, (flow, grain) in enumerate(product(FLOWS, GRAINS)):
-            error = (-1.0) ** number * 1e-4 * 3.0**number * (2 if scene == "30°" else 1)
+            error = (-1.0) ** number * 1e-3 * 3.0**number * (2 if scene == "30°" else 1)
             errors = dict(zip((*ladder.ERRORS, "error_curve"), error * np.arange(5), strict=True))
             rows.append(
                 {
