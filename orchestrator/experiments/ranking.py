@@ -54,14 +54,15 @@ def _against(own: pd.DataFrame) -> pd.DataFrame:
 def with_front(table: pd.DataFrame) -> pd.DataFrame:
     """Mark the pairs that no other of their packing beats in both cost and error.
 
-    A pair counts with its largest cost and its largest error over the scenes.
+    A pair counts with its mean cost and its largest error over the scenes.
     """
     worst = table.filter(regex=r"^error_\d+$").abs().max(axis=1, skipna=False)
     rows = table.assign(worst=worst)[table["same_model"] & (table["asked"] == "dem")]
     front: set[tuple[Hashable, ...]] = set()
     for (packing,), own in split(rows, "packing"):
-        most = own.groupby(["flow_rung", "grain_rung"])[["cost_core_s", "worst"]].agg(_largest)
-        names = most[_undominated(most.to_numpy(float))].index
+        pairs = own.groupby(["flow_rung", "grain_rung"])
+        both = pairs.agg({"cost_core_s": "mean", "worst": _largest})
+        names = both[_undominated(both.to_numpy(float))].index
         front |= {(packing, *name) for name in names}
     columns = (table[name] for name in ("packing", "flow_rung", "grain_rung"))
     return table.assign(pareto=[key in front for key in zip(*columns, strict=True)])
