@@ -1,5 +1,6 @@
 """LAMMPS and YADE through the door, where they are installed: three programs, one answer."""
 
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,8 @@ from tests.benchmark.conftest import ROOT
 
 EXAMPLES = ROOT / "examples"
 COMMANDS = {
-    "lmp": f"'{sys.executable}' '{EXAMPLES}/lammps/solve.py' {{case}} {{out}}",
-    "yade": f"yade -n -x -j1 '{EXAMPLES}/yade/solve.py' {{case}} {{out}}",
+    "lmp": f"{shlex.join([sys.executable, f'{EXAMPLES}/lammps/solve.py'])} {{case}} {{out}}",
+    "yade": f"yade -n -x -j1 {shlex.quote(f'{EXAMPLES}/yade/solve.py')} {{case}} {{out}}",
 }
 CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2")
 

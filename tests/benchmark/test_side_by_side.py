@@ -1,5 +1,6 @@
 """Several solvers on one page: each by its name, none lost, and the exit code of the worst."""
 
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from tests.benchmark.conftest import NATIVE
 from tests.conftest import Command
 from tests.report.test_page import Page
 
-COMMAND = f"'{sys.executable}' '{NATIVE / 'solver.py'}' {{case}} {{out}}"
+COMMAND = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
 CHOICE = Choice(patterns=("4-*", "2-incline-20"))
 HIGH = 1.3
 """A factor on thresholds that no interval holds."""

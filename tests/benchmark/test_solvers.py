@@ -1,5 +1,6 @@
 """Solvers as real processes: a right one passes, each wrong one is caught and told by name."""
 
+import shlex
 import shutil
 import subprocess
 import sys
@@ -33,7 +34,7 @@ def _program(folder: Path, body: str) -> str:
     """A solver that is the example but for something."""
     path = folder / "my solver.py"
     path.write_text(HEAD.format(native=str(NATIVE)) + body)
-    return f"'{sys.executable}' '{path}' {{case}} {{out}}"
+    return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
 
 
 def _run(pack: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
@@ -175,7 +176,7 @@ def test_ours_answers_as_exported(all_levels: Path, tmp_path: Path) -> None:
 
 
 def test_compare_gives_the_same_verdicts(formulas: Path, orchestrator: Command) -> None:
-    command = f"'{sys.executable}' '{NATIVE / 'solver.py'}' {{case}} {{out}}"
+    command = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
     arguments = (str(formulas), "--scene", "2-incline-[27]0", "--solver", command, "--out", "r")
     ran = orchestrator("benchmark", "run", *arguments)
     assert ran.returncode == 0, ran.stderr

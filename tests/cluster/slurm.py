@@ -134,6 +134,8 @@ def _configure(root: Path, nodes: int, cores: int) -> Path:
             cores=cores,
         )
     )
+    # nothing here uses cgroups: this plugin starts where none are mounted, the one for v2 does not
+    (root / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
     return path
 
 
