@@ -44,6 +44,12 @@ AHEAD = 2
 """Cases handed to a job for each core: no core waits for the next while this process is busy."""
 LOST_S = 5.0
 """A worker that was not heard of for this long is gone: its job is asked for again."""
+AWKWARD = frozenset(" \t\n'\"\\$`%#")
+"""Characters of a path that the head of a job's script cannot hold."""
+PATIENCE_S = 60.0
+"""After this long without a job that has begun, a line says so; after twice as long again."""
+LAST_LETTERS = 200
+"""Of a job's log that such a line repeats."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,7 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         )
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
+        _await_first(client, Path(settings["log_directory"]))
         yield Pool(
             client.get_executor(pure=False),
             partial(execute_alone, cases=cases, limit_s=limit_s),
@@ -138,16 +145,31 @@ def _settings(kind: Any, given: Mapping[str, Any], root: Path) -> dict[str, Any]
     for key in given:
         if key not in known:
             raise unknown_key(key, sorted(known), f"cluster.{key}")
+    import dask
+
     # a job begins in an environment of its own, where this package need not be installed
     path = shlex.quote(str(assets.PACKAGE.parent))
+    python = dask.config.get(f"jobqueue.{_configuration(kind, given)}.python", None)
     prologue = [f"export PYTHONPATH={path}:$PYTHONPATH", *given.get("job_script_prologue", [])]
-    scheduler = {"dashboard": False, **given.get("scheduler_options", {})}
+    scheduler = {"dashboard": False, "dashboard_address": ":0"} | given.get("scheduler_options", {})
+    _check_logs(str(given.get("log_directory", root)))
     return {
         "log_directory": str(root / "jobs"),
+        "python": python or shlex.quote(sys.executable),
         **given,
         "job_script_prologue": prologue,
         "scheduler_options": scheduler,
     }
+
+
+def _check_logs(directory: str) -> None:
+    found = sorted(AWKWARD.intersection(directory))
+    if found:
+        raise InputError(
+            f"jobs cannot write logs into {directory}: it has {' '.join(map(repr, found))} in it",
+            where="cluster.log_directory",
+            remedy="name a directory without these there; the study's own may stay as it is",
+        )
 
 
 def _known(kind: Any) -> set[str]:
@@ -180,8 +202,36 @@ def _opened(kind: Any, settings: Mapping[str, Any]) -> Any:
 def _cores(kind: Any, settings: Mapping[str, Any]) -> int:
     import dask
 
-    name = settings.get("config_name", kind.job_cls.config_name)
+    name = _configuration(kind, settings)
     return int(settings.get("cores") or dask.config.get(f"jobqueue.{name}.cores"))
+
+
+def _configuration(kind: Any, settings: Mapping[str, Any]) -> str:
+    """What dask's own configuration calls a queue."""
+    return str(settings.get("config_name", kind.job_cls.config_name))
+
+
+def _await_first(client: Any, logs: Path) -> None:
+    """Wait for the first job to begin; where that takes long, say so, and what its log says."""
+    patience = PATIENCE_S
+    while True:
+        try:
+            client.wait_for_workers(1, timeout=patience)
+            return
+        except TimeoutError:
+            said = _last_words(logs)
+            print(f"no job has begun for {patience:.0f} s; {said}", file=sys.stderr)
+            patience *= 2
+
+
+def _last_words(logs: Path) -> str:
+    """The last line of the newest log that holds one."""
+    found = sorted(logs.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for path in found:
+        lines = path.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        if lines:
+            return f"{path.name} says: {lines[-1][-LAST_LETTERS:]}"
+    return "ask the queue why"
 
 
 def _submit(cluster: Any, jobs: int, system: str) -> None:

@@ -2,12 +2,14 @@
 
 import os
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from orchestrator import cluster
 from tests.cluster.conftest import Start, tables
 from tests.cluster.slurm import Slurm
 
@@ -96,6 +98,18 @@ def _refused(driver: "subprocess.Popen[str]", *words: str) -> None:
         assert word in lines[0]
 
 
+def test_a_directory_may_have_any_name(
+    start: Start, tmp_path: Path, local_tables: dict[str, bytes]
+) -> None:
+    name, study = "it's a pâth of $HOME", tmp_path / "small.toml"
+    command = ("study", "small.toml", "--out", name, *ON_SLURM[4:])
+    _refused(start(*command), "cluster.log_directory", "'$'")
+    study.write_text(f'{study.read_text()}log_directory = "{tmp_path}/logs"\n')
+    _end(start(*command))
+    assert tables(tmp_path / name) == local_tables
+    assert list((tmp_path / "logs").glob("*.err"))
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
@@ -117,3 +131,21 @@ def test_a_job_without_cores_is_refused(start: Start, tmp_path: Path) -> None:
     path = tmp_path / "small.toml"
     path.write_text(path.read_text().replace("cores = 1", ""))
     _refused(start(*ON_SLURM), "cores", "[cluster]")
+
+
+def test_a_queue_without_workers_is_told_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "PATIENCE_S", 0.2)
+    (tmp_path / "worker-1.out").write_text("")
+    (tmp_path / "worker-1.err").write_text("line 11: no such Python\n\n")
+    local = {"n_workers": 0, "processes": False, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**local) as empty, distributed.Client(empty) as client:
+        late = threading.Timer(1.0, empty.scale, [1])
+        late.start()
+        cluster._await_first(client, tmp_path)
+        late.join()
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "no job has begun for 0 s; worker-1.err says: line 11: no such Python"
+    assert 1 <= len(said) <= 3
