@@ -48,7 +48,7 @@ def _answered(contenders: Sequence[Contender]) -> set[str]:
 def _looks(contenders: Sequence[Contender]) -> list[style.Look]:
     """A colour for each solver, and rings one in the other: equal answers hide none."""
     colours = style.palette("d_m", range(len(contenders))).values()
-    sizes = range(2 * len(contenders), 0, -2)
+    sizes = range(2 * len(contenders) + 1, 1, -2)
     return [
         {"color": colour, "ms": size, "mfc": "none", "mew": 0.7}
         for colour, size in zip(colours, sizes, strict=True)
