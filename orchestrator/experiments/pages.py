@@ -39,7 +39,7 @@ def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> 
                 "error-at-fractions",
                 "The error at each fraction",
                 "The same errors at each fraction, and over the whole curve (its mean size at 5 to "
-                "85 %).",
+                "85 %). The pairs on the step line above are numbered.",
                 (),
                 ladder.by_fraction(by_dem),
             ),

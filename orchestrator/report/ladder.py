@@ -1,6 +1,6 @@
 """What a study's speed costs in accuracy: rungs of cheaper models against the dearest one."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,12 +69,14 @@ def against_cost(rungs: pd.DataFrame) -> Canvas:
     style.legends(figure, _method_entries(table), [*_key(table), *looks])
     figure.draw_without_rendering()  # tags are written into a finished layout
     for ax, part in zip(axes, parts, strict=False):
-        _write_tags(ax, part, 6.0, part["pareto"])
+        _write_tags(ax, part, 6.0, _name_of_front)
     return figure
 
 
 def by_fraction(rungs: pd.DataFrame) -> Canvas:
-    """The error at each fraction and of the whole curve against the cost; rungs are numbered.
+    """The error at each fraction and of the whole curve against the cost.
+
+    Rungs on the front of `against_cost` are numbered.
 
     The columns are those of `against_cost`; a row of panels for each packing.
     """
@@ -93,10 +95,11 @@ def by_fraction(rungs: pd.DataFrame) -> Canvas:
         ax.set_title(head)
     grid[-1, 2].set_xlabel("cost, s of one core")
     _scales(list(grid.ravel()), list(grid[:, -1]), parts)
-    style.legends(figure, _method_entries(table), [*_key(table), *_look_entries(parts)])
+    key = _key(table[table["pareto"].astype(bool)])
+    style.legends(figure, _method_entries(table), [*key, *_look_entries(parts)])
     figure.draw_without_rendering()
     for ax, part in zip(grid.ravel(), parts, strict=False):
-        _write_tags(ax, part, 5.5)
+        _write_tags(ax, part, 5.5, _number_of_front)
     return figure
 
 
@@ -265,24 +268,22 @@ def _empty(ax: Axes) -> None:
     ax.set(xticks=[], yticks=[])
 
 
-def _write_tags(
-    ax: Axes, rows: pd.DataFrame, size: float, named: "pd.Series | None" = None
-) -> None:
-    """Number the rungs, and name some."""
-    shown = _shown(rows.assign(named=False if named is None else named))
-    worst = shown[shown["worst"]].drop_duplicates("number")
+def _write_tags(ax: Axes, rows: pd.DataFrame, size: float, text: Callable[[Any], str]) -> None:
+    """Tag each rung that has a text."""
+    shown = _shown(rows)
+    worst = shown[shown["worst"]].drop_duplicates("number").sort_values("x")
+    found = [Tag(text(row), row.x, row.y, METHODS[row.method]) for row in _each(worst)]
     # the long ones first: the short ones fit in between
-    worst = worst.sort_values(["named", "x"], ascending=[False, True])
-    written = [
-        Tag(
-            f"{row.number}: {row.name}" if row.named else str(row.number),
-            row.x,
-            row.y,
-            METHODS[row.method],
-        )
-        for row in _each(worst)
-    ]
+    written = sorted((tag for tag in found if tag.text), key=lambda tag: -len(tag.text))
     tags.write(ax, written, shown[["x", "y"]].to_numpy(float), size)
+
+
+def _name_of_front(row: Any) -> str:
+    return f"{row.number}: {row.name}" if row.pareto else str(row.number)
+
+
+def _number_of_front(row: Any) -> str:
+    return str(row.number) if row.pareto else ""
 
 
 def _method_entries(table: pd.DataFrame) -> list[Artist]:

@@ -71,7 +71,7 @@ def test_each_error_has_a_panel_of_its_own(rungs: pd.DataFrame) -> None:
     for ax, column in zip(figure.axes[5:], ladder.HEADS, strict=True):
         expected = rows[column].abs().clip(lower=ladder.FLOOR).tolist()
         assert [y for _, y in sorted(points(ax), reverse=True)] == pytest.approx(expected)
-        assert sorted(tag.get_text() for tag in tags(ax)) == [str(n) for n in range(1, 10)]
+        assert sorted(tag.get_text() for tag in tags(ax)) == list("13579")  # those on the front
 
 
 def assert_apart(figure: Canvas) -> int:
