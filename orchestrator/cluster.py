@@ -18,6 +18,7 @@ from orchestrator import assets, engine
 from orchestrator.case import Case, done_state
 from orchestrator.engine import Pool
 from orchestrator.errors import InputError, OrchestratorError, unknown_key
+from orchestrator.solvers import process
 
 SYSTEMS = {
     "htcondor": "HTCondorCluster",
@@ -48,8 +49,6 @@ AWKWARD = frozenset(" \t\n'\"\\$`%#")
 """Characters of a path that the head of a job's script cannot hold."""
 PATIENCE_S = 60.0
 """After this long without a job that has begun, a line says so; after twice as long again."""
-LAST_LETTERS = 200
-"""Of a job's log that such a line repeats."""
 
 
 @dataclass(frozen=True)
@@ -152,11 +151,12 @@ def _settings(kind: Any, given: Mapping[str, Any], root: Path) -> dict[str, Any]
     python = dask.config.get(f"jobqueue.{_configuration(kind, given)}.python", None)
     prologue = [f"export PYTHONPATH={path}:$PYTHONPATH", *given.get("job_script_prologue", [])]
     scheduler = {"dashboard": False, "dashboard_address": ":0"} | given.get("scheduler_options", {})
-    _check_logs(str(given.get("log_directory", root)))
+    logs = str(given.get("log_directory", root / "jobs"))
+    _check_logs(logs)
     return {
-        "log_directory": str(root / "jobs"),
         "python": python or shlex.quote(sys.executable),
         **given,
+        "log_directory": logs,
         "job_script_prologue": prologue,
         "scheduler_options": scheduler,
     }
@@ -226,12 +226,9 @@ def _await_first(client: Any, logs: Path) -> None:
 
 def _last_words(logs: Path) -> str:
     """The last line of the newest log that holds one."""
-    found = sorted(logs.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
-    for path in found:
-        lines = path.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        if lines:
-            return f"{path.name} says: {lines[-1][-LAST_LETTERS:]}"
-    return "ask the queue why"
+    newest = sorted(logs.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    said = ((path.name, process.last_words(path)) for path in newest)
+    return next((f"{name} says: {words}" for name, words in said if words), "ask the queue why")
 
 
 def _submit(cluster: Any, jobs: int, system: str) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-from orchestrator import assets
+from orchestrator import assets, closures
 from orchestrator.scene import PileBed, Scene
 
 Part = Literal["flow", "grains"]
@@ -248,9 +248,12 @@ def is_open(scene: Scene) -> bool:
     )
 
 
+_threshold = cache(closures.threshold)  # thousands of scenes have the same grain
+
+
 def flies(scene: Scene) -> bool:
     """Whether the lift carries a grain before it rolls, which DEM alone shows."""
-    return float(scene.closed_form(scene.closure).lift) >= LIFTS * scene.weight
+    return float(_threshold(scene.closure, **scene.exposed()).lift) >= LIFTS * scene.weight
 
 
 def meaning(part: Part, name: str) -> str:

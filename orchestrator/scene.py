@@ -6,7 +6,7 @@ names; everything else is in SI units or, where the comment says so, in units of
 
 import re
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -26,8 +26,6 @@ Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
-
-_threshold = cache(closures.threshold)  # thousands of scenes have the same grain
 
 
 class Part(BaseModel):
@@ -232,10 +230,10 @@ class Scene(Part):
 
     def closed_form(self, closure: Closure) -> Threshold:
         """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
-        return _threshold(closure, **self._exposed())
+        return closures.threshold(closure, **self.exposed())
 
-    def _exposed(self) -> dict[str, float]:
-        """All that the closed form depends on."""
+    def exposed(self) -> dict[str, float]:
+        """All that the closed form depends on: arguments of `closures.threshold`."""
         return {
             "diameter": self.grain.diameter,
             "density": self.grain.density,
@@ -283,7 +281,7 @@ class Scene(Part):
 
 def decide_regimes(scenes: Sequence[Scene]) -> None:
     """Find the regimes of many scenes at once, which is a hundred times faster than one by one."""
-    rows = [scene._exposed() for scene in scenes]
+    rows = [scene.exposed() for scene in scenes]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     low, high = (closures.threshold(closure, **columns) for closure in closures.CLOSURES)
     for scene, regime in zip(scenes, closures.regime(low, high).tolist(), strict=True):

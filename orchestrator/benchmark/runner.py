@@ -20,8 +20,6 @@ from orchestrator.files import digest_files, read_json, write_json
 from orchestrator.solvers import process
 
 LOG = "log.txt"
-LAST_LINES = 200
-"""Characters of a log's end that a message repeats."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +187,8 @@ def _attempt(
     if ended.timed_out:
         error = f"it did not end within {limit_s:g} s and was killed"
     elif used.get("returncode") != 0:
-        error = f"it ended with {used.get('returncode')}{_last_words(folder / LOG)}"
+        said = process.last_words(folder / LOG)
+        error = f"it ended with {used.get('returncode')}{said and f': {said}'}"
     elif _digests(case) != _digests(chosen.directory(name)):
         error = "it changed the files of its case"
     harm, other = watch.harm(), watch.restored()
@@ -200,11 +199,6 @@ def _attempt(
 
 def _digests(folder: Path) -> dict[str, str]:
     return digest_files((path for path in folder.rglob("*") if path.is_file()), root=folder)
-
-
-def _last_words(log: Path) -> str:
-    said = log.read_text(errors="replace").strip().splitlines()
-    return f": {said[-1][-LAST_LINES:]}" if said else ""
 
 
 Mark = tuple[int, int] | None

@@ -84,11 +84,8 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
         part[row, column] = rows[name]
     listed = ~np.isnan(state[0, 1:])
     resting = ~listed & _there(listed, _left(directory, ids, looks), looks)
-    places, motion = state[:2], state[2:]
-    for part in places:
-        np.copyto(part[1:], part[0], where=resting)
-    for part in motion:
-        part[1:][resting] = 0.0
+    for part, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0), strict=True):
+        np.copyto(part[1:], still, where=resting)
     return state
 
 

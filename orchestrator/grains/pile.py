@@ -254,7 +254,12 @@ class PileCase(GrainCase):
         Parameters
         ----------
         cases : Path
-            Holds the finished flow case; positive is downstream.
+            Holds the finished flow case, if the stress is that of one.
+
+        Returns
+        -------
+        ndarray, shape (grains of the packing,)
+            Of the mean stress around each grain; positive is downstream.
         """
         flow, d = self.scene.flow, self.scene.grain.diameter
         length = max(d, flow.average * self.bed.height)

@@ -17,6 +17,8 @@ from orchestrator.errors import Interrupted
 
 GRACE_S = 2.0
 POLL_S = 0.1
+LAST_LETTERS = 200
+"""Most of a log's last line that a message repeats."""
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 _SIGACTION_BYTES = 512
@@ -131,6 +133,12 @@ def end_group(process: "subprocess.Popen[bytes]") -> None:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(GRACE_S)
     process.wait()
+
+
+def last_words(log: Path) -> str:
+    """The end of the last line of a log; nothing where it holds none."""
+    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1][-LAST_LETTERS:] if lines else ""
 
 
 def _dies_with_its_parent() -> list[str]:
