@@ -23,7 +23,7 @@ test-faults: lint  ## kill, harm and starve a small study, and count what it sur
 known: setup  ## measure the ladder and the maps anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
-	cp results/ladder/tables/rungs.csv results/stability/tables/maps.csv orchestrator/known/
+	cp results/ladder/tables/rungs.csv results/stability/tables/maps.csv orchestrator/fidelity/known/
 	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
 	cp results/ladder/figures/gains.png docs/gains.png
 	cp results/stability/figures/maps.png docs/stability.png

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import case, engine
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import Array, Measure, WallStress
-from orchestrator.scene import default_first_cell_height
+from orchestrator.runs import case, engine
+from orchestrator.study.scene import default_first_cell_height
 
 HEIGHT = 0.02
 ROUGHNESS = (3.3e-6, 3.333e-5, 1e-4)

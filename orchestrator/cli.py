@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
-from orchestrator.cluster import SYSTEMS, Queue
 from orchestrator.errors import InputError, OrchestratorError, of_system
+from orchestrator.runs.cluster import SYSTEMS, Queue
 
 INTERRUPTED = 130
 NUMBERS: dict[str, tuple[float | None, str]] = {
@@ -188,7 +188,8 @@ def _workers(text: str) -> int:
 
 
 def _study(options: argparse.Namespace) -> int:
-    from orchestrator import pipeline, study
+    from orchestrator import pipeline
+    from orchestrator.study import study
 
     asked = study.load(options.source)
     if options.tolerance is not None:
@@ -203,8 +204,8 @@ def _study(options: argparse.Namespace) -> int:
 
 
 def _ladder(options: argparse.Namespace) -> int:
-    from orchestrator import study
     from orchestrator.experiments import run
+    from orchestrator.study import study
 
     asked = study.load(options.source)
     out = options.out or Path("results") / "ladder"
@@ -234,7 +235,7 @@ def _end(page: Path, failures: dict[str, OrchestratorError]) -> int:
 
 
 def _status(options: argparse.Namespace) -> int:
-    from orchestrator import status
+    from orchestrator.runs import status
 
     found = status.read(options.directory)
     print(status.text(found))
@@ -249,7 +250,7 @@ def _prune(options: argparse.Namespace) -> int:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    from orchestrator import doctor
+    from orchestrator.solvers import doctor
 
     findings = doctor.examine()
     print(doctor.text(findings))
@@ -269,7 +270,7 @@ OPTION_OF = {
 
 
 def _threshold(options: argparse.Namespace) -> int:
-    from orchestrator import answer
+    from orchestrator.grains import answer
 
     try:
         scene = answer.scene(

@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator import __version__, case, cluster, engine, plan, report, tables
-from orchestrator.case import Case
-from orchestrator.cluster import Queue
+from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.files import (
+from orchestrator.plan import Plan
+from orchestrator.runs import case, cluster, engine
+from orchestrator.runs.case import Case
+from orchestrator.runs.cluster import Queue
+from orchestrator.runs.files import (
     canonical_json,
     digest_file,
     digest_files,
@@ -18,10 +20,9 @@ from orchestrator.files import (
     read_json,
     write_json,
 )
-from orchestrator.plan import Plan
-from orchestrator.progress import Display
-from orchestrator.study import Study, parse
-from orchestrator.workspace import Workspace
+from orchestrator.runs.progress import Display
+from orchestrator.runs.workspace import Workspace
+from orchestrator.study.study import Study, parse
 
 
 @dataclass(frozen=True)

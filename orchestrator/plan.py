@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator import checks, rungs
-from orchestrator.case import Case, done_state, failure
 from orchestrator.errors import InputError
+from orchestrator.fidelity import checks, rungs
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import PileCase
-from orchestrator.scene import PileBed, Scene
-from orchestrator.study import Study
+from orchestrator.runs.case import Case, done_state, failure
+from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.study import Study
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator import case, pipeline, report, tables
-from orchestrator.status import size_text, sizes
-from orchestrator.workspace import Workspace
+from orchestrator import pipeline, report, tables
+from orchestrator.runs import case
+from orchestrator.runs.status import size_text, sizes
+from orchestrator.runs.workspace import Workspace
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class Pruned:
     Attributes
     ----------
     before, after : mapping of str to int
-        Bytes on disk, as in `orchestrator.status.Status`.
+        Bytes on disk, as in `orchestrator.runs.status.Status`.
     cases : int
         How many cases are pruned now.
     kept : tuple of str

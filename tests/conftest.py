@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import assets
-from orchestrator.solvers import liggghts, process
+from orchestrator.runs import assets, process
+from orchestrator.solvers import liggghts
 
 Deck = Callable[..., str]
 

@@ -9,9 +9,9 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from orchestrator import curves
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, ours
+from orchestrator.physics import curves
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
 

@@ -19,7 +19,7 @@ from orchestrator.benchmark.problem import (
 )
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY, LAST
 from orchestrator.grains.protocol import SETTLE_FLOW, START
-from orchestrator.scene import Grain, Scene
+from orchestrator.study.scene import Grain, Scene
 
 FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
 """Relative tolerances."""

@@ -9,15 +9,17 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator import case, plan, study, tables
+from orchestrator import plan, tables
 from orchestrator.benchmark import exact, measured, ours, pack
 from orchestrator.benchmark.problem import Problem
 from orchestrator.errors import InputError
 from orchestrator.plan import Plan
+from orchestrator.runs import case
+from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
-from orchestrator.study import Study
+from orchestrator.study import study
+from orchestrator.study.study import Study
 from orchestrator.tables import scenes as scene_rows
-from orchestrator.workspace import Workspace
 
 LEVELS = (1, 2, 3, 4, 5)
 FORMULAS = (1, 2)

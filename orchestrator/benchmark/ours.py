@@ -13,18 +13,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator import assets, engine, plan, study, tables
+from orchestrator import plan, tables
 from orchestrator.benchmark import exact, measured
 from orchestrator.benchmark.answer import STEPS
 from orchestrator.benchmark.measured import Answered
 from orchestrator.benchmark.pack import STUDY, Pack
 from orchestrator.benchmark.problem import Problem
-from orchestrator.case import Case, done_state
 from orchestrator.errors import InputError, SolverError
 from orchestrator.plan import Plan
-from orchestrator.scene import Scene
-from orchestrator.solvers import liggghts, process
-from orchestrator.study import Group
+from orchestrator.runs import assets, engine, process
+from orchestrator.runs.case import Case, done_state
+from orchestrator.solvers import liggghts
+from orchestrator.study import study
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import Group
 from orchestrator.tables import scenes as scene_rows
 
 LIMIT_S = 3600.0

@@ -14,7 +14,7 @@ import pandas as pd
 
 from orchestrator.benchmark.problem import SCENE, SCHEMA, Problem, csv
 from orchestrator.errors import InputError
-from orchestrator.files import digest_files, read_json, write_json
+from orchestrator.runs.files import digest_files, read_json, write_json
 
 MANIFEST = "manifest.json"
 EXPECTED = "expected.csv"

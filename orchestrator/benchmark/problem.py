@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.scene import Scene
+from orchestrator.study.scene import Scene
 
 SCHEMA = 1
 """Of the exchange format, ``docs/benchmark.md``."""

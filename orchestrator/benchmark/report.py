@@ -11,7 +11,7 @@ import pandas as pd
 
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict
-from orchestrator.files import write_durably
+from orchestrator.runs.files import write_durably
 
 PAGE = "comparison.html"
 NUMBERS = "comparison.csv"

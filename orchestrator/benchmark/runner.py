@@ -16,8 +16,8 @@ from orchestrator.benchmark.problem import csv
 from orchestrator.benchmark.report import Found
 from orchestrator.benchmark.verdict import OURS, USED, compared
 from orchestrator.errors import InputError
-from orchestrator.files import digest_files, read_json, write_json
-from orchestrator.solvers import process
+from orchestrator.runs import process
+from orchestrator.runs.files import digest_files, read_json, write_json
 
 LOG = "log.txt"
 

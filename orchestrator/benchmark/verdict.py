@@ -13,7 +13,7 @@ from orchestrator.benchmark import answer
 from orchestrator.benchmark.answer import FILE, STEPS, AnswerError
 from orchestrator.benchmark.mistakes import hint
 from orchestrator.benchmark.pack import Pack
-from orchestrator.files import read_json
+from orchestrator.runs.files import read_json
 
 USED = "used.json"
 """What a solver took for a scene, beside its answer."""

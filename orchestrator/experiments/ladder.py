@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator import rungs
 from orchestrator.experiments import naive
+from orchestrator.fidelity import rungs
+from orchestrator.fidelity.rungs import Part, Rung
 from orchestrator.grains.threshold import of_pile
 from orchestrator.plan import Plan
-from orchestrator.rungs import Part, Rung
-from orchestrator.scene import PileBed, Scene
-from orchestrator.study import Study
+from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
 
 Pair = tuple[str, str]

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestrator.errors import InputError
-from orchestrator.scene import Scene
-from orchestrator.study import PARTS, make_scene
+from orchestrator.study.scene import Scene
+from orchestrator.study.study import PARTS, make_scene
 
 FOLDER = Path(__file__).parent / "maps"
 Judge = Literal["pile", "grain"]

@@ -13,12 +13,12 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator import rungs
 from orchestrator.errors import InputError
+from orchestrator.fidelity import rungs
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import PileCase
-from orchestrator.scene import PileBed, Scene
-from orchestrator.study import Study
+from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.study import Study
 
 FEW = {"protocol.step": 0.2, "protocol.quiet": 10.0, "protocol.timestep": 0.2}
 """Few holds, at the time step that is safe, on which the time of one is measured."""

@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 import pandas as pd
 from matplotlib import rc_context
 
-from orchestrator import limits, rungs
+from orchestrator.experiments import ladder_figures as ladder
+from orchestrator.experiments import map_figures as maps
 from orchestrator.experiments.maps import Map
 from orchestrator.experiments.stability import WRONG
-from orchestrator.report import experiment, ladder, maps, style
+from orchestrator.fidelity import limits, rungs
+from orchestrator.report import experiment, style
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
 

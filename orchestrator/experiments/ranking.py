@@ -9,8 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.experiments.ladder import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.fidelity.rungs import Part
 from orchestrator.report.results import split
-from orchestrator.rungs import Part
 
 Row = dict[str, Any]
 TAU, CURVE = "tau_", "curve_"

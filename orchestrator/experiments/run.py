@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pandas as pd
 
-from orchestrator import case as case_states
 from orchestrator import pipeline
-from orchestrator.case import Case
 from orchestrator.experiments import ladder, maps, naive, pages, ranking, stability
-from orchestrator.files import write_durably
 from orchestrator.pipeline import Finished
 from orchestrator.plan import of
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
-from orchestrator.study import TIME_LIMIT_S, Study
-from orchestrator.workspace import Workspace
+from orchestrator.runs import case as case_states
+from orchestrator.runs.case import Case
+from orchestrator.runs.files import write_durably
+from orchestrator.runs.workspace import Workspace
+from orchestrator.study.study import TIME_LIMIT_S, Study
 
 
 def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:

@@ -12,14 +12,14 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator import case as case_states
 from orchestrator.experiments.maps import Map, Run
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import PileCase
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.plan import Plan, of
-from orchestrator.scene import Scene
+from orchestrator.runs import case as case_states
+from orchestrator.study.scene import Scene
 
 Row = dict[str, Any]
 

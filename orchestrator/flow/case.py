@@ -9,14 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.case import Case
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow import diagnostics
 from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
-from orchestrator.scene import BUILDABLE_DEG, Convection, Turbulence
+from orchestrator.runs.case import Case
 from orchestrator.solvers import openfoam
+from orchestrator.study.scene import BUILDABLE_DEG, Convection, Turbulence
 
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.closures import KARMAN
-from orchestrator.files import write_durably
 from orchestrator.flow.stress import WallStress
+from orchestrator.physics.closures import KARMAN
+from orchestrator.runs.files import write_durably
 
 UPSTREAM_OF_TOE = 9.0
 """Where the bed is undisturbed yet, h before the windward toe: the pile slows the flow by 4 % at

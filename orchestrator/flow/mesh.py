@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
-from orchestrator.solvers import process
+from orchestrator.runs import process
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""

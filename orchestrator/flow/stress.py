@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orchestrator.closures import log_law_ustar
 from orchestrator.errors import InputError, SolverError
-from orchestrator.files import write_durably
+from orchestrator.physics.closures import log_law_ustar
+from orchestrator.runs.files import write_durably
 from orchestrator.solvers.openfoam import read_last_time, read_numbers
 
 if TYPE_CHECKING:

@@ -30,8 +30,8 @@ from math import ceil, log, pi, radians, sqrt, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.closures import KARMAN
 from orchestrator.flow.stress import WallStress
+from orchestrator.physics.closures import KARMAN
 
 Array = NDArray[np.float64]
 

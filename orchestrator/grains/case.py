@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
-from orchestrator.case import Case
+from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 
 

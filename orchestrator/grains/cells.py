@@ -12,11 +12,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.closures import Powers
-from orchestrator.files import canonical_json
 from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
-from orchestrator.scene import Scene
+from orchestrator.physics.closures import Powers
+from orchestrator.runs.files import canonical_json
+from orchestrator.study.scene import Scene
 
 DIAMETER = 1e-3
 DENSITY = 2500.0

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.closures import Powers
+from orchestrator.physics.closures import Powers
 
 FloatArray = NDArray[np.float64]
 

@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator import packing
-from orchestrator.case import Case
+from orchestrator.bed import packing
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
@@ -17,7 +16,8 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains import deck, motion, peeling, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.grains.motion import Motion
-from orchestrator.scene import PileBed, Scene
+from orchestrator.runs.case import Case
+from orchestrator.study.scene import PileBed, Scene
 
 FloatArray = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestrator.case import Case
     from orchestrator.plan import Plan
-    from orchestrator.study import Study
+    from orchestrator.runs.case import Case
+    from orchestrator.study.study import Study
     from orchestrator.tables import Tables
 
 PAGE = "report.html"
@@ -44,9 +44,9 @@ def write(
         The page.
     """
     # the drawing libraries take half a second to import: only who draws waits for them
-    from orchestrator.files import write_durably
     from orchestrator.report import claims, gallery, page
     from orchestrator.report.results import Results
+    from orchestrator.runs.files import write_durably
 
     results = Results(study, plan, tables, out / "cases")
     folder = out / FIGURES

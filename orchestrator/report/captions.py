@@ -5,10 +5,10 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from orchestrator import curves
 from orchestrator.grains import motion
 from orchestrator.grains.pile import PileCase
 from orchestrator.grains.protocol import LOOK
+from orchestrator.physics import curves
 from orchestrator.report import labels, reference, theory
 from orchestrator.report.results import Results, valid
 from orchestrator.report.snapshot import Snapshot

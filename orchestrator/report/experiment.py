@@ -7,10 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.files import write_durably
 from orchestrator.report import FIGURES, facts, page, style
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
+from orchestrator.runs.files import write_durably
 
 LONG = 60
 """Rows of a table that is folded away."""

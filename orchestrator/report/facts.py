@@ -8,11 +8,11 @@ from platform import python_version
 import pandas as pd
 
 from orchestrator import __version__
-from orchestrator import rungs as ladder
-from orchestrator.case import IDENTITY
-from orchestrator.files import read_json
+from orchestrator.fidelity import rungs as ladder
 from orchestrator.report import labels
 from orchestrator.report.results import Results, by_dem, held, split, valid, varying
+from orchestrator.runs.case import IDENTITY
+from orchestrator.runs.files import read_json
 from orchestrator.tables import COLUMNS
 
 PACKAGES = (

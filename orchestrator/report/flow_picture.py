@@ -9,12 +9,12 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from orchestrator.case import is_whole
 from orchestrator.grains.pile import PileCase
 from orchestrator.report import captions, flow_field, stress, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.flow_field import Window
 from orchestrator.report.results import Results
+from orchestrator.runs.case import is_whole
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from matplotlib import rc_context
 
-from orchestrator import retry
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
     animation,
@@ -25,7 +24,7 @@ from orchestrator.report import (
 )
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
-from orchestrator.solvers import process
+from orchestrator.runs import process, retry
 
 Drawn = tuple[Figure, bytes]
 """A figure without its canvas, and its image: PNG, of an animation GIF."""

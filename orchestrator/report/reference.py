@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator import curves
-from orchestrator.curves import Air
+from orchestrator.physics import curves
+from orchestrator.physics.curves import Air
 from orchestrator.report.theory import sweep
 
 FloatArray = NDArray[np.float64]

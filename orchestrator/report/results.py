@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from orchestrator.case import is_whole
 from orchestrator.grains.pile import PileCase
 from orchestrator.plan import Plan
-from orchestrator.study import Study
+from orchestrator.runs.case import is_whole
+from orchestrator.study.study import Study
 from orchestrator.tables import Tables
 
 RAMP_BELOW = 3.0

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from orchestrator import curves
-from orchestrator.closures import HIGH_FROM, LOW_BELOW
+from orchestrator.physics import curves
+from orchestrator.physics.closures import HIGH_FROM, LOW_BELOW
 from orchestrator.report import labels, reference, style
 from orchestrator.report.results import valid
 from orchestrator.report.theory import Branch, drag_law_limit

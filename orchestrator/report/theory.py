@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator import closures
-from orchestrator.closures import Closure, Threshold
+from orchestrator.physics import closures
+from orchestrator.physics.closures import Closure, Threshold
 
 FloatArray = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator import checks
 from orchestrator.errors import OrchestratorError
-from orchestrator.files import discard, write_durably
+from orchestrator.fidelity import checks
 from orchestrator.plan import Plan
-from orchestrator.study import Study
+from orchestrator.runs.files import discard, write_durably
+from orchestrator.study.study import Study
 from orchestrator.tables import piles, scenes, single
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter

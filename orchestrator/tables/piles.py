@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator import checks, rungs
+from orchestrator.fidelity import checks, rungs
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Face, PileCase
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.scene import Scene
+from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
 

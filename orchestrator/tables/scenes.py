@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from orchestrator.plan import Plan
-from orchestrator.scene import PileBed, Scene
-from orchestrator.study import Study
+from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.study import Study
 
 Row = dict[str, Any]
 

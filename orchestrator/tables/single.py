@@ -8,7 +8,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase
 from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
-from orchestrator.scene import Scene
+from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import pipeline, study
+from orchestrator import pipeline
 from orchestrator.benchmark.export import export
+from orchestrator.study import study
 
 ROOT = Path(__file__).parents[2]
 NATIVE = ROOT / "examples" / "native"

@@ -7,10 +7,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestrator import case, engine, plan, study, tables
+from orchestrator import plan, tables
 from orchestrator.benchmark import measured
-from orchestrator.scene import PileBed
-from orchestrator.study import Group, Study
+from orchestrator.runs import case, engine
+from orchestrator.study import study
+from orchestrator.study.scene import PileBed
+from orchestrator.study.study import Group, Study
 from orchestrator.tables import scenes as scene_rows
 from tests.benchmark.conftest import ROOT
 from tests.conftest import Command

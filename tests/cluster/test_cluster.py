@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import cluster
+from orchestrator.runs import cluster
 from tests.cluster.conftest import Start, tables
 from tests.cluster.slurm import Slurm
 

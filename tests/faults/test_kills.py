@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import retry
+from orchestrator.runs import retry
 from tests.faults.bench import (
     Bench,
     case_of,

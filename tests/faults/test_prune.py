@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import case, cli, plan, study
-from orchestrator.files import read_json
+from orchestrator import cli, plan
 from orchestrator.plan import Plan
+from orchestrator.runs import case
+from orchestrator.runs.files import read_json
+from orchestrator.study import study
 from tests.faults.bench import Bench, case_of, same_tables
 
 

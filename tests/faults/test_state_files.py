@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import case, cli, plan, study
+from orchestrator import cli, plan
 from orchestrator.errors import SolverError
+from orchestrator.runs import case
+from orchestrator.study import study
 from tests.faults.bench import Bench, case_of, same_tables
 from tests.faults.ledger import Ledger
 

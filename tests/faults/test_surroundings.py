@@ -141,7 +141,8 @@ WITHOUT_LOCKS = (
     "-c",
     """
 import errno, fcntl, sys
-from orchestrator import cli, lock
+from orchestrator import cli
+from orchestrator.runs import lock
 def flock(*_):
     raise OSError(errno.ENOLCK, "No locks available")
 fcntl.flock, lock.BEAT_S = flock, 0.5

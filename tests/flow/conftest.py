@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import assets, case
 from orchestrator.flow.case import FlowCase
-from orchestrator.solvers import process
+from orchestrator.runs import assets, case, process
 
 PILE = FlowCase(
     slope_deg=15.0,

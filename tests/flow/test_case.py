@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator import case
 from orchestrator.errors import Exploded, InputError, SolverError, Stalled
 from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, read_openfoam
-from orchestrator.scene import Turbulence, default_first_cell_height
-from orchestrator.solvers import openfoam, process
+from orchestrator.runs import case, process
+from orchestrator.solvers import openfoam
+from orchestrator.study.scene import Turbulence, default_first_cell_height
 from tests.flow.conftest import PILE, SLOW, Solve, allrun
 from tests.flow.test_mesh import edit
 

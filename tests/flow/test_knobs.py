@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import plan, study
+from orchestrator import plan
 from orchestrator.grains.pile import PileCase
+from orchestrator.study import study
 
 TEXT = """
 [grain]

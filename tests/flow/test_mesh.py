@@ -9,11 +9,11 @@ import meshio
 import numpy as np
 import pytest
 
-from orchestrator import assets, case
 from orchestrator.errors import SolverError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import Mesh, first_cell_heights, smallest_jacobian, write_mesh
-from orchestrator.scene import default_first_cell_height
+from orchestrator.runs import assets, case
+from orchestrator.study.scene import default_first_cell_height
 from tests.flow.conftest import PILE
 
 

@@ -14,9 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from orchestrator import case, cli
+from orchestrator import cli
 from orchestrator.grains.cells import CellsCase
-from orchestrator.scene import Flow, Fluid, Grain, GrainBed, PileBed, Protocol, Scene
+from orchestrator.runs import case
+from orchestrator.study.scene import Flow, Fluid, Grain, GrainBed, PileBed, Protocol, Scene
 
 Words = tuple[int, str]
 
@@ -173,7 +174,7 @@ def test_study_files_of_any_bytes(shell: Shell, content: bytes) -> None:
     assert shell.files() == {shell.folder / "bad.toml"}
 
 
-VALID = Path(__file__).parents[2] / "orchestrator" / "presets" / "first-look.toml"
+VALID = Path(__file__).parents[2] / "orchestrator" / "study" / "presets" / "first-look.toml"
 
 
 @QUICK

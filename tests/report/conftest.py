@@ -8,9 +8,11 @@ import pandas as pd
 import pytest
 from matplotlib import rc_context
 
-from orchestrator import engine, plan, report, study, tables
+from orchestrator import plan, report, tables
 from orchestrator.report import style
 from orchestrator.report.results import Results
+from orchestrator.runs import engine
+from orchestrator.study import study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import curves, study
+from orchestrator.physics import curves
 from orchestrator.report import claims, page
 from orchestrator.report.claims import base, counting
 from orchestrator.report.claims.base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
-from orchestrator.scene import Scene
+from orchestrator.study import study
+from orchestrator.study.scene import Scene
 from orchestrator.tables import Tables, scenes
 
 

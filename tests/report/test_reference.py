@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator import closures, curves
+from orchestrator.physics import closures, curves
 from orchestrator.report import reference, theory
 from orchestrator.report.results import Results
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from orchestrator.closures import Closure
+from orchestrator.physics.closures import Closure
 from orchestrator.report.results import by_dem, split, valid
 from orchestrator.tables import Tables
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator import curves
-from orchestrator.closures import CLOSURES, Closure
+from orchestrator.physics import curves
+from orchestrator.physics.closures import CLOSURES, Closure
 from orchestrator.report import labels, reference
 from orchestrator.report.claims.base import NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.report.results import split

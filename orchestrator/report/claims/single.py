@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from orchestrator import closures
+from orchestrator.physics import closures
 from orchestrator.report.claims.base import (
     BY_SHARE,
     NAMES,

@@ -1,0 +1,1 @@
+"""The bed: where its grains lie and which of them are exposed."""

@@ -1,0 +1,295 @@
+"""Where the grains of a bed lie, which of them are exposed, and which may move.
+
+A packing is a lattice of equal spheres in the plane of the flow: rows in which the centres are
+``2 d cos(beta)`` apart, each row resting in the pockets of the one below, ``d sin(beta)`` lower.
+Lengths here are in diameters, with the windward toe of the flow's bed line at the origin.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.bed.disorder import rows as disorder_rows
+from orchestrator.study.scene import Packing as Pattern
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+TIE = 1e-6
+"""Of a diameter: neighbours of a lattice lie exactly on the limits below, and a tie must not be
+decided by round-off."""
+APRON = 10.0
+"""Length of the fixed flat bed beyond each toe, diameters."""
+STRAY = 0.1
+"""Rows of a disordered bed are straight within this, diameters: no neighbour of a row covers
+another, and none stands out too far."""
+DISORDERED = 4
+"""Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
+is the same for any number of mobile layers up to it."""
+TWIN = 1e-9
+"""How far the grains of a lattice's twin lie aside, diameters: as far as matters to nothing but
+which grain of a chain goes first."""
+LEE_DEPTH = 1.5
+"""Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """The bed line of a pile: flat, up the windward face, down the lee face, flat.
+
+    Attributes
+    ----------
+    slope_deg : float
+        Slope of both faces, alpha.
+    height : float
+        Height h of the crest over the flat bed, diameters.
+    """
+
+    slope_deg: float
+    height: float
+
+    @property
+    def tangent(self) -> FloatArray:
+        """Unit vector up the windward face, (x, z)."""
+        alpha = np.radians(self.slope_deg)
+        return np.array([np.cos(alpha), np.sin(alpha)])
+
+    @property
+    def normals(self) -> tuple[FloatArray, FloatArray]:
+        """Outward unit normals of the windward and of the lee face."""
+        x, z = self.tangent
+        return np.array([-z, x]), np.array([z, x])
+
+    @property
+    def crest(self) -> FloatArray:
+        """Position of the crest, diameters."""
+        return np.array([self.height / np.tan(np.radians(self.slope_deg)), self.height])
+
+    def depth(self, points: FloatArray, face: int) -> FloatArray:
+        """Signed distance of points (n, 2) below a face's line (0 windward, 1 lee), diameters."""
+        return np.asarray(-(points - self.crest) @ self.normals[face])
+
+    def arc_length(self, points: FloatArray) -> FloatArray:
+        """Arc length from the windward toe to the foot of each point's normal, diameters."""
+        top = self.height / np.sin(np.radians(self.slope_deg))
+        up = (points - self.crest) @ self.tangent
+        down = (points - self.crest) @ (self.tangent * [1, -1])
+        along = np.where(self.is_windward(points), np.minimum(top + up, top), top + down)
+        return np.asarray(along)
+
+    def is_windward(self, points: FloatArray) -> BoolArray:
+        """Which points belong to the windward face; the crest's own grain does."""
+        return np.asarray(points[:, 0] <= self.crest[0] + TIE)
+
+
+@dataclass(frozen=True)
+class Packing:
+    """The grains of a pile, n of them, lengths in diameters.
+
+    Attributes
+    ----------
+    centres : ndarray, shape (n, 2)
+        x and z of each centre.
+    mobile : ndarray of bool, shape (n,)
+        May move; the others are fixed.
+    windward, lee : ndarray of bool, shape (n,)
+        Exposed on that face.
+    arc_length : ndarray, shape (n,)
+        Position along the bed line; it means something for exposed grains.
+    """
+
+    centres: FloatArray
+    mobile: BoolArray
+    windward: BoolArray
+    lee: BoolArray
+    arc_length: FloatArray
+
+    @property
+    def count(self) -> int:
+        """N(d): how many grains the windward face exposes."""
+        return int(self.windward.sum())
+
+
+def pile(
+    triangle: Triangle,
+    *,
+    entrainment_angle_deg: float,
+    gap: float,
+    pattern: Pattern,
+    mobile_layers: int,
+    disorder: float = 0.0,
+    seed: int = 0,
+) -> Packing:
+    """Pack a triangular pile.
+
+    Parameters
+    ----------
+    triangle : Triangle
+        The bed line of the flow.
+    entrainment_angle_deg : float
+        beta of the lattice.
+    gap : float
+        Height of the exposed grains' lowest points over the bed line, z0/d.
+    pattern : {"aligned", "horizontal", "disordered"}
+        Rows along the windward face, or level; or along it with random gaps.
+    mobile_layers : int
+        Layers of the windward face that may move.
+    disorder : float
+        Of a disordered packing: largest gap in the row below the mobile ones, diameters.
+    seed : int
+        Of a disordered packing: which of the many. Of a lattice: itself, or which of its twins.
+    """
+    beta = np.radians(entrainment_angle_deg)
+    surface = 0.5 + gap
+    row_height = float(np.sin(beta))
+    most = int(np.ceil(triangle.height / np.cos(np.radians(triangle.slope_deg)) / row_height)) + 1
+    mobile_layers = min(mobile_layers, most)
+    uneven = max(mobile_layers, DISORDERED)
+    points = _points(triangle, pattern, beta, surface, uneven, disorder, seed)
+    stray = STRAY if pattern == "disordered" else TIE
+    # under a slope's level rows a grain rests on one that lies deeper below the face
+    layers = mobile_layers + (pattern == "horizontal")
+    body = _shell(points, triangle, beta, surface, layers, stray)
+    buried = body[:, 1] < surface - TIE
+    in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
+    windward, lee = (face & ~buried for face in exposed(body, triangle, disorder))
+    mobile = (in_layers & ~buried) | windward
+    idle = buried & ~_touching(body, mobile)
+    body = body[~idle]
+    mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
+    centres = np.vstack([body, _apron(body, surface)])
+    rest = np.zeros(len(centres) - len(body), bool)
+    aside = TWIN if pattern != "disordered" and seed else 0.0
+    shift = np.random.default_rng(seed).uniform(-aside, aside, centres.shape)
+    return Packing(
+        centres=centres + shift,
+        mobile=np.append(mobile, rest),
+        windward=np.append(windward, rest),
+        lee=np.append(lee, rest),
+        arc_length=triangle.arc_length(centres),
+    )
+
+
+def _points(
+    triangle: Triangle,
+    pattern: Pattern,
+    beta: float,
+    surface: float,
+    uneven: int,
+    disorder: float,
+    seed: int,
+) -> FloatArray:
+    """Where grains of the pattern may lie, one of them on the crest."""
+    direction = np.array([1.0, 0.0]) if pattern == "horizontal" else triangle.tangent
+    apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
+    lattice = _lattice(triangle, apex, direction, beta)
+    if pattern != "disordered":
+        return lattice
+    columns = int(np.ceil(np.linalg.norm(triangle.crest) / np.cos(beta) / 2)) + uneven + 4
+    rows = disorder_rows(columns, uneven, beta=beta, size=disorder, seed=seed)
+    normal = triangle.normals[0]
+    upper = apex + np.vstack(rows) @ np.vstack([direction, normal])
+    below = (apex - lattice) @ normal > (uneven + 0.5) * np.sin(beta)
+    return np.vstack([upper, lattice[below]])
+
+
+def _shell(
+    points: FloatArray,
+    triangle: Triangle,
+    beta: float,
+    surface: float,
+    layers: int,
+    stray: float,
+) -> FloatArray:
+    """Grains near both faces, and some below the ground.
+
+    Below the layers that hold mobile grains one is enough: a grain touches no deeper one.
+    """
+    depths = [triangle.depth(points, face) + surface for face in (0, 1)]
+    depth, level = np.minimum(*depths), points[:, 1] - surface
+    windward_shell = depths[0] < (layers + 0.5) * np.sin(beta)
+    lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
+    inside = (depth >= -stray) & (windward_shell | lee_shell)
+    covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))
+    return np.asarray(points[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
+
+
+def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
+    """Which points touch one of the chosen ones."""
+    wanted = points[chosen]
+    order = np.argsort(wanted[:, 0])
+    wanted = wanted[order]
+    reach = 1 + 1e-3
+    start = np.searchsorted(wanted[:, 0], points[:, 0] - reach)
+    stop = np.searchsorted(wanted[:, 0], points[:, 0] + reach)
+    return np.array(
+        [
+            bool(np.any(np.hypot(*(wanted[low:high] - point).T) < reach))
+            for point, low, high in zip(points, start, stop, strict=True)
+        ]
+    )
+
+
+def exposed(
+    centres: FloatArray, triangle: Triangle, slack: float = 0.0
+) -> tuple[BoolArray, BoolArray]:
+    """Which grains are exposed on the windward and on the lee face.
+
+    A grain is exposed when no other centre lies higher along the normal of its face within d/2 of
+    the line along that normal through its own centre. A slit narrower than `slack` (diameters)
+    between two grains does not expose the one under it.
+    """
+    side = triangle.is_windward(centres)
+    found = []
+    for face, own in enumerate((side, ~side)):
+        normal = triangle.normals[face]
+        along = centres @ np.array([normal[1], -normal[0]])
+        height = centres @ normal
+        free = _unshadowed(along, height, 0.5 + slack + TIE, STRAY if slack else TIE)
+        found.append(free & own)
+    return found[0], found[1]
+
+
+def _unshadowed(along: FloatArray, height: FloatArray, reach: float, stray: float) -> BoolArray:
+    """Which points have none that is higher within a reach along the face."""
+    order = np.argsort(along, kind="stable")
+    x, z = along[order], height[order]
+    free = np.ones(len(x), bool)
+    # neighbours by place: first each point with the next one, then with the one after that
+    for apart in range(1, len(x)):
+        near = np.flatnonzero(x[apart:] - x[:-apart] <= reach)
+        if not len(near):
+            break
+        first, second = near, near + apart
+        free[first] &= z[second] <= z[first] + stray
+        free[second] &= z[first] <= z[second] + stray
+    found = np.empty_like(free)
+    found[order] = free
+    return found
+
+
+def _lattice(
+    triangle: Triangle, anchor: FloatArray, direction: FloatArray, beta: float
+) -> FloatArray:
+    """Every lattice point within the triangle's corners, with a margin."""
+    normal = np.array([-direction[1], direction[0]])
+    toe = [2 * triangle.crest[0], 0.0]
+    corners = np.array([[0.0, 0.0], toe, triangle.crest]) - anchor
+    along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
+    rows = np.arange(0, np.ceil(down.max()) + 3)
+    columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)
+    row, column = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
+    offset = (2 * column + row % 2) * np.cos(beta)
+    return anchor + np.outer(offset, direction) - np.outer(row * np.sin(beta), normal)
+
+
+def _apron(body: FloatArray, surface: float) -> FloatArray:
+    """Two flat rows of touching fixed grains, each starting where it touches the pile."""
+    drop = np.abs(body[:, 1] - surface)
+    near = body[drop < 1]
+    clearance = np.sqrt(1 - drop[drop < 1] ** 2)
+    first = (near[:, 0] - clearance).min(), (near[:, 0] + clearance).max()
+    steps = np.arange(0, APRON)
+    x = np.concatenate([first[0] - steps, first[1] + steps])
+    return np.column_stack([x, np.full(len(x), surface)])

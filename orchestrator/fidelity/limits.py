@@ -1,0 +1,267 @@
+"""Where the methods hold: what a study refuses, and what it is warned of.
+
+Each limit was read off a map of `orchestrator stability`, which runs scenes beyond it; the map's
+table lies in ``known/maps.csv``.
+"""
+
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from orchestrator.flow.case import LID_OVER_HEIGHT
+from orchestrator.flow.stress import undisturbed_ustar
+from orchestrator.physics.closures import KARMAN
+from orchestrator.study.scene import PileBed, Scene, UnfitError
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One limit of a method.
+
+    Attributes
+    ----------
+    map : str
+        Name of the map that shows it.
+    field : str
+        The field of a study file to change.
+    beyond : callable
+        What is wrong with a scene, or nothing.
+    says : str
+        The limit in a sentence.
+    remedy : str
+        What would do.
+    refused : bool
+        Whether a study is refused; else it is warned.
+    """
+
+    map: str
+    field: str
+    beyond: Callable[[Scene], str | None]
+    says: str
+    remedy: str
+    refused: bool = True
+
+
+def check(scene: Scene) -> None:
+    """Refuse a scene outside of the regions in which its answer means something.
+
+    Where the answer is merely worse, a warning is given.
+
+    Raises
+    ------
+    UnfitError
+        For the first limit that it is beyond: the field, the map and the remedy.
+    """
+    for limit in LIMITS:
+        if what := limit.beyond(scene):
+            remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
+            if limit.refused:
+                raise UnfitError(limit.field, what, remedy)
+            warnings.warn(f"{limit.field}: {what} ({remedy})", stacklevel=2)
+
+
+def of_map(name: str) -> Iterator[Limit]:
+    """The limits that were read off a map."""
+    return (limit for limit in LIMITS if limit.map == name)
+
+
+def _pile(scene: Scene) -> PileBed | None:
+    return scene.bed if isinstance(scene.bed, PileBed) else None
+
+
+def _solved(scene: Scene) -> PileBed | None:
+    return _pile(scene) if scene.flow.model == "solve" else None
+
+
+def _slope(scene: Scene) -> str | None:
+    slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
+    if slope <= limit + 1e-9:
+        return None
+    return (
+        f"{slope:g} deg is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
+    )
+
+
+def _pile_slope(scene: Scene) -> str | None:
+    bed, (low, high) = _pile(scene), PILE_SLOPES_DEG
+    return f"a pile of {bed.slope_deg:g} deg" if bed and not low <= bed.slope_deg <= high else None
+
+
+def _first_cell(scene: Scene) -> str | None:
+    if not _solved(scene) or 4 * scene.solve_roughness <= scene.first_cell_height:
+        return None
+    return (
+        f"z0 = {scene.solve_roughness:g} m is above half of z_e ="
+        f" {scene.first_cell_height / 2:g} m, the height of the first cell's centre"
+    )
+
+
+def _laminar(scene: Scene) -> str | None:
+    bed = _solved(scene)
+    if not bed:
+        return None
+    ustar0 = undisturbed_ustar(
+        scene.flow.speed, LID_OVER_HEIGHT * bed.height, scene.solve_roughness
+    )
+    ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.flow.viscosity
+    if ratio >= 1:
+        return None
+    return (
+        "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
+        f"{ratio:.2g} of the molecular one"
+    )
+
+
+def _timestep(scene: Scene) -> str | None:
+    if scene.protocol.method != "dem":
+        return None
+    most = largest_timestep(scene.grain.damping)
+    step = scene.protocol.timestep
+    if step <= most:
+        return None
+    return f"{step:g} sqrt(m/K) is above {most:g} at a damping of {scene.grain.damping:g}"
+
+
+def largest_timestep(damping: float) -> float:
+    """The largest safe time step at a damping ratio, sqrt(m/K)."""
+    return next(step for least, step in TIMESTEPS if damping <= least)
+
+
+def _undamped(scene: Scene) -> str | None:
+    if scene.protocol.method != "dem" or scene.grain.damping >= LEAST_DAMPING:
+        return None
+    return f"at a damping of {scene.grain.damping:g} a bed does not come to rest"
+
+
+def _ramp(scene: Scene) -> str | None:
+    rules = scene.protocol
+    if not _pile(scene) or rules.method != "dem" or rules.quiet >= QUIET:
+        return None
+    return f"holds of {rules.quiet:g} sqrt(d/g') end before slow grains have passed: it is a ramp"
+
+
+def _coarse(scene: Scene) -> str | None:
+    step = scene.protocol.step
+    if not _pile(scene) or scene.protocol.method != "dem" or step <= COARSE_STEP:
+        return None
+    return f"holds {step:.0%} apart leave the threshold that wide an interval"
+
+
+def _wedged(scene: Scene) -> str | None:
+    bed = _pile(scene)
+    if not bed or bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
+        return None
+    return (
+        f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those"
+        " under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
+    )
+
+
+def _forced(scene: Scene) -> str | None:
+    if not _pile(scene) or scene.flow.forced == "exposed":
+        return None
+    return f"{scene.flow.forced}: a grain without its force blocks those behind it"
+
+
+def _scheme(scene: Scene) -> str | None:
+    if not _solved(scene) or scene.flow.convection == "linearUpwind":
+        return None
+    return f"{scene.flow.convection} does not converge to the same answer, or not at all"
+
+
+PILE_SLOPES_DEG = (10.0, 35.0)
+"""Slopes of piles that the mesh and the packing have been tried for."""
+TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
+"""Damping ratio, and the largest safe time step up to it."""
+LEAST_DAMPING = 0.03
+QUIET = 3.0
+"""Least time without a passage, sqrt(d/g')."""
+COARSE_STEP = 0.05
+CLOSE_PACKED_DEG = 59.0
+"""Entrainment angle from which the grains of a row hold each other."""
+
+LIMITS = (
+    Limit(
+        "slope",
+        "bed.slope_deg",
+        _slope,
+        "Beyond min(phi, 90 deg - beta) a bed rolls back without any flow: refused.",
+        "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
+    ),
+    Limit(
+        "slope",
+        "bed.slope_deg",
+        _pile_slope,
+        "Piles of 10 to 35 deg: others are refused.",
+        f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg",
+    ),
+    Limit(
+        "first-cell",
+        "bed.roughness",
+        _first_cell,
+        "z_e, half the first cell, is at least 2 z0: refused below; 10 z0 is sound.",
+        "lower it, or raise flow.first_cell_height or bed.height; z_e of 10 z0 is sound",
+    ),
+    Limit(
+        "similarity",
+        "flow.viscosity",
+        _laminar,
+        "In the first cell the eddy viscosity is above the molecular one: refused below.",
+        "take the field of a lower viscosity or a higher speed: u*/U_e is the same",
+    ),
+    Limit(
+        "timestep-damping",
+        "protocol.timestep",
+        _timestep,
+        "The largest safe time step falls with the damping: "
+        + ", ".join(f"{step:g} up to {damping:g}" for damping, step in TIMESTEPS)
+        + " sqrt(m/K); refused above.",
+        "lower it, or the damping",
+    ),
+    Limit(
+        "timestep-damping",
+        "grain.damping",
+        _undamped,
+        f"Without damping a bed never rests: refused below {LEAST_DAMPING:g}.",
+        "0.1 is sound",
+    ),
+    Limit(
+        "entrainment-layers",
+        "bed.entrainment_angle_deg",
+        _wedged,
+        f"Piles have rows that touch: refused below {CLOSE_PACKED_DEG:g} deg.",
+        "60 deg; single grains may have less",
+    ),
+    Limit(
+        "quiet-step",
+        "protocol.quiet",
+        _ramp,
+        f"A pile's hold waits for at least {QUIET:g} sqrt(d/g'): a warning below.",
+        "raise it, unless a ramp is what you want",
+        refused=False,
+    ),
+    Limit(
+        "quiet-step",
+        "protocol.step",
+        _coarse,
+        "A pile's holds are at most 5 % apart: a warning above.",
+        "lower it",
+        refused=False,
+    ),
+    Limit(
+        "forced",
+        "flow.forced",
+        _forced,
+        "Every exposed grain carries a force: a warning otherwise.",
+        "exposed",
+        refused=False,
+    ),
+    Limit(
+        "mesh-scheme-15",
+        "flow.convection",
+        _scheme,
+        "linearUpwind alone converges to the answer: a warning otherwise.",
+        "linearUpwind",
+        refused=False,
+    ),
+)

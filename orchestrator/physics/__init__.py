@@ -1,0 +1,1 @@
+"""Forces on a grain, thresholds in closed form, published curves: no scenes, no files."""

@@ -1,0 +1,276 @@
+"""A case directory: who it is, what it holds, how far it came. It knows nothing of any solver."""
+
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.errors import SolverError
+from orchestrator.runs import assets
+from orchestrator.runs.files import (
+    canonical_json,
+    digest_file,
+    digest_files,
+    digest_text,
+    read_json,
+    remove_empty_folders,
+    size_of,
+    write_durably,
+    write_json,
+)
+
+IDENTITY = "case.json"
+DONE = "done.json"
+FAILED = "failed.json"
+CHECKSUMS = "results.sha256"
+
+
+class Case(ABC):
+    """One run of a solver: what it depends on, how its inputs are written, what its end means.
+
+    A subclass is a frozen value. Its `parameters` and the template it copies are its identity,
+    so two scenes that need the same run name the same directory.
+    """
+
+    kind: ClassVar[str]
+    """Name of the kind, and first word of the directory's name."""
+    template: ClassVar[str]
+    """Folder below `templates/` that the directory starts as a copy of."""
+    recipe: ClassVar[int]
+    """Raised whenever the same parameters come to give other inputs or results."""
+    results: ClassVar[tuple[str, ...]]
+    """Glob patterns of the files that a rerun by hand must reproduce byte for byte."""
+    derived: ClassVar[tuple[str, ...]] = ()
+    """Tables that `collect` makes of the results; not the solver's own."""
+    bulky: ClassVar[tuple[str, ...]] = ()
+    """Large files that the run leaves and no table is made of: `prune` drops them."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, Any]:
+        """All that the run depends on, as JSON; SI units."""
+
+    @property
+    @abstractmethod
+    def cost_s(self) -> float:
+        """Expected wall time on one core, s: for ordering and for the time left, nothing else."""
+
+    @property
+    def needs(self) -> tuple["Case", ...]:
+        """The cases whose results this one's inputs are made of."""
+        return ()
+
+    @abstractmethod
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write parameter files, meshes and tables into a fresh copy of the template."""
+
+    @abstractmethod
+    def collect(self, directory: Path) -> None:
+        """Check how the run ended and derive its tables.
+
+        Raises
+        ------
+        SolverError
+            If the results cannot be trusted, whatever the exit code was.
+        """
+
+    @abstractmethod
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+
+    @cached_property
+    def id(self) -> str:
+        """Digest of all that the results depend on."""
+        return digest_text(
+            canonical_json(
+                {
+                    "kind": self.kind,
+                    "recipe": self.recipe,
+                    "template": assets.template_digest(self.template),
+                    "parameters": self.parameters,
+                    "needs": [case.id for case in self.needs],
+                }
+            )
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the case's directory."""
+        return f"{self.kind}-{self.id[:12]}"
+
+
+def prepare(case: Case, cases: Path) -> Path:
+    """Make the case's directory afresh, inputs and identity, and return it.
+
+    What an interrupted run left there is thrown away: it is never trusted half-written.
+    """
+    directory = cases / case.name
+    shutil.rmtree(directory, ignore_errors=True)
+    assets.copy_template(case.template, directory)
+    case.write(directory, cases)
+    inputs = [path for path in directory.rglob("*") if path.is_file()]
+    identity = {
+        "id": case.id,
+        "kind": case.kind,
+        "recipe": case.recipe,
+        "template": case.template,
+        "template_sha256": assets.template_digest(case.template),
+        "parameters": case.parameters,
+        "needs": [need.name for need in case.needs],
+        "inputs_sha256": digest_files(inputs, root=directory),
+        "programs": case.versions(),
+    }
+    write_json(directory / IDENTITY, identity)
+    return directory
+
+
+def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s: float) -> None:
+    """Mark a case as done: the last file written, with digests of all that it vouches for."""
+    results = digest_files(_matching(directory, case.results), root=directory)
+    derived = digest_files(_matching(directory, case.derived), root=directory)
+    stamps = {name: list(_stamp(directory / name)) for name in (*results, *derived)}
+    sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
+    write_durably(directory / CHECKSUMS, sums)
+    (directory / FAILED).unlink(missing_ok=True)
+    write_json(
+        directory / DONE,
+        {
+            "ended": "done",
+            "solver_s": solver_s,
+            "cpu_s": cpu_s,
+            "wall_s": wall_s,
+            "results_sha256": results,
+            "derived_sha256": derived,
+            "stamps": stamps,
+            "bytes": size_of(directory),
+        },
+    )
+
+
+def fail(directory: Path, error: SolverError) -> None:
+    """Leave a note of how and why a case failed; the next study run tries it again."""
+    if directory.is_dir():
+        write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
+
+
+def failure(directory: Path) -> str | None:
+    """Why the case in a directory failed, or None if it is not known to have failed.
+
+    The word for its end comes first where it says more than that it failed.
+    """
+    path = directory / FAILED
+    if not path.is_file():
+        return None
+    state = read_json(path)
+    if not isinstance(state, dict):
+        return "its note of failure cannot be read"
+    ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
+    return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
+
+
+def ended(directory: Path) -> tuple[str, str]:
+    """In which way the case in a directory failed, and why; empty where it is not known to have."""
+    state = read_json(directory / FAILED)
+    if not isinstance(state, dict):
+        return "", ""
+    return str(state.get("ended", "")), str(state.get("cause", ""))
+
+
+def is_done(case: Case, cases: Path) -> bool:
+    """Whether the case's directory holds its finished results, unharmed."""
+    return done_state(case, cases) is not None
+
+
+def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
+    """The marker of a finished case, or None where anything about it cannot be trusted."""
+    directory = cases / case.name
+    identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
+    if not isinstance(identity, dict) or identity.get("id") != case.id:
+        return None
+    return state if isinstance(state, dict) and _vouched(directory, state) else None
+
+
+def prune(case: Case, cases: Path) -> None:
+    """Drop the bulky files of a case that is done.
+
+    Their digests stay in the marker, beside a list of what was dropped, and in `CHECKSUMS`: a
+    rerun by hand is still compared with the run that the tables were made of.
+    """
+    directory, state = cases / case.name, done_state(case, cases)
+    if state is None:
+        return
+    files = _matching(directory, case.bulky)
+    names = {path.relative_to(directory).as_posix() for path in files}
+    pruned = sorted(names.union(state.get("pruned", [])))
+    marker = directory / DONE
+    left = size_of(directory) - sum(path.stat().st_size for path in (*files, marker))
+    # first what makes up for the files: killed in between, the case is still done
+    write_json(marker, {**state, "pruned": pruned, "bytes": left})
+    for path in files:
+        path.unlink()
+    remove_empty_folders(directory, (path.parent for path in files))
+
+
+def size(directory: Path, state: Mapping[str, Any]) -> int:
+    """Bytes on disk of the case in a directory, whose marker says what it came to at its end."""
+    told = state.get("bytes")
+    try:
+        return told + (directory / DONE).stat().st_size if type(told) is int else size_of(directory)
+    except OSError:
+        return size_of(directory)
+
+
+def is_whole(case: Case, cases: Path) -> bool:
+    """Whether a finished case has all of its files: nothing was pruned, or a rerun made it anew."""
+    state = read_json(cases / case.name / DONE)
+    pruned = state.get("pruned", []) if isinstance(state, dict) else []
+    return all((cases / case.name / name).is_file() for name in pruned)
+
+
+def programs(cases: Path) -> dict[str, str]:
+    """The programs, with versions, that the cases in a directory were made with."""
+    found: dict[str, str] = {}
+    for path in sorted(cases.glob(f"*/{IDENTITY}")):
+        identity = read_json(path)
+        found.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
+    return found
+
+
+def _vouched(directory: Path, state: dict[str, Any]) -> bool:
+    try:
+        digests = {**state["results_sha256"], **state["derived_sha256"]}
+        if not state["wall_s"] >= state["solver_s"] >= 0:
+            return False
+        dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
+        stamps, marked = state.get("stamps", {}), (directory / DONE).stat().st_mtime_ns
+        return bool(digests) and all(
+            name in dropped
+            or _untouched(directory / name, stamps.get(name), marked)
+            or digest_file(directory / name) == digest
+            for name, digest in digests.items()
+        )
+    except (AttributeError, KeyError, TypeError, OSError):
+        return False
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Size, bytes, and time of the last change, ns."""
+    found = path.stat()
+    return found.st_size, found.st_mtime_ns
+
+
+def _untouched(path: Path, stamp: Any, marked: int) -> bool:
+    """Whether a file is as it was when the case was marked as done, at that time in ns.
+
+    Digests of a thousand piles are those of 7 GB. A file that was written in the same tick of the
+    clock as the marker may have been changed since without a trace: its digest has to tell.
+    """
+    size, changed = _stamp(path)
+    return [size, changed] == stamp and changed < marked
+
+
+def _matching(directory: Path, patterns: tuple[str, ...]) -> list[Path]:
+    found = {path for pattern in patterns for path in directory.glob(pattern) if path.is_file()}
+    return sorted(found)

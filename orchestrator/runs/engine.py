@@ -1,0 +1,255 @@
+"""Run what is missing of a plan's cases: many at a time, wherever a pool runs them, none twice."""
+
+import concurrent.futures
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_fault, of_system
+from orchestrator.runs import case as case_states
+from orchestrator.runs import process, retry
+from orchestrator.runs.agenda import Agenda
+from orchestrator.runs.case import Case
+
+LOG = "log.Allrun"
+POLL_S = 0.2
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""As many cases run as there are cores: a solver that took more would take them from others."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended: without an error, it is done.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    seconds : float
+        What it took, s; 0 where that is not known.
+    error : OrchestratorError or None
+        Why it failed.
+    """
+
+    case: Case
+    seconds: float = 0.0
+    error: OrchestratorError | None = None
+
+
+Report = Callable[[Outcome], None]
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Where cases run.
+
+    Attributes
+    ----------
+    executor : Executor
+        Threads or processes, here or elsewhere.
+    task : callable
+        Runs a case and returns what it took, s.
+    places : int
+        How many cases to hand to the executor at a time.
+    lost : tuple of exception types
+        What the executor raises for a case whose process it lost for good.
+    """
+
+    executor: Executor
+    task: Callable[[Case], float]
+    places: int
+    lost: tuple[type[Exception], ...] = ()
+
+
+@contextlib.contextmanager
+def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
+    """Threads of this process, each with one solver at a time.
+
+    While `workers` solvers run, other threads prepare the next cases and read what the last ones
+    left, so that no solver waits for Python. An exception ends all children before it goes on.
+
+    Parameters
+    ----------
+    cases : Path
+        The directory of the study's cases.
+    workers : int
+        How many solvers run at a time.
+    limit_s : float
+        Wall time after which a run counts as hung, s.
+    """
+    stop, turn = threading.Event(), threading.BoundedSemaphore(workers)
+    task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, turn=turn)
+    places = 2 * workers
+    with concurrent.futures.ThreadPoolExecutor(places, thread_name_prefix="case") as threads:
+        try:
+            yield Pool(threads, task, places)
+        except BaseException:
+            stop.set()
+            threads.shutdown(cancel_futures=True)
+            raise
+
+
+def execute(
+    case: Case,
+    cases: Path,
+    limit_s: float,
+    stop: threading.Event | None = None,
+    turn: AbstractContextManager[object] = nullcontext(),  # noqa: B008 - it holds nothing
+) -> float:
+    """Run one case from its inputs to its marker of being done, and return what it took, s.
+
+    Parameters
+    ----------
+    case : Case
+        The case; what it needs is done.
+    cases : Path
+        The directory of the study's cases.
+    limit_s : float
+        Wall time after which the run counts as hung, s.
+    stop : threading.Event, optional
+        Set by another thread to end the run early.
+    turn : context manager, optional
+        Held while the solver runs; the wait for it is not counted.
+
+    Raises
+    ------
+    SolverError
+        If the solver died, hung or gave results that cannot be trusted; the case's directory is
+        left for inspection.
+    Interrupted
+        If `stop` was set.
+    """
+    began = time.monotonic()
+    directory = case_states.prepare(case, cases)
+    outside_s = time.monotonic() - began
+    try:
+        with turn:
+            ended = retry.run(
+                ["./Allrun"],
+                cwd=directory,
+                log=directory / LOG,
+                limit_s=limit_s,
+                stop=stop,
+                env=ONE_THREAD,
+            )
+        began = time.monotonic()
+        _check(case, directory, ended, limit_s)
+        took_s = outside_s + ended.seconds + time.monotonic() - began
+        case_states.finish(
+            case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
+        )
+    except SolverError as error:
+        case_states.fail(directory, error)
+        raise
+    return took_s
+
+
+def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) -> None:
+    if ended.timed_out:
+        raise SolverError(
+            f"the solver did not end within {limit_s:g} s and was killed",
+            where=str(directory),
+            remedy="see its logs; raise time_limit in the study file if it was still at work",
+        )
+    # the case's own look at its logs knows more than the exit code: it comes first
+    case.collect(directory)
+    if ended.returncode != 0:
+        raise SolverError(
+            f"./Allrun ended with {ended.returncode}", where=str(directory / LOG), remedy="see it"
+        )
+
+
+def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
+    """See that the programs of some cases are where a pool runs them, before any is started.
+
+    Raises
+    ------
+    SolverError
+        Naming what is missing, or too old, and what to install.
+    """
+    one_of_each = {one.kind: one for one in cases}.values()
+    for future in [pool.executor.submit(one.versions) for one in one_of_each]:
+        try:
+            future.result()
+        except pool.lost as error:
+            raise _loss(error, "the first look at the solvers") from None
+
+
+def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, OrchestratorError]:
+    """Run cases that are not done yet.
+
+    Parameters
+    ----------
+    todo : mapping of str to Case
+        By name; what a case needs is either here too or done already.
+    pool : Pool
+        Where they run.
+    report : callable
+        Told of each case as it ends.
+
+    Returns
+    -------
+    dict of str to OrchestratorError
+        The cases that failed, with why; what needed them is among them.
+
+    Raises
+    ------
+    Interrupted
+        If the pool was stopped.
+    """
+    agenda = Agenda(todo)
+    running: dict[Future[float], Case] = {}
+    failed: dict[str, OrchestratorError] = {}
+    while agenda or running:
+        while len(running) < pool.places and (case := agenda.next()):
+            running[pool.executor.submit(pool.task, case)] = case
+        # a wait without a limit would not let the main thread see a signal
+        ended, _ = concurrent.futures.wait(
+            running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
+        )
+        for future in ended:
+            outcome = _outcome(running.pop(future), future, pool)
+            for each in (outcome, *_after(outcome, agenda)):
+                report(each)
+                if each.error:
+                    failed[each.case.name] = each.error
+    return failed
+
+
+def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
+    try:
+        return Outcome(case, future.result())
+    except Interrupted:
+        raise
+    except OrchestratorError as error:
+        return Outcome(case, error=error)
+    except OSError as error:
+        return Outcome(case, error=of_system(error, case.name))
+    except pool.lost as error:
+        return Outcome(case, error=_loss(error, case.name))
+    except Exception as error:  # one case is lost by it, not the study
+        return Outcome(case, error=of_fault(error, case.name))
+
+
+def _loss(error: Exception, where: str) -> SolverError:
+    return SolverError(
+        f"the processes that ran it were lost: {error}",
+        where=where,
+        remedy="the logs of their jobs say more: out of memory, or of time?",
+    )
+
+
+def _after(outcome: Outcome, agenda: Agenda) -> Iterator[Outcome]:
+    """Let the agenda know how a case ended; the cases that are lost with it."""
+    if not outcome.error:
+        agenda.done(outcome.case)
+        return
+    for without, need in agenda.lost(outcome.case):
+        error = SolverError(f"it needs {need.name}, which failed", where=without.name)
+        yield Outcome(without, error=error)

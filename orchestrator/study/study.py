@@ -1,0 +1,295 @@
+"""A study file: fluid, grain, bed, flow, protocol and axes in TOML, read into scenes.
+
+The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them, and its
+``axes`` span a grid: every combination of the listed values is a scene. Without groups the file
+is one group.
+"""
+
+import itertools
+import os
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from orchestrator.errors import InputError, unknown_key
+from orchestrator.fidelity import limits
+from orchestrator.runs import assets
+from orchestrator.study.scene import (
+    PileBed,
+    Scene,
+    UnfitError,
+    decide_regimes,
+    roughness_length,
+)
+
+PARTS = tuple(Scene.model_fields)
+GROUP_KEYS = (*PARTS, "axes", "name")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
+TIME_LIMIT_S = 3600.0
+MOST_SCENES = 100_000
+
+
+@dataclass(frozen=True)
+class Group:
+    """Scenes of a study that belong together: the points of one experiment."""
+
+    name: str
+    scenes: tuple[Scene, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a study file asks for.
+
+    Attributes
+    ----------
+    name : str
+        The file's name without its ending.
+    title : str
+        A line for the page.
+    groups : tuple of Group
+        In the file's order; every scene has its closure decided.
+    time_limit_s : float
+        Wall time after which one solver run counts as hung, s.
+    tolerance : float or None
+        Relative error that tau_c may have; None: every scene as it is asked for.
+    cluster : dict
+        Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
+    text : str
+        The file itself.
+    """
+
+    name: str
+    title: str
+    groups: tuple[Group, ...]
+    time_limit_s: float
+    tolerance: float | None
+    cluster: dict[str, Any]
+    text: str
+
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """Every scene once, in the file's order."""
+        return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
+
+
+def preset_names() -> list[str]:
+    """Names of the study files that the package brings."""
+    return sorted(path.stem for path in assets.presets().glob("*.toml"))
+
+
+def load(source: str, *, guarded: bool = True) -> Study:
+    """Read a study file, or a preset by its name; `guarded` as in `parse`.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the field and the remedy.
+    """
+    preset = assets.presets() / f"{source}.toml"
+    path = preset if source in preset_names() else Path(source)
+    if not _is_file(path):
+        known = ", ".join(preset_names())
+        raise InputError(
+            "there is no such study file, nor a preset of this name",
+            where=source,
+            remedy=f"presets: {known}; or give the path of a TOML file",
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"not a readable text file: {error}", where=source) from None
+    # a file's name may be bytes that are no text; the page and the tables are text
+    name = os.fsencode(path.stem).decode("utf-8", "replace")
+    if name.strip(".") == "":
+        raise InputError("a file of dots names no study", where=source, remedy="rename it")
+    return parse(text, name=name, where=source, guarded=guarded)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long
+        return False
+
+
+def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
+    """Make a study of a TOML file's text; `where` names the file in messages.
+
+    A guarded study refuses scenes beyond `limits`; an unguarded one what cannot be built.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the field and the remedy.
+    """
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise InputError("tables or lists are nested too deeply", where=where) from None
+    except ValueError as error:
+        raise InputError(f"not TOML: {error}", where=where) from None
+    _known(data, TOP_KEYS, where, "")
+    limit = data.get("time_limit", TIME_LIMIT_S)
+    if not isinstance(limit, int | float) or isinstance(limit, bool) or not limit > 0:
+        raise InputError(
+            f"{limit!r} is not a time in seconds above 0", where=f"{where}: time_limit"
+        )
+    title = data.get("title", name)
+    if not isinstance(title, str):
+        raise InputError("the title is not a text", where=f"{where}: title")
+    groups = tuple(_groups(data, where, guarded))
+    tolerance = data.get("tolerance")
+    if tolerance is not None:
+        check_tolerance(tolerance, f"{where}: tolerance")
+    cluster = _table(data, "cluster", where)
+    return Study(name, title, groups, float(limit), tolerance, cluster, text)
+
+
+def check_tolerance(value: Any, where: str) -> None:
+    """A tolerance is a relative error between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value < 1:
+        raise InputError(
+            f"{value!r} is not a relative error between 0 and 1",
+            where=where,
+            remedy="0.05 allows tau_c to be 5 % off",
+        )
+
+
+def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Group]:
+    listed = data.get("group", [{}])
+    if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
+        raise InputError(
+            "not a list of tables", where=f"{where}: group", remedy="write [[group]] for each"
+        )
+    for number, item in enumerate(listed, 1):
+        place = f"{where}: group {number}" if "group" in data else where
+        _known(item, GROUP_KEYS, place, "")
+        merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
+        scenes = tuple(_scenes(merged, place, guarded))
+        yield Group(str(item.get("name", f"group {number}")), scenes)
+
+
+def _merged(
+    data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
+) -> dict[str, Any]:
+    return {**_table(data, part, where), **_table(item, part, where)}
+
+
+def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    table = data.get(name, {})
+    if not isinstance(table, dict):
+        raise InputError(
+            f"{table!r} is not a table", where=f"{where}: {name}", remedy=f"write [{name}]"
+        )
+    return table
+
+
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> Iterator[Scene]:
+    axes = tables["axes"]
+    for key, values in axes.items():
+        part, dot, field = key.partition(".")
+        if part not in PARTS or not dot or not field:
+            raise InputError(
+                "an axis is named by its table and field",
+                where=f"{where}: axes.{key}",
+                remedy='for instance "grain.diameter" = [1e-4, 1e-3]',
+            )
+        if not isinstance(values, list) or not values:
+            raise InputError(
+                f"{values!r} is not a list of values",
+                where=f"{where}: axes.{key}",
+                remedy="write [first, second, ...]",
+            )
+    grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
+    if len(grid) > MOST_SCENES:
+        raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
+    scenes = [make_scene(parts, where, guarded=guarded) for parts in _points(tables, grid)]
+    decide_regimes(scenes)
+    for scene in scenes:
+        yield from scene.resolved()
+
+
+def _points(
+    tables: Mapping[str, dict[str, Any]], grid: list[tuple[Any, ...]]
+) -> Iterator[dict[str, dict[str, Any]]]:
+    places = [key.partition(".")[::2] for key in tables["axes"]]
+    for point in grid:
+        parts = {part: dict(tables[part]) for part in PARTS}
+        for (part, field), value in zip(places, point, strict=True):
+            parts[part][field] = value
+        yield parts
+
+
+def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool = True) -> Scene:
+    """Validate the tables of one scene; `where` names the file in messages.
+
+    A guarded scene is within `limits` too.
+
+    Raises
+    ------
+    InputError
+        For the first thing wrong: the file, the field and the remedy.
+    """
+    bed = {"kind": "grain", **parts["bed"]}
+    diameter = parts["grain"].get("diameter")
+    try:
+        # of a number beyond all floats the model says itself that it is wrong
+        if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
+            bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
+        scene = Scene.model_validate({**parts, "bed": bed})
+        if guarded:
+            limits.check(scene)
+        return scene
+    except UnfitError as error:
+        raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
+    except ValidationError as error:
+        raise _explained(error, where) from None
+
+
+def _explained(error: ValidationError, where: str) -> InputError:
+    # a misspelt key says more than the field that is missing because of it
+    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, UnfitError):
+        return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
+    path = [str(step) for step in first["loc"]]
+    if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):
+        del path[1]  # the branch of the union, not a key of the file
+    field = ".".join(path)
+    given = first.get("input")
+    if first["type"] == "extra_forbidden":
+        return unknown_key(path[-1], _fields_beside(path), f"{where}: {field}")
+    if first["type"] == "missing":
+        return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
+    return InputError(
+        f"{given!r} is not accepted",
+        where=f"{where}: {field}",
+        remedy=first["msg"].lower().replace("input should", "it should"),
+    )
+
+
+def _fields_beside(path: list[str]) -> list[str]:
+    if len(path) < 2:
+        return list(PARTS)
+    if path[0] == "bed":
+        return list(PileBed.model_fields)
+    annotation = Scene.model_fields[path[0]].annotation
+    return list(getattr(annotation, "model_fields", {}))
+
+
+def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str, prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise unknown_key(key, known, f"{where}: {prefix}{key}")

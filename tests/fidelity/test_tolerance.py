@@ -1,0 +1,97 @@
+"""A study with a tolerance on the real solvers: cheap answers, checked by DEM, overruled by it."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from orchestrator import cli, pipeline
+from orchestrator.fidelity import rungs
+from orchestrator.fidelity.rungs import Known
+from orchestrator.study import study
+
+PILES = """
+tolerance = 0.2
+[grain]
+diameter = 1e-3
+[bed]
+kind = "pile"
+height = 0.01
+slope_deg = 20.0
+roughness = "d/30"
+packing = "{packing}"
+[protocol]
+step = 0.03
+quiet = 6.0
+until = 0.75
+[flow]
+closure = "high"
+[[group]]
+name = "small"
+[[group]]
+name = "larger"
+bed = {{ height = 0.012 }}
+"""
+
+
+def _run(packing: str, out: Path) -> dict[str, pd.DataFrame]:
+    asked = study.parse(PILES.format(packing=packing), name="piles", where="test")
+    finished = pipeline.run(asked, out, workers=2)
+    assert not finished.failures
+    return {path.stem: pd.read_csv(path) for path in (out / "tables").glob("*.csv")}
+
+
+def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
+    tables = _run("aligned", tmp_path)
+    found, check = tables["pile_threshold"], tables["check"]
+    assert set(found["grain_rung"]) <= {"pivot", "peeling"}
+    assert (found["error_estimate"] <= 0.2).all()
+    # the smaller of the two piles stands for both
+    assert check["scene_id"].nunique() == 1
+    assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
+    assert check["agree"].all()
+    assert (check["difference"].abs() < 0.2).all()
+    # the intervals contain the known error
+    half = (found["shields_high"] - found["shields_low"]) / 2 / found["shields"]
+    assert (half >= found["error_estimate"] - 1e-9).all()
+
+
+def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_rung(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # told that the pivot of each grain is good for level rows, which it is not
+    wrong = {
+        (part, one.name, like): {0.5: Known(0.01, 0.0, cost)}
+        for part, like in (("flow", "wall"), ("grains", "horizontal"))
+        for cost, one in enumerate(rungs.LADDER[part])  # type: ignore[index]
+        if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
+    }
+    monkeypatch.setattr(rungs, "known", lambda: wrong)
+    monkeypatch.setattr(rungs, "_cheapest", rungs._cheapest.__wrapped__)
+    tables = _run("horizontal", tmp_path)
+    found = tables["pile_threshold"]
+    assert "pivot" not in set(found["grain_rung"])
+    assert found["shields"].notna().any()
+
+
+def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = 'grain = { diameter = 1e-3 }\nbed = { kind = "grain", slope_deg = 10.0 }\n'
+    (tmp_path / "one.toml").write_text(text)
+    out = tmp_path / "out"
+    command = ["study", str(tmp_path / "one.toml"), "--out", str(out), "--tolerance", "0.1"]
+    assert cli.main(command) == 0
+    assert not list((out / "cases").glob("cells-*"))
+    assert cli.main(["report", str(out)]) == 0
+    table = pd.read_csv(out / "tables" / "single_grain.csv")
+    assert set(table["method"]) == {"pivot"}
+    assert table["shields_closed_form"].notna().all()
+
+
+@pytest.mark.parametrize("value", ["0", "1", "-0.1", "nan"])
+def test_a_tolerance_out_of_range_is_refused(
+    value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["study", "first-look", "--tolerance", value]) == 2
+    assert "--tolerance" in capsys.readouterr().err

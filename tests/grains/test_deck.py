@@ -1,0 +1,108 @@
+"""What the decks are given: forces of the grains, files that LIGGGHTS reads."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.grains import deck
+from orchestrator.physics import closures
+from orchestrator.physics.closures import Closure
+from orchestrator.runs import assets
+
+WHERE = {"diameter": 1e-3, "roughness": 1e-4, "fluid_density": 1.0, "viscosity": 1e-5}
+ALONG = np.array([[np.cos(0.3), np.sin(0.3)]])
+OUTWARD = np.array([[-np.sin(0.3), np.cos(0.3)]])
+
+
+def _force(closure: Closure, speed: float, flow: float) -> deck.FloatArray:
+    drag, lift = closures.drag(closure, **WHERE), closures.lift(closure, **WHERE)
+    table = deck.force_table(drag, lift, np.array([speed]), ALONG, OUTWARD)
+    return np.asarray(sum(flow**p * table[k, 0] for k, p in enumerate(deck.POWERS)))
+
+
+@given(
+    closure=st.sampled_from(closures.CLOSURES),
+    speed=st.floats(-2, 2).filter(lambda r: abs(r) > 1e-3),
+    flow=st.floats(0.05, 2),
+)
+def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
+    closure: Closure, speed: float, flow: float
+) -> None:
+    ustar = abs(speed) * flow
+    drag = float(closures.drag(closure, **WHERE)(ustar))
+    lift = float(closures.lift(closure, **WHERE)(ustar))
+    exact = np.sign(speed) * drag * ALONG[0] + lift * OUTWARD[0]
+    np.testing.assert_allclose(_force(closure, speed, flow), exact, rtol=1e-12, atol=0)
+
+
+def _table(count: int = 3) -> deck.GrainTable:
+    rng = np.random.default_rng(1)
+    return deck.GrainTable(
+        position=rng.normal(size=(count, 3)),
+        kind=np.array([deck.FIXED, deck.MOBILE, deck.COUNTED])[:count],
+        along=np.tile([1.0, 0.0], (count, 1)),
+        force=rng.normal(size=(len(deck.POWERS), count, 2)),
+        diameter=1e-3,
+        density=2500.0,
+    )
+
+
+def test_files_hold_every_digit(tmp_path: Path) -> None:
+    grains = _table()
+    holds = np.array([1 / 3, 0.5])
+    deck.write(tmp_path, grains, {"diameter": np.float64(1e-3), "enough": 7}, holds, margin=0.1)
+    lines = (tmp_path / "grains.data").read_text().splitlines()
+    rows = [line.split() for line in lines[lines.index("Atoms") + 2 :]]
+    np.testing.assert_array_equal([[float(v) for v in row[4:]] for row in rows], grains.position)
+    assert [int(row[1]) for row in rows] == grains.kind.tolist()
+    force = (tmp_path / "force" / "1.687.z.txt").read_text().splitlines()
+    assert force[0] == "3"
+    assert [float(line.split()[1]) for line in force[1:]] == grains.force[2, :, 1].tolist()
+    parameters = (tmp_path / "parameters.liggghts").read_text()
+    assert [line.split()[:4] for line in parameters.splitlines()] == [
+        ["variable", "diameter", "equal", "0.001"],
+        ["variable", "enough", "equal", "7"],
+    ]
+    flows = (tmp_path / "holds.txt").read_text().splitlines()
+    assert [float(line) for line in flows] == holds.tolist()
+
+
+def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
+    grains = _table()
+    deck.write(tmp_path, grains, {}, np.ones(1), margin=0.1)
+    bounds = [
+        [float(v) for v in line.split()[:2]]
+        for line in (tmp_path / "grains.data").read_text().splitlines()
+        if line.endswith("hi")
+    ]
+    for axis, (low, high) in enumerate(bounds):
+        assert low == pytest.approx(grains.position[:, axis].min() - 0.1)
+        assert high == pytest.approx(grains.position[:, axis].max() + 0.1)
+
+
+def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
+    copy = tmp_path / "bed"
+    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert (copy / "levels.csv").read_text().splitlines()[-1].split(",")[3] == "0"
+
+
+def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
+    copy, shared = tmp_path / "bed", tmp_path / "shared"
+    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shared.mkdir()
+    untouched = shared.stat().st_mtime_ns
+    # MPI's own would be made here, and removed while another run starts
+    subprocess.run(["./Allrun"], cwd=copy, check=True, env={**os.environ, "TMPDIR": str(shared)})
+    assert shared.stat().st_mtime_ns == untouched
+
+
+def test_ids_of_the_counted_grains() -> None:
+    assert _table().counted_ids.tolist() == [3]

@@ -1,0 +1,142 @@
+"""Piles on both real solvers: the flow's stress on the grains, their motion, their thresholds."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator import plan, tables
+from orchestrator.grains import threshold
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.pile import PileCase
+from orchestrator.runs import engine
+from orchestrator.study import study
+
+SMALL = """
+[grain]
+diameter = 1e-3
+[bed]
+kind = "pile"
+slope_deg = 20.0
+height = 0.01
+roughness = "d/30"
+packing = "{packing}"
+[flow]
+cells_per_face = 20
+[protocol]
+step = {step}
+until = 0.75
+"""
+
+
+def _study(packing: str = "aligned", step: float = 0.05) -> study.Study:
+    return study.parse(SMALL.format(packing=packing, step=step), name="small", where="test")
+
+
+def _run(asked: study.Study, cases: Path) -> PileCase:
+    planned = plan.make(asked)
+    for one in planned.cases.values():
+        engine.execute(one, cases, 300.0)
+    (pile,) = planned.piles.values()
+    return pile
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("cases")
+
+
+@pytest.fixture(scope="module")
+def slow(cases: Path) -> PileCase:
+    return _run(_study(step=0.01), cases)
+
+
+def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
+    slow: PileCase, cases: Path
+) -> None:
+    motion, speed = Motion.from_csv(cases / slow.name), slow.face(cases).speed
+    pivot = slow.pivot_thresholds(speed)
+    for fraction in (0.1, 0.3, 0.5, 0.7):
+        found = threshold.of_pile(motion, speed, fraction, slow.scene.fluid.density)
+        expected = pivot[int(np.ceil(fraction * motion.count)) - 1]
+        assert found.ustar0 == pytest.approx(expected, rel=0.03)
+
+
+def test_it_empties_from_the_crest_down(slow: PileCase, cases: Path) -> None:
+    motion, face = Motion.from_csv(cases / slow.name), slow.face(cases)
+    moved = motion.level > 0
+    # from the crest to the toe no grain moves in an earlier hold than the one above it
+    downward = np.argsort(-face.arc_length[moved])
+    holds = motion.level[moved][downward]
+    assert holds[0] == holds.min()
+    assert np.mean(np.diff(holds) >= 0) > 0.9
+
+
+def test_tables_reconcile(slow: PileCase, cases: Path) -> None:
+    asked = _study(step=0.01)
+    planned = plan.make(asked)
+    made = tables.make(asked, planned, cases, planned.done(cases))
+    curve = made["pile_curve"]
+    assert ((curve["moved"] + curve["not_moved"]) == curve["count"]).all()
+    assert (curve["count"] == slow.packing.count).all()
+    assert curve["fraction_moved"].is_monotonic_increasing
+    found = made["pile_threshold"]
+    assert found["shields"].is_monotonic_increasing
+    assert (found["shields_low"] < found["shields"]).all()
+    assert (found["shields"] < found["shields_high"]).all()
+    # Re* and tau are two views of one stress
+    ustar = np.sqrt(found["shields"] * 2499 * 9.81 * 1e-3)
+    np.testing.assert_allclose(found["reynolds"], ustar * 1e-3 / 1e-5, rtol=1e-12)
+    grains = made["pile_grain"]
+    assert (grains["moved_in_hold"] > 0).sum() == curve["moved"].iloc[-1]
+
+
+def test_every_column_has_a_meaning_and_survives_its_files(
+    slow: PileCase, cases: Path, tmp_path: Path
+) -> None:
+    asked = _study(step=0.01)
+    planned = plan.make(asked)
+    made = tables.make(asked, planned, cases, planned.done(cases))
+    tables.write(made, tmp_path)
+    listed = pd.read_csv(tmp_path / "columns.csv").set_index("column")
+    assert {str(c) for table in made.values() for c in table} == set(listed.index)
+    assert listed["meaning"].str.len().min() >= 3
+    for name, table in tables.read(tmp_path).items():
+        pd.testing.assert_frame_equal(table, made[name], check_dtype=False)
+
+
+def test_a_copy_reruns_by_hand_and_gives_the_same_bytes(
+    slow: PileCase, cases: Path, tmp_path: Path
+) -> None:
+    for name in (slow.flow.name, slow.name):
+        copy = tmp_path / f'-{name} "copy" é'
+        shutil.copytree(cases / name, copy)
+        ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stderr + ended.stdout
+        # and the comparison is real
+        (copy / "results.sha256").write_text(
+            (copy / "results.sha256").read_text().replace("a", "b")
+        )
+        assert subprocess.run(["sha256sum", "--quiet", "-c", "results.sha256"], cwd=copy).returncode
+
+
+def test_a_stair_of_horizontal_rows_holds_longer(slow: PileCase, cases: Path) -> None:
+    stair = _run(_study(packing="horizontal"), cases)
+    motion, speed = Motion.from_csv(cases / stair.name), stair.face(cases).speed
+    found = threshold.of_pile(motion, speed, 0.1, stair.scene.fluid.density)
+    aligned = Motion.from_csv(cases / slow.name)
+    reference = threshold.of_pile(aligned, slow.face(cases).speed, 0.1, slow.scene.fluid.density)
+    assert found.ustar0 > 1.2 * reference.ustar0
+
+
+def test_scenes_that_differ_in_their_grains_alone_share_the_flow() -> None:
+    text = SMALL.format(packing="aligned", step=0.05).replace('"d/30"', "3e-5")
+    asked = study.parse(
+        text + '[axes]\n"grain.diameter" = [7e-4, 1e-3]\n', name="shared", where="test"
+    )
+    planned = plan.make(asked)
+    assert len(planned.piles) == 2
+    assert [one.kind for one in planned.cases.values()] == ["flow", "pile", "pile"]

@@ -1,0 +1,186 @@
+"""One grain by LIGGGHTS against the pivot law, and what happens when LIGGGHTS fails."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import SolverError
+from orchestrator.grains import threshold
+from orchestrator.grains.cells import CellsCase, batches
+from orchestrator.grains.motion import MODES, Motion
+from orchestrator.runs import case, engine
+from orchestrator.study import study
+
+BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
+
+
+def _cells(text: str) -> CellsCase:
+    (one,) = batches(study.parse(text, name="cells", where="test").scenes)
+    return one
+
+
+def _run(one: CellsCase, cases: Path, limit_s: float = 120.0) -> Motion:
+    engine.execute(one, cases, limit_s)
+    return Motion.from_csv(cases / one.name)
+
+
+FIGURE = f"""
+protocol = {{ step = 0.002 }}
+[axes]
+"bed.entrainment_angle_deg" = {list(BETAS)}
+"bed.slope_deg" = {list(SLOPES)}
+[[group]]
+grain = {{ diameter = 1e-4 }}
+fluid = {{ viscosity = 1e-3 }}
+[[group]]
+grain = {{ diameter = 1e-3 }}
+"""
+FEW = """
+protocol = { step = 0.005 }
+[axes]
+"grain.diameter" = [7e-4, 1e-3]
+"""
+
+
+def test_threshold_of_the_pivot_law_in_both_regimes_from_one_run(tmp_path: Path) -> None:
+    one = _cells(FIGURE)
+    assert len(one.scenes) == 24
+    assert {scene.regime for scene in one.scenes} == {"low", "high"}
+    found = threshold.of_grains(_run(one, tmp_path))
+    # the deck's flow is the friction velocity over that of the closed form
+    np.testing.assert_allclose(found.value, 1.0, atol=0.005)
+    assert np.all(found.low < 1.005)
+    assert np.all(found.high > 0.995)
+
+
+def test_a_bed_has_no_scale(tmp_path: Path) -> None:
+    # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the hold
+    text = """
+    flow = { closure = "high" }
+    protocol = { step = 0.002 }
+    [[group]]
+    grain = { diameter = 1e-3 }
+    [[group]]
+    grain = { diameter = 1e-4 }
+    fluid = { viscosity = 3.1622776601683795e-7 }
+    """
+    found = _run(_cells(text), tmp_path)
+    assert found.level[0] == found.level[1] > 0
+
+
+def test_blocks_do_not_depend_on_the_order_of_the_scenes() -> None:
+    scenes = study.parse(FIGURE, name="cells", where="test").scenes
+    assert [c.id for c in batches(scenes)] == [c.id for c in batches(reversed(scenes))]
+
+
+def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> None:
+    one = _cells(FEW)
+    _run(one, tmp_path)
+    assert case.is_done(one, tmp_path)
+    copy = tmp_path / """-odd "name" c'é"""
+    shutil.copytree(tmp_path / one.name, copy)
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "the results are those of results.sha256" in ended.stdout
+    with (copy / "grains.data").open("a") as stream:
+        stream.write("\n# the same grains\n")
+    holds = (copy / "holds.txt").read_text()
+    (copy / "holds.txt").write_text(holds.replace("0.9\n", "0.901\n", 1))
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode != 0
+
+
+def _before_liggghts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    """Put a script before the real solver; what it does to the case, the solver then suffers."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    program = folder / "liggghts"
+    program.write_text(f'#!/bin/sh\n{script}\nexec {shutil.which("liggghts")} "$@"\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+
+
+def _failure(tmp_path: Path, limit_s: float = 120.0) -> str:
+    one = _cells(FEW)
+    cases = tmp_path / "cases"
+    with pytest.raises(SolverError) as caught:
+        _run(one, cases, limit_s)
+    assert not case.is_done(one, cases)
+    assert (cases / one.name / case.FAILED).is_file()
+    assert str(cases / one.name) in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_solver_that_loses_every_grain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # LIGGGHTS itself ends with 0: a spring that is too stiff for the step throws all grains out
+    script = "sed -i 's/timestep equal 0.2/timestep equal 3.0/' parameters.liggghts"
+    _before_liggghts(tmp_path, monkeypatch, script)
+    assert "lost" in _failure(tmp_path)
+
+
+def test_a_solver_that_refuses_its_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _before_liggghts(tmp_path, monkeypatch, "echo 'fix nothing' >>parameters.liggghts")
+    assert "ERROR" in _failure(tmp_path)
+
+
+def test_a_solver_that_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # the shell that becomes the solver leaves a child that kills it once it is at work
+    script = "pid=$$\n(until [ -s levels.csv ]; do sleep 0.01; done; kill -KILL $pid) &"
+    _before_liggghts(tmp_path, monkeypatch, script)
+    assert "before its protocol did" in _failure(tmp_path)
+
+
+def test_a_solver_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _before_liggghts(tmp_path, monkeypatch, "kill -STOP $$")
+    assert "within 1 s" in _failure(tmp_path, limit_s=1)
+
+
+@pytest.mark.parametrize("name", ["passage.dump", "levels.csv", "settling.csv"])
+def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
+    one = _cells(FEW)
+    _run(one, tmp_path)
+    path = tmp_path / one.name / name
+    os.truncate(path, path.stat().st_size * 2 // 3)
+    with pytest.raises(SolverError, match=name):
+        one.collect(tmp_path / one.name)
+
+
+def test_a_grain_that_falls_back_and_leaves_has_not_moved(tmp_path: Path) -> None:
+    # at the limiting slope the low closure's lift carries a large grain before its drag holds it
+    text = """
+    grain = { diameter = 3e-4 }
+    bed = { slope_deg = 30.0 }
+    flow = { closure = "low" }
+    protocol = { step = 0.02 }
+    """
+    one = _cells(text)
+    motion = _run(one, tmp_path)
+    assert motion.level.tolist() == [0]
+    assert motion.fallen[0] > 0
+    assert motion.fraction[-1] == 0
+    assert np.isnan(threshold.of_grains(motion).value[0])
+
+
+def test_how_grains_move(tmp_path: Path) -> None:
+    # 8 % above the threshold: without lift a grain rolls over its neighbour; with little else it
+    # leaves its bed
+    text = """
+    grain = { diameter = 1e-3 }
+    protocol = { step = 0.2 }
+    [[group]]
+    flow = { closure = "high", lift_coefficient = 0.0 }
+    [[group]]
+    flow = { closure = "high", lift_coefficient = 200.0 }
+    bed = { entrainment_angle_deg = 20.0 }
+    """
+    one = _cells(text)
+    motion = _run(one, tmp_path)
+    found = {
+        scene.flow.lift_coefficient: MODES[mode]
+        for scene, mode in zip(one.scenes, motion.mode, strict=True)
+    }
+    assert found == {0.0: "rolled", 200.0: "lifted"}

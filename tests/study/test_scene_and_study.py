@@ -1,0 +1,160 @@
+"""Study files: what they mean, and the message for each way in which they can be wrong."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.runs.files import canonical_json
+from orchestrator.study import study
+from orchestrator.study.scene import Grain, GrainBed, PileBed, Scene
+
+PILE = """
+[grain]
+diameter = 1e-3
+[bed]
+kind = "pile"
+slope_deg = 15.0
+roughness = "d/30"
+"""
+
+
+def _parse(text: str) -> study.Study:
+    return study.parse(text, name="test", where="test.toml")
+
+
+def test_axes_span_a_grid_in_the_files_order() -> None:
+    found = _parse(
+        """
+        [flow]
+        closure = "high"
+        [axes]
+        "bed.slope_deg" = [0.0, 10.0]
+        "grain.diameter" = [1e-3, 2e-3, 3e-3]
+        """
+    )
+    points = [(s.bed.slope_deg, s.grain.diameter) for s in found.scenes]
+    assert points == [(a, d) for a in (0.0, 10.0) for d in (1e-3, 2e-3, 3e-3)]
+
+
+def test_a_group_overrides_the_tables_at_the_top() -> None:
+    found = _parse(
+        """
+        [grain]
+        diameter = 1e-3
+        density = 2650.0
+        [[group]]
+        name = "one"
+        grain = { density = 3000.0 }
+        [[group]]
+        """
+    )
+    assert [group.name for group in found.groups] == ["one", "group 2"]
+    assert [s.grain.density for s in found.scenes] == [3000.0, 2650.0]
+
+
+def test_the_transition_is_run_with_both_closures() -> None:
+    found = _parse("[grain]\ndiameter = 2e-4\n")
+    assert [s.closure for s in found.scenes] == ["low", "high"]
+    assert {s.regime for s in found.scenes} == {"transition"}
+
+
+@pytest.mark.parametrize(("d", "nu", "regime"), [(5e-5, 1e-5, "low"), (1e-3, 1e-5, "high")])
+def test_auto_takes_the_valid_closure(d: float, nu: float, regime: str) -> None:
+    (scene,) = _parse(f"[grain]\ndiameter = {d}\n[fluid]\nviscosity = {nu}\n").scenes
+    assert (scene.closure, scene.regime) == (regime, regime)
+
+
+def test_roughness_as_a_part_of_the_diameter() -> None:
+    (scene,) = _parse("[grain]\ndiameter = 1e-3\n[bed]\nroughness = 'd/10'\n").scenes
+    assert scene.bed.roughness == pytest.approx(1e-4)
+
+
+def test_the_id_follows_the_content_alone() -> None:
+    one = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4))
+    same = Scene(grain=Grain(diameter=1e-3, density=2500.0), bed=GrainBed(roughness=1e-4))
+    other = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1.1e-4))
+    assert one.id == same.id != other.id
+    copy = Scene.model_validate_json(canonical_json(one.model_dump(mode="json")), strict=False)
+    assert copy == one
+
+
+def test_defaults_are_the_papers() -> None:
+    (scene,) = _parse(PILE).scenes
+    assert isinstance(scene.bed, PileBed)
+    assert (scene.fluid.density, scene.fluid.viscosity, scene.fluid.gravity) == (1.0, 1e-5, 9.81)
+    assert (scene.grain.density, scene.grain.friction_angle_deg) == (2500.0, 35.0)
+    assert (scene.bed.height, scene.bed.entrainment_angle_deg) == (0.02, 60.0)
+    assert (scene.protocol.marker, scene.protocol.fractions) == (0.3, (0.1, 0.3, 0.5, 0.7))
+
+
+def test_presets_are_studies() -> None:
+    assert "first-look" in study.preset_names()
+    for name in study.preset_names():
+        assert study.load(name).scenes
+
+
+BAD = [
+    ("[grain\n", "test.toml", "TOML"),
+    ("grain = 3\n", "test.toml: grain", "table"),
+    ("[grian]\ndiameter = 1e-3\n", "test.toml: grian", "did you mean grain"),
+    ("[grain]\ndiametre = 1e-3\n", "test.toml: grain.diametre", "did you mean diameter"),
+    ("[grain]\n", "test.toml: grain.diameter", "missing"),
+    ("[grain]\ndiameter = '1 mm'\n", "test.toml: grain.diameter", "number"),
+    ("[grain]\ndiameter = true\n", "test.toml: grain.diameter", "number"),
+    ("[grain]\ndiameter = 0.0\n", "test.toml: grain.diameter", "greater than 0"),
+    ("[grain]\ndiameter = -1e-3\n", "test.toml: grain.diameter", "greater than 0"),
+    ("[grain]\ndiameter = nan\n", "test.toml: grain.diameter", "finite"),
+    ("[grain]\ndiameter = 1e-3\ndensity = 0.5\n", "test.toml: grain.density", "float"),
+    ("[grain]\ndiameter = 1e-3\n[bed]\nslope_deg = 31.0\n", "test.toml: bed.slope_deg", "30"),
+    (
+        "[grain]\ndiameter = 1e-3\n[bed]\nslope_deg = 36.0\nentrainment_angle_deg = 50.0\n",
+        "test.toml: bed.slope_deg",
+        "35",
+    ),
+    (
+        "[grain]\ndiameter = 1e-3\n[bed]\nentrainment_angle_deg = 0.0\n",
+        "test.toml: bed.entrainment_angle_deg",
+        "greater than 0",
+    ),
+    (
+        "[grain]\ndiameter = 1e-3\n[bed]\nentrainment_angle_deg = 61.0\n",
+        "test.toml: bed.entrainment_angle_deg",
+        "60",
+    ),
+    ("[grain]\ndiameter = 1e-3\n[bed]\nroughness = 'd'\n", "test.toml: bed.roughness", "d/30"),
+    ("[grain]\ndiameter = 1e-3\n[bed]\nroughness = 2e-3\n", "test.toml: bed.roughness", "d/30"),
+    ("[grain]\ndiameter = 1e-3\n[bed]\nkind = 'dune'\n", "test.toml: bed", "dune"),
+    ("[grain]\ndiameter = 1e-3\n[bed]\nheight = 0.02\n", "test.toml: bed.height", "unknown"),
+    (PILE + "height = 2e-3\n", "test.toml: bed.height", "raise"),
+    (PILE + "[flow]\nfirst_cell_height = 6e-5\n", "test.toml: bed.roughness", "z_e"),
+    (PILE.replace("15.0", "5.0"), "test.toml: bed.slope_deg", "10"),
+    ("[axes]\ndiameter = [1e-3]\n", "test.toml: axes.diameter", "grain.diameter"),
+    ("[axes]\n'grain.diameter' = 1e-3\n", "test.toml: axes.grain.diameter", "list"),
+    ("[axes]\n'grain.diameter' = []\n", "test.toml: axes.grain.diameter", "list"),
+    ("time_limit = -1\n[grain]\ndiameter = 1e-3\n", "test.toml: time_limit", "above 0"),
+    ("group = 1\n", "test.toml: group", "[[group]]"),
+    ("[[group]]\ncolour = 1\n", "test.toml: group 1: colour", "known keys"),
+    ("[[group]]\n[group.grain]\ndiametre = 1\n", "test.toml: group 1: grain.diametre", "diameter"),
+]
+
+
+@pytest.mark.parametrize(("text", "where", "word"), BAD, ids=[word for _, _, word in BAD])
+def test_bad_files_are_refused_with_place_and_reason(text: str, where: str, word: str) -> None:
+    with pytest.raises(InputError) as caught:
+        _parse(text)
+    assert caught.value.where == where
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_study_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="first-look"):
+        study.load(str(tmp_path / "none.toml"))
+
+
+def test_a_study_that_is_no_text(tmp_path: Path) -> None:
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="text"):
+        study.load(str(path))
