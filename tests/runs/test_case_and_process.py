@@ -163,7 +163,7 @@ def test_a_stop_ends_the_program(tmp_path: Path) -> None:
 
 def test_a_killed_driver_leaves_no_orphan(tmp_path: Path) -> None:
     script = (
-        "from pathlib import Path; from orchestrator.solvers import process;"
+        "from pathlib import Path; from orchestrator.runs import process;"
         "process.run(['sh', '-c', 'echo $$ >pid; exec sleep 60'], cwd=Path('.').absolute(),"
         " log=Path('log').absolute(), limit_s=60)"
     )
