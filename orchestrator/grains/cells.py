@@ -39,7 +39,7 @@ class CellsCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 4
+    recipe: ClassVar[int] = 5
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -82,7 +82,7 @@ class CellsCase(GrainCase):
         grains = self._grains()
         marker = self.scenes[0].protocol.marker
         rest.check(directory, grains, WEIGHT, self._grain.stiffness, all_rest=False)
-        found = motion.read(directory, grains, marker)
+        found = motion.read(directory, grains, marker, falls_out=True)
         found.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:

@@ -25,15 +25,12 @@ class Track:
 
     Attributes
     ----------
-    stayed : ndarray of bool, shape (N,)
-        Whether a grain was still there when the bed had settled.
     travel, rise : ndarray
         Displacement since the settling, along the bed downstream and normal to it, diameters.
     roll : ndarray
         Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
     """
 
-    stayed: NDArray[np.bool_]
     travel: FloatArray
     rise: FloatArray
     roll: FloatArray
@@ -120,7 +117,6 @@ def _track(state: FloatArray, along: FloatArray, diameter: float) -> Track:
     with np.errstate(invalid="ignore", divide="ignore"):
         roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
     return Track(
-        stayed=~np.isnan(state[0, 0]),
         travel=right * along[:, 0] + up * along[:, 1],
         rise=up * along[:, 0] - right * along[:, 1],
         roll=roll,

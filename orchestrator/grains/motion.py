@@ -8,6 +8,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
+from orchestrator.grains import counting
+from orchestrator.grains.counting import Count
 from orchestrator.grains.deck import GrainTable
 from orchestrator.grains.dump import Track, read_track
 from orchestrator.grains.protocol import SETTLE_FLOW
@@ -39,12 +41,11 @@ class Motion:
     flow : ndarray, shape (levels + 1,)
         The flow of each hold, rising, in the deck's unit; first the flow of the settling.
     level : ndarray of int, shape (N,)
-        Hold (index into `flow`) in which a grain first passed the marker or left the box; 0 where
-        it never did. Latched: a grain that comes back has moved.
+        Hold (index into `flow`) in which a grain moved by the rule of `counting`; 0 for never.
     fallen : ndarray of int, shape (N,)
-        Hold in which a grain was first a marker's length upstream of its place, the first hold for
-        one that did not even stay while the bed settled; 0 for never. Such a grain has not moved,
-        unless it had passed the marker before.
+        Hold in which a grain was first a marker's length upstream of its place; 0 for never.
+    carried : ndarray of bool, shape (N,)
+        Whether it moved by being carried off: it was gone before it was seen beyond the marker.
     mode : ndarray of int, shape (N,)
         How it moved: index into `MODES`.
     exact : bool
@@ -55,6 +56,7 @@ class Motion:
     flow: FloatArray
     level: IntArray
     fallen: IntArray
+    carried: BoolArray
     mode: IntArray
     exact: bool = False
 
@@ -71,6 +73,7 @@ class Motion:
             flow=flow,
             level=level,
             fallen=np.zeros_like(level),
+            carried=np.zeros_like(moves),
             mode=np.where(moves, rolled, none),
             exact=True,
         )
@@ -80,7 +83,7 @@ class Motion:
         """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
         return self.flow if self.exact else self.flow[np.maximum(np.arange(len(self.flow)), 1) - 1]
 
-    def moved_by(self, level: int) -> NDArray[np.bool_]:
+    def moved_by(self, level: int) -> BoolArray:
         """Which grains have moved by the end of a hold."""
         return (self.level > 0) & (self.level <= level)
 
@@ -104,6 +107,11 @@ class Motion:
         """How many had been a marker's length upstream by then, shape (levels + 1,)."""
         return self._counts(self.fallen)
 
+    @property
+    def carried_off(self) -> IntArray:
+        """How many of those that had moved by then were carried off, shape (levels + 1,)."""
+        return self._counts(np.where(self.carried, self.level, 0))
+
     def _counts(self, level: IntArray) -> IntArray:
         """How many grains had their level by the end of each hold."""
         counts = np.bincount(level, minlength=len(self.flow))
@@ -116,6 +124,7 @@ class Motion:
         holds = holds.assign(
             moved=self.moved,
             not_moved=self.count - self.moved,
+            carried_off=self.carried_off,
             fallen_upstream=self.fallen_upstream,
         )
         holds.to_csv(directory / HOLDS, index=False)
@@ -123,6 +132,7 @@ class Motion:
             "id": grains.counted_ids,
             "moved_in": self.level,
             "fallen_in": self.fallen,
+            "carried_off": self.carried.astype(int),
             "mode": [MODES[mode] for mode in self.mode],
         }
         pd.DataFrame(columns).to_csv(directory / MOTION, index=False)
@@ -136,11 +146,12 @@ class Motion:
             flow=holds["flow"].to_numpy(float),
             level=grains["moved_in"].to_numpy(np.int64),
             fallen=grains["fallen_in"].to_numpy(np.int64),
+            carried=grains["carried_off"].to_numpy(bool),
             mode=np.array([MODES.index(mode) for mode in grains["mode"]], np.int64),
         )
 
 
-def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
+def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool) -> Motion:
     """Read the deck's tables of a finished run.
 
     Parameters
@@ -149,8 +160,8 @@ def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
         The case.
     grains : GrainTable
         As the deck was given them.
-    marker : float
-        Displacement that counts as motion, diameters.
+    marker, falls_out
+        As `counting.count` takes them.
 
     Raises
     ------
@@ -159,18 +170,16 @@ def read(directory: Path, grains: GrainTable, marker: float) -> Motion:
     """
     looks = _looks(directory)
     track = read_track(directory, grains, looks)
-    present = ~np.isnan(track.travel)
-    _reconcile(directory, looks, track, present, marker)
-    fallen = ~track.stayed | (present & (track.travel <= -marker))
-    has_fallen = np.logical_or.accumulate(fallen, axis=0)
-    passed = (present & (track.travel >= marker)) | (~present & ~has_fallen)
+    _reconcile(directory, looks, track, marker)
+    found = counting.count(track.travel, marker, falls_out=falls_out)
     hold = looks["level"].to_numpy(np.int64)
     flow = looks.groupby("level")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
-        level=_first(passed, hold),
-        fallen=_first(fallen, hold),
-        mode=_mode(track, passed),
+        level=_first(found.moved, hold),
+        fallen=_first(found.fallen, hold),
+        carried=found.carried[-1],
+        mode=_mode(track, found),
     )
 
 
@@ -178,8 +187,9 @@ def _first(happened: BoolArray, hold: IntArray) -> IntArray:
     return np.where(happened.any(axis=0), hold[happened.argmax(axis=0)], 0)
 
 
-def _mode(track: Track, passed: BoolArray) -> IntArray:
-    """How each grain moved, from its track around the look at which it had passed the marker."""
+def _mode(track: Track, found: Count) -> IntArray:
+    """How each grain moved, from its track around the look at which it was found to have moved."""
+    passed = found.moved
     looks = np.arange(len(passed))[:, None]
     first = np.where(passed.any(axis=0), passed.argmax(axis=0), -1)
     present = ~np.isnan(track.travel)
@@ -189,7 +199,11 @@ def _mode(track: Track, passed: BoolArray) -> IntArray:
     rise = np.max(np.where(window, track.rise, -np.inf), axis=0)
     roll = np.take_along_axis(track.roll, last_seen[None], axis=0)[0]
     none, rolled, slid, lifted = range(len(MODES))
-    return np.select([first < 0, rise > LIFTED, roll >= ROLLED], [none, lifted, rolled], slid)
+    return np.select(
+        [first < 0, found.carried[-1] | (rise > LIFTED), roll >= ROLLED],
+        [none, lifted, rolled],
+        slid,
+    )
 
 
 def _looks(directory: Path) -> pd.DataFrame:
@@ -207,12 +221,9 @@ def _looks(directory: Path) -> pd.DataFrame:
         ) from None
 
 
-def _reconcile(
-    directory: Path, looks: pd.DataFrame, track: Track, present: BoolArray, marker: float
-) -> None:
+def _reconcile(directory: Path, looks: pd.DataFrame, track: Track, marker: float) -> None:
     """Lying, fallen and gone make N at each look, by the deck's own count and by the places."""
-    lying = (present & (track.travel < marker)).sum(axis=1)
-    fallen = (present & (track.travel <= -marker)).sum(axis=1)
+    lying, fallen = counting.deck_counts(track.travel, marker)
     agree = (looks["lying"] == lying) & (looks["fallen"] == fallen)
     if not agree.all():
         raise SolverError(

@@ -74,7 +74,7 @@ class PileCase(GrainCase):
 
     scene: Scene
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 7
+    recipe: ClassVar[int] = 8
 
     @property
     def bed(self) -> PileBed:
@@ -183,7 +183,7 @@ class PileCase(GrainCase):
         self.check(directory)
         grain = self.scene.grain
         rest.check(directory, self._bare, self.scene.weight, grain.stiffness, all_rest=True)
-        found = motion.read(directory, self._bare, self.scene.protocol.marker)
+        found = motion.read(directory, self._bare, self.scene.protocol.marker, falls_out=False)
         found.to_csv(directory, self._bare)
 
     def motion(self, cases: Path) -> Motion:

@@ -84,6 +84,8 @@ class PileThreshold:
     tau, tau_low, tau_high : float
         tau_c and its interval, Pa: the mean signed wall stress over the grains that have moved.
         The interval holds the step between two flows and the count's resolution of 1/N.
+    carried_off : float
+        Share of the grains that had moved which were carried off.
     """
 
     fraction: float
@@ -91,6 +93,7 @@ class PileThreshold:
     tau: float
     tau_low: float
     tau_high: float
+    carried_off: float
 
 
 def of_pile(
@@ -99,7 +102,7 @@ def of_pile(
     """tau_c of a pile at a fraction; arguments as in `curve`."""
     level = _first_level(motion, fraction)
     if level is None:
-        return PileThreshold(fraction, *(math.nan,) * 4)
+        return PileThreshold(fraction, *(math.nan,) * 5)
     half_a_grain = 0.5 / motion.count
     below = _first_level(motion, fraction - half_a_grain) or level
     # where half a grain more was not reached, the interval is open: it ends at the last hold
@@ -115,6 +118,7 @@ def of_pile(
         tau=stress(level, flow),
         tau_low=stress(below, motion.low[below]),
         tau_high=stress(above, motion.flow[above]),
+        carried_off=float(motion.carried_off[level] / motion.moved[level]),
     )
 
 

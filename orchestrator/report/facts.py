@@ -1,6 +1,6 @@
 """What the page says in words and numbers beside its figures."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from platform import python_version
@@ -222,15 +222,27 @@ def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
     if len(thresholds) and thresholds["shields"].isna().any():
         missing = int(thresholds["shields"].isna().sum())
         found.append(f"Thresholds of piles that were not reached: {missing} of {len(thresholds)}.")
-    curve = results.joined("pile_curve")
-    if len(curve) and (curve["fallen_upstream"] > 0).any():
-        most = curve.groupby("scene_id")["fallen_upstream"].max()
-        found.append(
-            f"Piles in which grains fell upstream: {int((most > 0).sum())}, up to "
-            f"{int(most.max())} grains of one; unless such a grain also passed the marker it has "
-            "not moved."
+    return [*found, *_upstream(results.joined("pile_curve")), *_stray_grains(results)]
+
+
+def _upstream(curve: pd.DataFrame) -> Iterator[str]:
+    """What grains of piles did other than to move downstream over the bed."""
+    if curve.empty:
+        return
+    most = curve.groupby("scene_id")[["carried_off", "fallen_upstream"]].max()
+    piles, grains = (most > 0).sum(), most.max()
+    if piles["carried_off"]:
+        yield (
+            f"Piles in which lift carried grains off before they moved downstream: "
+            f"{piles['carried_off']}, up to {grains['carried_off']} grains of one. They count as "
+            "moved; there the threshold is that of lift-off (share_carried_off)."
         )
-    return [*found, *_stray_grains(results)]
+    if piles["fallen_upstream"]:
+        yield (
+            f"Piles in which grains fell upstream: {piles['fallen_upstream']}, up to "
+            f"{grains['fallen_upstream']} grains of one; such a grain has moved only if it also "
+            "passed the marker or was carried off."
+        )
 
 
 def _stray_grains(results: Results) -> list[str]:

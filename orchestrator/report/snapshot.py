@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.grains import dump, motion
+from orchestrator.grains import counting, dump, motion
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import PileCase
 
@@ -131,9 +131,5 @@ def _place(into: FloatArray, rows: pd.DataFrame, steps: IntArray, d: float) -> N
 
 
 def _passed(exposed: FloatArray, pile: PileCase) -> BoolArray:
-    """As `orchestrator.grains.motion.read` counts: one that went upstream has not moved."""
-    marker = pile.scene.protocol.marker
     travel = (exposed[1:] - exposed[0]) @ pile.triangle.tangent
-    fallen = np.logical_or.accumulate(travel <= -marker, axis=0)
-    passed = (travel >= marker) | (np.isnan(travel) & ~fallen)
-    return np.asarray(np.logical_or.accumulate(passed, axis=0))
+    return counting.count(travel, pile.scene.protocol.marker, falls_out=False).moved

@@ -66,6 +66,7 @@ def grains(answer: Answer) -> pd.DataFrame:
             "ustar_over_ustar0": face.speed,
             "moved_in_hold": motion.level,
             "fallen_in_hold": motion.fallen,
+            "carried_off": motion.carried.astype(int),
             "mode": [MODES[mode] for mode in motion.mode],
             "ustar0_m_s": found.value,
         }
@@ -85,6 +86,7 @@ def curve(answer: Answer) -> pd.DataFrame:
             "count": motion.count,
             "moved": motion.moved,
             "not_moved": motion.count - motion.moved,
+            "carried_off": motion.carried_off,
             "fallen_upstream": motion.fallen_upstream,
             "fraction_moved": curve.fraction,
             "mean_tau_pa": curve.mean_tau,
@@ -116,6 +118,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
+            "share_carried_off": found.carried_off,
             "flow_rung": rung["flow"],
             "grain_rung": rung["grains"],
             "error_estimate": error if math.isfinite(error) else None,

@@ -54,8 +54,10 @@ def test_grains_at_their_places_need_no_line(tmp_path: Path, grains: deck.GrainT
     assert gone[-1].any()
     assert not gone[-1].all()
     np.testing.assert_allclose(few.travel, all_of_them.travel, rtol=0, atol=0.02)
-    found, expected = (motion.read(folder, grains, 0.3) for folder in (short, whole))
-    for name in ("flow", "level", "fallen", "mode"):
+    found, expected = (
+        motion.read(folder, grains, 0.3, falls_out=False) for folder in (short, whole)
+    )
+    for name in ("flow", "level", "fallen", "carried", "mode"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 

@@ -15,7 +15,8 @@ FLOW = np.array([0.9, 1.0, 1.1, 1.2, 1.3])
 LEVEL = np.array([1, 1, 2, 2, 2, 4, 4, 4, 4, 0])
 SPEED = np.array([2.0, 2.0, 1.5, 1.5, 1.5, 1.0, 1.0, 1.0, 1.0, -0.5])
 NONE = np.zeros(10, int)
-MOTION = Motion(FLOW, LEVEL, NONE, NONE)
+NOBODY = np.zeros(10, bool)
+MOTION = Motion(FLOW, LEVEL, NONE, NOBODY, NONE)
 DENSITY = 1.2
 
 
@@ -24,8 +25,16 @@ def test_fraction_counts_each_grain_once_from_its_hold_on() -> None:
 
 
 def test_a_grain_that_fell_upstream_has_not_moved() -> None:
-    fallen = Motion(FLOW, np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0), NONE)
-    assert fallen.fraction[-1] == pytest.approx(0.5)
+    level, fallen = np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0)
+    assert Motion(FLOW, level, fallen, NOBODY, NONE).fraction[-1] == pytest.approx(0.5)
+
+
+def test_a_threshold_says_what_share_of_its_grains_lift_carried_off() -> None:
+    carried = np.arange(10) < 4  # all of the first hold, two of the three of the second
+    motion = Motion(FLOW, LEVEL, NONE, carried, NONE)
+    np.testing.assert_array_equal(motion.carried_off, [0, 2, 4, 4, 4])
+    shares = [threshold.of_pile(motion, SPEED, n, DENSITY).carried_off for n in (0.1, 0.4, 0.95)]
+    np.testing.assert_allclose(shares, [1.0, 0.8, np.nan])
 
 
 def test_thresholds_of_grains_lie_between_two_holds() -> None:
@@ -71,7 +80,7 @@ def test_a_fraction_that_was_not_reached_is_empty() -> None:
 def test_intervals_enclose_their_value_where_the_stress_is_uniform(
     level: list[int], fraction: float
 ) -> None:
-    motion = Motion(FLOW, np.array(level), *(np.zeros(len(level), int),) * 2)
+    motion = Motion(FLOW, np.array(level), *(np.zeros(len(level), int),) * 3)
     found = threshold.of_pile(motion, np.ones(len(level)), fraction, 1.0)
     if math.isnan(found.tau):
         assert motion.fraction[-1] < fraction

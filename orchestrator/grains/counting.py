@@ -1,0 +1,64 @@
+"""The counting rule: which of the counted grains have moved, gone back or been carried off.
+
+Its words are in docs/benchmark.md, "The counting rule"; the deck in.bed holds the same marker to
+know when a hold may end, and its counts are compared with those of this rule.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Count:
+    """What N counted grains have done by each of T looks. What is once true stays true.
+
+    Attributes
+    ----------
+    moved : ndarray of bool, shape (T, N)
+        Displaced downstream by the marker at a look, or carried off.
+    fallen : ndarray of bool, shape (T, N)
+        Displaced upstream by the marker at a look. Such a grain has not moved, but may yet.
+    carried : ndarray of bool, shape (T, N)
+        Gone without having been seen beyond the marker: the flow lifted it off the pile.
+    """
+
+    moved: BoolArray
+    fallen: BoolArray
+    carried: BoolArray
+
+
+def count(travel: FloatArray, marker: float, *, falls_out: bool) -> Count:
+    """Apply the rule to the tracks of grains.
+
+    Parameters
+    ----------
+    travel : ndarray, shape (T, N)
+        Displacement along the bed since the settling, downstream positive, d; NaN for a grain
+        that is gone.
+    marker : float
+        Displacement that counts as motion, d.
+    falls_out : bool
+        What it means that a grain is gone which was not seen beyond the marker: from the two
+        neighbours of a single grain it fell upstream, for no bed is there to hold it; only lift
+        can have taken it from a pile.
+    """
+    ahead, back = _ever(travel >= marker), _ever(travel <= -marker)
+    vanished = _ever(np.isnan(travel) & ~ahead)
+    if falls_out:
+        return Count(ahead, back | vanished, np.zeros_like(vanished))
+    return Count(ahead | vanished, back, vanished)
+
+
+def deck_counts(travel: FloatArray, marker: float) -> tuple[IntArray, IntArray]:
+    """What the deck prints at each look, shape (T,): grains short of the marker, grains fallen."""
+    return (travel < marker).sum(axis=1), (travel <= -marker).sum(axis=1)
+
+
+def _ever(happened: BoolArray) -> BoolArray:
+    return np.logical_or.accumulate(happened, axis=0)
