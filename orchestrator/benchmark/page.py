@@ -5,12 +5,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pandas as pd
-from matplotlib import rc_context
 
 from orchestrator.benchmark import charts, sheets
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender
-from orchestrator.report import experiment, style
+from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.facts import Sheet
 
@@ -29,8 +28,7 @@ def write(pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame, fil
     """Write the page and its figures; `levels` is the summary."""
     names = ", ".join(one.name for one in contenders)
     title = f"Against the pack “{pack.root.name}”: {names}"
-    with rc_context(style.RC):
-        sections = list(_sections(pack, contenders, levels))
+    sections = list(_sections(pack, contenders, levels))
     return experiment.write(title, sections, file, pack.manifest.get("programs", {}))
 
 

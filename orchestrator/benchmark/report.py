@@ -11,6 +11,7 @@ import pandas as pd
 
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict
+from orchestrator.report import settings
 from orchestrator.runs.files import write_durably
 
 PAGE = "comparison.html"
@@ -39,14 +40,15 @@ class Found:
 
 def write(pack: Pack, contenders: Sequence[Contender], root: Path) -> Found:
     """Write tables, figures and page of a comparison into a directory."""
-    # the drawing libraries take half a second to import: only who draws waits for them
-    from orchestrator.benchmark import page
-
     numbers = pd.concat([one.rows.assign(solver=one.name) for one in contenders])
     _write(numbers, root / NUMBERS, "%.9g")
     _write(pd.DataFrame(_verdicts(contenders)), root / VERDICTS, "%.6g")
     levels = summary(contenders)
-    page.write(pack, contenders, levels, root / PAGE)
+    with settings.own():
+        # the drawing libraries take half a second to import: only who draws waits for them
+        from orchestrator.benchmark import page
+
+        page.write(pack, contenders, levels, root / PAGE)
     return Found(_failures(contenders), levels.to_string(index=False), root / PAGE)
 
 

@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 import pandas as pd
-from matplotlib import rc_context
 
 from orchestrator.experiments import ladder_figures as ladder
 from orchestrator.experiments import map_figures as maps
 from orchestrator.experiments.maps import Map
 from orchestrator.experiments.stability import WRONG
 from orchestrator.fidelity import limits, rungs
-from orchestrator.report import experiment, style
+from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
 
@@ -19,10 +19,12 @@ CHART = "speed-against-accuracy"
 ERROR_COLUMNS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
 
 
-def of_ladder(tables: Mapping[str, pd.DataFrame]) -> list[Section]:
-    """The page of the ladder: points, rungs and naive routes."""
-    with rc_context(style.RC):
-        return list(_ladder(tables["points"], tables["rungs"], tables["naive"]))
+def write_ladder(
+    tables: Mapping[str, pd.DataFrame], file: Path, programs: Mapping[str, str]
+) -> None:
+    """Write the page of the ladder: points, rungs and naive routes."""
+    sections = list(_ladder(tables["points"], tables["rungs"], tables["naive"]))
+    experiment.write("Speed against accuracy", sections, file, programs)
 
 
 def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> Iterator[Section]:
@@ -125,8 +127,17 @@ def _wide(known: pd.DataFrame) -> pd.DataFrame:
     return table.drop(columns="place").rename(columns=heads)
 
 
-def of_stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> list[Section]:
-    """The page of the maps: the sheet of all, then each by itself."""
+def write_stability(
+    drawn: Sequence[Map],
+    judged: Mapping[str, pd.DataFrame],
+    file: Path,
+    programs: Mapping[str, str],
+) -> None:
+    """Write the page of the maps: the sheet of all, then each by itself."""
+    experiment.write("Where each method fails", list(_stability(drawn, judged)), file, programs)
+
+
+def _stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> Iterator[Section]:
     shown = {
         one.name: maps.Map(
             judged[one.name],
@@ -138,21 +149,17 @@ def of_stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> li
         )
         for one in drawn
     }
-    with rc_context(style.RC):
-        first = Section(
-            "All maps",
-            "Each cell is a real run. It is good where tau_c is within "
-            f"{WRONG:.0%} of its reference at every fraction; wrong where it is not and nothing "
-            "said so; noisy, exploded or stalled where the run itself said so (a marked corner).",
-            (Figure("maps", "Where each method fails", "", (), maps.sheet(list(shown.values()))),),
+    yield Section(
+        "All maps",
+        "Each cell is a real run. It is good where tau_c is within "
+        f"{WRONG:.0%} of its reference at every fraction; wrong where it is not and nothing "
+        "said so; noisy, exploded or stalled where the run itself said so (a marked corner).",
+        (Figure("maps", "Where each method fails", "", (), maps.sheet(list(shown.values()))),),
+    )
+    for one in drawn:
+        yield Section(
+            one.title,
+            one.question,
+            (Figure(f"map-{one.name}", one.title, "", (), maps.draw(shown[one.name])),),
+            limits=tuple(limit.says for limit in limits.of_map(one.name)),
         )
-        rest = [
-            Section(
-                one.title,
-                one.question,
-                (Figure(f"map-{one.name}", one.title, "", (), maps.draw(shown[one.name])),),
-                limits=tuple(limit.says for limit in limits.of_map(one.name)),
-            )
-            for one in drawn
-        ]
-    return [first, *rest]

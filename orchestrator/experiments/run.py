@@ -1,16 +1,15 @@
 """Run an experiment in a directory of its own, to its tables and its page."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 
 from orchestrator import pipeline
-from orchestrator.experiments import ladder, maps, naive, pages, ranking, stability
+from orchestrator.experiments import ladder, maps, naive, ranking, stability
 from orchestrator.pipeline import Finished
 from orchestrator.plan import of
-from orchestrator.report import experiment
-from orchestrator.report.experiment import Section
+from orchestrator.report import settings
 from orchestrator.runs import case as case_states
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import write_durably
@@ -52,7 +51,10 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
             ),
         }
         _write(tables, space)
-        _page("Speed against accuracy", pages.of_ladder(tables), space)
+        with settings.own():
+            from orchestrator.experiments import pages
+
+            pages.write_ladder(tables, space.page, case_states.programs(space.cases))
     return Finished(space.page, len(todo), failures)
 
 
@@ -82,7 +84,10 @@ def run_stability(out: Path, *, workers: int) -> Finished:
         judged = {one.name: stability.judge(one, answers) for one in drawn}
         table = pd.concat(judged.values(), ignore_index=True)
         _write({"maps": table}, space)
-        _page("Where each method fails", pages.of_stability(drawn, judged), space)
+        with settings.own():
+            from orchestrator.experiments import pages
+
+            pages.write_stability(drawn, judged, space.page, case_states.programs(space.cases))
     return Finished(space.page, len(todo), {})
 
 
@@ -95,7 +100,3 @@ def _write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
     space.tables.mkdir(exist_ok=True)
     for name, table in tables.items():
         write_durably(space.tables / f"{name}.csv", table.to_csv(index=False))
-
-
-def _page(title: str, sections: Sequence[Section], space: Workspace) -> None:
-    experiment.write(title, sections, space.page, case_states.programs(space.cases))

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from orchestrator.report import settings
+from orchestrator.runs.files import write_durably
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -43,15 +46,15 @@ def write(
     Path
         The page.
     """
-    # the drawing libraries take half a second to import: only who draws waits for them
-    from orchestrator.report import claims, gallery, page
-    from orchestrator.report.results import Results
-    from orchestrator.runs.files import write_durably
+    with settings.own():
+        # the drawing libraries take half a second to import: only who draws waits for them
+        from orchestrator.report import claims, gallery, page
+        from orchestrator.report.results import Results
 
-    results = Results(study, plan, tables, out / "cases")
-    folder = out / FIGURES
-    folder.mkdir(exist_ok=True)
-    figures = gallery.draw(results, folder)
+        results = Results(study, plan, tables, out / "cases")
+        folder = out / FIGURES
+        folder.mkdir(exist_ok=True)
+        figures = gallery.draw(results, folder)
     judged = claims.judge(tables)
     write_durably(out / CLAIMS, claims.frame(judged).to_csv(index=False))
     write_durably(out / PAGE, page.render(results, figures, timings, failures, judged))
@@ -60,8 +63,9 @@ def write(
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
     """The cases whose bulky files the page's pictures are drawn from."""
-    from orchestrator.report import flow_picture, grain_picture
-    from orchestrator.report.results import Results
+    with settings.own():
+        from orchestrator.report import flow_picture, grain_picture
+        from orchestrator.report.results import Results
 
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:

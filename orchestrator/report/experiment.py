@@ -25,7 +25,7 @@ class Section:
     title, text : str
         Its heading and what it says; an empty line parts paragraphs.
     figures : sequence of Figure
-        With canvases that were made under `style.RC`.
+        With canvases that were made under `settings.own`.
     tables : sequence of Sheet
         As `sheet` makes them.
     limits : sequence of str

@@ -9,8 +9,6 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
-from matplotlib import rc_context
-
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
     animation,
@@ -72,8 +70,7 @@ _shared: list[Results] = []
 
 
 def _section(number: int, folder: Path) -> list[Drawn]:
-    with rc_context(style.RC):
-        return list(SECTIONS[number](_shared[0], folder))
+    return list(SECTIONS[number](_shared[0], folder))
 
 
 def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:

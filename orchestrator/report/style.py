@@ -16,24 +16,6 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 WIDTH = 7.0
 """Of a figure across two columns of a paper, inches."""
-PIXELS_PER_INCH = 200
-RC: dict[Any, Any] = {
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "legend.fontsize": 7,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "axes.linewidth": 0.6,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 4.2,
-    "mathtext.fontset": "dejavusans",
-    "axes.titley": 1.0,  # where they are anyway; matplotlib would look for ticks above each panel
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-    "svg.hashsalt": "orchestrator",
-    "savefig.dpi": PIXELS_PER_INCH,
-}
 
 SHADES = {
     "beta_deg": ("viridis", 0.0, 0.85),

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from matplotlib import rc_context
 
 from orchestrator import plan, report, tables
-from orchestrator.report import style
+from orchestrator.report import settings
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
 from orchestrator.study import study
@@ -82,5 +81,5 @@ def only(results: Results, bed: str) -> Results:
 
 @pytest.fixture(autouse=True)
 def styled() -> Iterator[None]:
-    with rc_context(style.RC):
+    with settings.own():
         yield

@@ -1,0 +1,136 @@
+"""A user's settings and variables that are none of ours: they change no result and no figure."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.faults.bench import CELLS, HEAD, PILE, ROOT
+
+HOSTILE_RC = """
+text.usetex: True
+backend: nonsense
+font.family: serif
+font.serif: Nothing
+axes.facecolor: red
+lines.linewidth: 9
+path.sketch: 3, 10, 2
+savefig.dpi: 30
+savefig.bbox: tight
+svg.fonttype: none
+axes.formatter.use_locale: True
+nonsense: 1
+"""
+
+
+def _run(folder: Path, *arguments: str, **variables: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "orchestrator", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **variables},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The directory of a finished study: a pile, its flow, two single grains."""
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "small.toml").write_text(HEAD + CELLS + PILE)
+    ended = _run(folder, "study", "small.toml", "--out", "out")
+    assert ended.returncode == 0, ended.stderr
+    return folder / "out"
+
+
+def _drawn(out: Path) -> dict[str, bytes]:
+    files = [out / "report.html", out / "claims.csv", *(out / "figures").iterdir()]
+    return {path.name: path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"MATPLOTLIBRC": "rc"},
+        {"MPLCONFIGDIR": "rc"},
+        {"XDG_CONFIG_HOME": "config"},
+        {"MPLBACKEND": "nonsense"},
+        {"MPLBACKEND": "TkAgg", "DISPLAY": ":99"},
+        {"MPLCONFIGDIR": "/dev/null/nowhere"},
+        {"SOURCE_DATE_EPOCH": "abc"},
+    ],
+    ids=str,
+)
+def test_no_setting_of_matplotlib_changes_a_figure(
+    finished: Path, tmp_path: Path, variables: dict[str, str]
+) -> None:
+    before = _drawn(finished)
+    for folder in ("rc", "config/matplotlib"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "matplotlibrc").write_text(HOSTILE_RC)
+    ended = _run(tmp_path, "report", str(finished), **variables)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert _drawn(finished) == before
+
+
+@pytest.mark.parametrize("content", [HOSTILE_RC.encode(), b"\xff\xfe\x00"])
+def test_no_matplotlibrc_of_the_working_directory_does(
+    finished: Path, tmp_path: Path, content: bytes
+) -> None:
+    before = _drawn(finished)
+    (tmp_path / "matplotlibrc").write_bytes(content)
+    for command in ("report", "prune"):
+        ended = _run(tmp_path, command, str(finished))
+        assert (ended.returncode, ended.stderr) == (0, "")
+    assert _drawn(finished) == before
+
+
+SEALED = """
+import sys
+from pathlib import Path
+import orchestrator.benchmark.runner, orchestrator.experiments.run, orchestrator.prune
+assert "matplotlib" not in sys.modules
+from orchestrator.report import settings
+with settings.own():
+    from orchestrator.benchmark import page
+    from orchestrator.experiments import pages
+    from orchestrator.report import style
+    figure = style.canvas(1.0)
+    figure.subplots().plot([0, 1], label="grains")
+    style.save(figure, Path(), "one")
+"""
+"""What the pages of experiments and benchmarks do: matplotlib is imported by nothing before."""
+
+
+def test_pages_of_experiments_and_benchmarks_are_drawn_as_ours_too(tmp_path: Path) -> None:
+    for name in ("ours", "theirs"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "theirs" / "matplotlibrc").write_text(HOSTILE_RC)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for name in ("ours", "theirs"):
+        subprocess.run(
+            [sys.executable, "-c", SEALED], cwd=tmp_path / name, env=environment, check=True
+        )
+    for kind in ("png", "svg"):
+        one, other = (tmp_path / name / f"one.{kind}" for name in ("ours", "theirs"))
+        assert one.read_bytes() == other.read_bytes()
+
+
+def test_a_program_that_draws_by_itself_keeps_its_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import matplotlib
+
+    from orchestrator.report import settings
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "pdf")
+    with matplotlib.rc_context({"font.size": 33}):
+        with settings.own():
+            assert matplotlib.rcParams["font.size"] == settings.RC["font.size"]
+        assert matplotlib.rcParams["font.size"] == 33
+    assert Path.cwd() == tmp_path
+    assert os.environ["MPLBACKEND"] == "pdf"
