@@ -1,0 +1,100 @@
+"""Measured thresholds in water, pivots of natural beds, and the hiding of grains in mixtures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.physics.exposure import FloatArray
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Measured threshold Shields numbers in a range of Re*.
+
+    Attributes
+    ----------
+    low, high : float
+        Range of the friction Reynolds number, low <= Re* < high.
+    count : int
+        How many measurements.
+    median, tenth, ninetieth : float
+        Of their threshold Shields numbers; the order statistics of rank int(n/10) + 1 and
+        int(9 n/10) + 1.
+    """
+
+    low: float
+    high: float
+    count: int
+    median: float
+    tenth: float
+    ninetieth: float
+
+    @property
+    def middle(self) -> float:
+        """Geometric mean of the range of Re*."""
+        return float(np.sqrt(self.low * self.high))
+
+
+BUFFINGTON_MONTGOMERY = (
+    Bin(0.1, 0.3, 12, 0.1125, 0.063, 0.165),
+    Bin(0.3, 1.0, 16, 0.1265, 0.062, 0.226),
+    Bin(1.0, 3.0, 23, 0.059, 0.039, 0.113),
+    Bin(3.0, 10.0, 51, 0.041, 0.024, 0.059),
+    Bin(10.0, 30.0, 27, 0.038, 0.020, 0.172),
+    Bin(30.0, 100.0, 45, 0.030, 0.022, 0.092),
+    Bin(100.0, 300.0, 66, 0.037, 0.023, 0.069),
+)
+"""Flume measurements in water by many authors, binned by Re*.
+
+Compiled by J. M. Buffington and D. R. Montgomery, Water Resour. Res. 33, 1997,
+doi:10.1029/96WR03190; binned from its rows in the data of S. A. Feehan et al., 2023
+(github.com/scott-feehan/Quantifying-uncertainty-in-incipient-sediment-motion-thresholds,
+Shields_compilation_flume.csv), Re* from their Shields number, median diameter and density with
+nu = 1e-6 m2/s and g = 9.81 m/s2. Visual thresholds and those by a reference transport are together.
+"""
+
+MEASURED_SOURCE = "flumes, compiled by Buffington & Montgomery 1997"
+"""For legends."""
+
+
+def kirchner_pivot(percentile: ArrayLike, relative_diameter: ArrayLike = 1.0) -> FloatArray:
+    """Pivot angle of a natural bed at a percentile, deg: (30 + n/2)(D/D50)^-0.3.
+
+    J. W. Kirchner, W. E. Dietrich, F. Iseya and H. Ikeda, Sedimentology 37, 1990, as in the code
+    of E. Yager et al., 2018 (taucrcalc); the article was not at hand. The entrainment angle is 90
+    deg less the pivot: beta 60 and 45 are the percentiles 0 and 30 of grains of the median size.
+
+    Parameters
+    ----------
+    percentile : array_like
+        n, 0 to 100.
+    relative_diameter : array_like
+        Diameter of the grain over the median of the bed.
+    """
+    n, size = np.asarray(percentile, float), np.asarray(relative_diameter, float)
+    return np.asarray((30 + 0.5 * n) * size**-0.3)
+
+
+def wilcock_crowe_hiding(relative_diameter: ArrayLike) -> FloatArray:
+    """Threshold stress of a size in a mixture over that of the mean size, of D_i/D_m.
+
+    P. R. Wilcock and J. C. Crowe, J. Hydraul. Eng. 129, 2003,
+    doi:10.1061/(ASCE)0733-9429(2003)129:2(120); the exponent agrees with several public codes.
+    It was fitted to a reference transport, not to the first motion.
+    """
+    size = np.asarray(relative_diameter, float)
+    return np.asarray(size ** (0.67 / (1 + np.exp(1.5 - size))))
+
+
+def egiazaroff_hiding(relative_diameter: ArrayLike) -> FloatArray:
+    """Threshold Shields number of a size in a mixture over that of the mean size, of D_i/D_m.
+
+    I. V. Egiazaroff, J. Hydraul. Div. 91 (HY4), 1965: (log 19/log(19 D_i/D_m))^2, as in public
+    codes. It rises without bound towards D_i/D_m = 1/19 (codes replace it below 0.4, after Ashida
+    and Michiue) and means nothing below, where it is NaN. The factor on the stress is it times
+    D_i/D_m.
+    """
+    size = 19 * np.asarray(relative_diameter, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(size > 1, (np.log(19) / np.log(size)) ** 2, np.nan)

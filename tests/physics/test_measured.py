@@ -1,0 +1,67 @@
+"""Measured thresholds and pivots, and what the laws make of them."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.measured import (
+    BUFFINGTON_MONTGOMERY,
+    egiazaroff_hiding,
+    kirchner_pivot,
+    wilcock_crowe_hiding,
+)
+from orchestrator.physics.threshold import shields_at
+
+
+def test_the_bins_follow_each_other_and_are_in_order() -> None:
+    bins = BUFFINGTON_MONTGOMERY
+    assert all(one.high == other.low for one, other in pairwise(bins))
+    assert all(b.low < b.middle < b.high and b.tenth < b.median < b.ninetieth for b in bins)
+    assert sum(b.count for b in bins) == 240
+
+
+@pytest.mark.parametrize(
+    ("name", "beta", "part", "median", "worst"),
+    [
+        ("low", 50, 30, 1.54, 10.97),
+        ("high", 50, 30, 2.88, 52.58),
+        ("bridged", 50, 30, 1.23, 1.62),
+        ("bridged", 60, 10, 1.60, 2.59),
+        ("profile", 50, 30, 1.26, 1.78),
+        ("claudin-andreotti", 50, 10, 1.12, 1.63),
+        ("zeng", 45, 30, 1.20, 2.11),
+        ("zeng-torque", 45, 30, 1.73, 3.19),
+    ],
+)
+def test_how_far_each_law_is_from_the_medians(
+    name: str, beta: float, part: float, median: float, worst: float
+) -> None:
+    bins = [b for b in BUFFINGTON_MONTGOMERY if b.low >= 0.3]
+    middle = np.array([b.middle for b in bins])
+    theta = shields_at(LAWS[name], middle, roughness_ratio=1 / part, entrainment_angle_deg=beta)
+    factor = np.exp(np.abs(np.log(theta / [b.median for b in bins])))
+    assert float(np.median(factor)) == pytest.approx(median, abs=0.006)
+    assert float(factor.max()) == pytest.approx(worst, rel=0.003)
+
+
+def test_beta_60_and_45_are_pivots_of_a_natural_bed() -> None:
+    np.testing.assert_allclose(90 - kirchner_pivot([0, 30, 100]), [60, 45, 10])
+    assert float(kirchner_pivot(50, 2.0)) == pytest.approx(55 * 2**-0.3)
+
+
+def test_grains_of_the_mean_size_neither_hide_nor_stand_out() -> None:
+    assert float(wilcock_crowe_hiding(1.0)) == 1
+    assert float(egiazaroff_hiding(1.0)) == pytest.approx(1)
+    size = np.array([0.2, 0.5, 2.0, 5.0])
+    assert np.all(np.diff(wilcock_crowe_hiding(size)) > 0)
+    assert np.all(np.diff(egiazaroff_hiding(size)) < 0)
+    # b = 0.67/(1 + e^0.5) at half the mean, tends to 0.67 for the largest
+    assert float(wilcock_crowe_hiding(0.5)) == pytest.approx(0.5 ** (0.67 / 3.718281828459045))
+    assert float(wilcock_crowe_hiding(20.0)) == pytest.approx(20**0.67, rel=1e-6)
+    assert float(egiazaroff_hiding(2.0)) == pytest.approx((2.944438979 / 3.637586160) ** 2)
+
+
+def test_egiazaroff_means_nothing_below_a_nineteenth() -> None:
+    assert np.all(np.isnan(egiazaroff_hiding([0.01, 1 / 19.01])))
