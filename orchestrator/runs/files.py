@@ -1,9 +1,12 @@
 """State on disk: canonical JSON, digests, and writing that survives a crash."""
 
+import errno
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterable
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +23,7 @@ def digest_text(text: str) -> str:
 
 def digest_file(path: Path) -> str:
     """SHA-256 of a file's content, in hexadecimal."""
-    with path.open("rb") as stream:
+    with opened(path) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
@@ -33,7 +36,8 @@ def write_durably(path: Path, content: str | bytes) -> None:
     """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with temporary.open("wb") as stream:
+        temporary.unlink(missing_ok=True)
+        with temporary.open("xb") as stream:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
@@ -93,12 +97,33 @@ def sync_directory(directory: Path) -> None:
 
 def write_json(path: Path, value: Any) -> None:
     """Write a JSON file durably, indented for people, with its keys sorted."""
-    write_durably(path, json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n")
+    write_durably(path, text_of(value))
+
+
+def text_of(value: Any) -> str:
+    """A JSON value as a file for people: indented, with its keys sorted."""
+    return json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 def read_json(path: Path) -> Any | None:
     """The file's value, or None where it is missing or cannot be read: unreadable is undone."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        with opened(path) as stream:
+            return json.load(stream)
     except (OSError, ValueError, RecursionError):
         return None
+
+
+def opened(path: Path) -> BufferedReader:
+    """Open a file to read it; a pipe or a device, which might never end, is refused.
+
+    Raises
+    ------
+    OSError
+        If it is no file, or cannot be read.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EINVAL, "not a file", str(path))
+    return os.fdopen(handle, "rb")

@@ -9,6 +9,7 @@ import errno
 import fcntl
 import os
 import socket
+import stat
 import threading
 import time
 from collections.abc import Iterator
@@ -16,8 +17,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import IO
 
-from orchestrator.errors import OrchestratorError
-from orchestrator.runs.files import canonical_json, read_json, remove_empty_directory, write_durably
+from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.runs.files import (
+    canonical_json,
+    opened,
+    read_json,
+    remove_empty_directory,
+    write_durably,
+)
 
 BEAT_S = 10.0
 """Between two beats of a holder on a file system without locks."""
@@ -93,7 +100,7 @@ def holder(path: Path) -> Holder | None:
     """Who holds a lock file, as far as can be seen at once; nothing is written."""
     note = _read(path)
     try:
-        with path.open("rb") as stream:
+        with opened(path) as stream:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return note or Holder("this machine", 0, "")
@@ -104,8 +111,13 @@ def holder(path: Path) -> Holder | None:
 
 
 def _open(path: Path) -> IO[str]:
+    """Open the file itself: no link to one, nor a pipe, which would wait for a reader."""
     remove_empty_directory(path)
-    return path.open("a+", encoding="utf-8")
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise InputError("the lock is not a file", where=str(path), remedy="remove it")
+    return os.fdopen(handle, "r+", encoding="utf-8")
 
 
 def _lock(stream: IO[str], path: Path) -> bool:
@@ -128,7 +140,7 @@ def _lock(stream: IO[str], path: Path) -> bool:
 
 def _refusal(other: Holder | None, path: Path) -> OrchestratorError:
     return OrchestratorError(
-        f"the study is being run by {other or 'another process'}",
+        f"it is in use by {other or 'another process'}",
         where=str(path.parent),
         remedy="wait for its end, or choose another directory with --out",
     )
@@ -136,14 +148,21 @@ def _refusal(other: Holder | None, path: Path) -> OrchestratorError:
 
 @contextlib.contextmanager
 def _by_system(stream: IO[str]) -> Iterator[None]:
-    stream.truncate(0)
-    stream.write(_text(this_process()))
-    stream.flush()
+    _write(stream, _text(this_process()))
     try:
         yield
     finally:
         with contextlib.suppress(OSError):
-            stream.truncate(0)
+            _write(stream, "")
+
+
+def _write(stream: IO[str], text: str) -> None:
+    """Replace the note, unless the file has another name: what that belongs to is not known."""
+    if os.fstat(stream.fileno()).st_nlink == 1:
+        stream.seek(0)
+        stream.truncate()
+        stream.write(text)
+        stream.flush()
 
 
 @contextlib.contextmanager
