@@ -2,7 +2,7 @@
 
 A packing is a lattice of equal spheres in the plane of the flow: rows in which the centres are
 ``2 d cos(beta)`` apart, each row resting in the pockets of the one below, ``d sin(beta)`` lower.
-Lengths here are in diameters, with the windward toe of the flow's bed line at the origin.
+Lengths here are in diameters, with the foot of the form at the origin.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.bed.disorder import rows as disorder_rows
+from orchestrator.bed.line import BedLine
 from orchestrator.study.scene import Packing as Pattern
 
 FloatArray = NDArray[np.float64]
@@ -32,55 +33,6 @@ TWIN = 1e-9
 which grain of a chain goes first."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
-
-
-@dataclass(frozen=True)
-class Triangle:
-    """The bed line of a pile: flat, up the windward face, down the lee face, flat.
-
-    Attributes
-    ----------
-    slope_deg : float
-        Slope of both faces, alpha.
-    height : float
-        Height h of the crest over the flat bed, diameters.
-    """
-
-    slope_deg: float
-    height: float
-
-    @property
-    def tangent(self) -> FloatArray:
-        """Unit vector up the windward face, (x, z)."""
-        alpha = np.radians(self.slope_deg)
-        return np.array([np.cos(alpha), np.sin(alpha)])
-
-    @property
-    def normals(self) -> tuple[FloatArray, FloatArray]:
-        """Outward unit normals of the windward and of the lee face."""
-        x, z = self.tangent
-        return np.array([-z, x]), np.array([z, x])
-
-    @property
-    def crest(self) -> FloatArray:
-        """Position of the crest, diameters."""
-        return np.array([self.height / np.tan(np.radians(self.slope_deg)), self.height])
-
-    def depth(self, points: FloatArray, face: int) -> FloatArray:
-        """Signed distance of points (n, 2) below a face's line (0 windward, 1 lee), diameters."""
-        return np.asarray(-(points - self.crest) @ self.normals[face])
-
-    def arc_length(self, points: FloatArray) -> FloatArray:
-        """Arc length from the windward toe to the foot of each point's normal, diameters."""
-        top = self.height / np.sin(np.radians(self.slope_deg))
-        up = (points - self.crest) @ self.tangent
-        down = (points - self.crest) @ (self.tangent * [1, -1])
-        along = np.where(self.is_windward(points), np.minimum(top + up, top), top + down)
-        return np.asarray(along)
-
-    def is_windward(self, points: FloatArray) -> BoolArray:
-        """Which points belong to the windward face; the crest's own grain does."""
-        return np.asarray(points[:, 0] <= self.crest[0] + TIE)
 
 
 @dataclass(frozen=True)
@@ -112,7 +64,7 @@ class Packing:
 
 
 def pile(
-    triangle: Triangle,
+    line: BedLine,
     *,
     entrainment_angle_deg: float,
     gap: float,
@@ -121,12 +73,12 @@ def pile(
     disorder: float = 0.0,
     seed: int = 0,
 ) -> Packing:
-    """Pack a triangular pile.
+    """Pack a pile with straight faces.
 
     Parameters
     ----------
-    triangle : Triangle
-        The bed line of the flow.
+    line : BedLine
+        Of the flow, diameters.
     entrainment_angle_deg : float
         beta of the lattice.
     gap : float
@@ -143,17 +95,17 @@ def pile(
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap
     row_height = float(np.sin(beta))
-    most = int(np.ceil(triangle.height / np.cos(np.radians(triangle.slope_deg)) / row_height)) + 1
+    most = int(np.ceil(line.crest[1] / line.tangents[line.windward, 0] / row_height)) + 1
     mobile_layers = min(mobile_layers, most)
     uneven = max(mobile_layers, DISORDERED)
-    points = _points(triangle, pattern, beta, surface, uneven, disorder, seed)
+    points = _points(line, pattern, beta, surface, uneven, disorder, seed)
     stray = STRAY if pattern == "disordered" else TIE
     # under a slope's level rows a grain rests on one that lies deeper below the face
     layers = mobile_layers + (pattern == "horizontal")
-    body = _shell(points, triangle, beta, surface, layers, stray)
+    body = _shell(points, line, beta, surface, layers, stray)
     buried = body[:, 1] < surface - TIE
-    in_layers = triangle.depth(body, 0) + surface < (mobile_layers - 0.5) * row_height
-    windward, lee = (face & ~buried for face in exposed(body, triangle, disorder))
+    in_layers = line.depth(body, line.windward) + surface < (mobile_layers - 0.5) * row_height
+    windward, lee = (face & ~buried for face in exposed(body, line, disorder))
     mobile = (in_layers & ~buried) | windward
     idle = buried & ~_touching(body, mobile)
     body = body[~idle]
@@ -167,12 +119,12 @@ def pile(
         mobile=np.append(mobile, rest),
         windward=np.append(windward, rest),
         lee=np.append(lee, rest),
-        arc_length=triangle.arc_length(centres),
+        arc_length=line.nearest(centres)[1],
     )
 
 
 def _points(
-    triangle: Triangle,
+    line: BedLine,
     pattern: Pattern,
     beta: float,
     surface: float,
@@ -181,14 +133,15 @@ def _points(
     seed: int,
 ) -> FloatArray:
     """Where grains of the pattern may lie, one of them on the crest."""
-    direction = np.array([1.0, 0.0]) if pattern == "horizontal" else triangle.tangent
-    apex = triangle.crest + np.array([0, surface / np.cos(np.radians(triangle.slope_deg))])
-    lattice = _lattice(triangle, apex, direction, beta)
+    face = line.tangents[line.windward]
+    direction = np.array([1.0, 0.0]) if pattern == "horizontal" else face
+    apex = line.crest + np.array([0, surface / face[0]])
+    lattice = _lattice(line, apex, direction, beta)
     if pattern != "disordered":
         return lattice
-    columns = int(np.ceil(np.linalg.norm(triangle.crest) / np.cos(beta) / 2)) + uneven + 4
+    columns = int(np.ceil(line.crest_s / np.cos(beta) / 2)) + uneven + 4
     rows = disorder_rows(columns, uneven, beta=beta, size=disorder, seed=seed)
-    normal = triangle.normals[0]
+    normal = line.normals[line.windward]
     upper = apex + np.vstack(rows) @ np.vstack([direction, normal])
     below = (apex - lattice) @ normal > (uneven + 0.5) * np.sin(beta)
     return np.vstack([upper, lattice[below]])
@@ -196,7 +149,7 @@ def _points(
 
 def _shell(
     points: FloatArray,
-    triangle: Triangle,
+    line: BedLine,
     beta: float,
     surface: float,
     layers: int,
@@ -206,7 +159,7 @@ def _shell(
 
     Below the layers that hold mobile grains one is enough: a grain touches no deeper one.
     """
-    depths = [triangle.depth(points, face) + surface for face in (0, 1)]
+    depths = [line.depth(points, face) + surface for face in (line.windward, line.lee)]
     depth, level = np.minimum(*depths), points[:, 1] - surface
     windward_shell = depths[0] < (layers + 0.5) * np.sin(beta)
     lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
@@ -231,19 +184,17 @@ def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
     )
 
 
-def exposed(
-    centres: FloatArray, triangle: Triangle, slack: float = 0.0
-) -> tuple[BoolArray, BoolArray]:
+def exposed(centres: FloatArray, line: BedLine, slack: float = 0.0) -> tuple[BoolArray, BoolArray]:
     """Which grains are exposed on the windward and on the lee face.
 
     A grain is exposed when no other centre lies higher along the normal of its face within d/2 of
     the line along that normal through its own centre. A slit narrower than `slack` (diameters)
     between two grains does not expose the one under it.
     """
-    side = triangle.is_windward(centres)
+    side = centres[:, 0] <= line.crest[0] + TIE
     found = []
-    for face, own in enumerate((side, ~side)):
-        normal = triangle.normals[face]
+    for face, own in ((line.windward, side), (line.lee, ~side)):
+        normal = line.normals[face]
         along = centres @ np.array([normal[1], -normal[0]])
         height = centres @ normal
         free = _unshadowed(along, height, 0.5 + slack + TIE, STRAY if slack else TIE)
@@ -269,13 +220,10 @@ def _unshadowed(along: FloatArray, height: FloatArray, reach: float, stray: floa
     return found
 
 
-def _lattice(
-    triangle: Triangle, anchor: FloatArray, direction: FloatArray, beta: float
-) -> FloatArray:
-    """Every lattice point within the triangle's corners, with a margin."""
+def _lattice(line: BedLine, anchor: FloatArray, direction: FloatArray, beta: float) -> FloatArray:
+    """Every lattice point within the form's corners, with a margin."""
     normal = np.array([-direction[1], direction[0]])
-    toe = [2 * triangle.crest[0], 0.0]
-    corners = np.array([[0.0, 0.0], toe, triangle.crest]) - anchor
+    corners = np.array([np.zeros(2), line.toe, line.crest]) - anchor
     along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
     rows = np.arange(0, np.ceil(down.max()) + 3)
     columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed import packing
-from orchestrator.bed.packing import Triangle
+from orchestrator.bed.shapes import triangle
 from orchestrator.study.scene import Packing as Pattern
 
 PATTERNS: tuple[Pattern, Pattern] = ("aligned", "horizontal")
@@ -18,7 +18,7 @@ def _pile(
     slope: float, height: float, pattern: Pattern = "aligned", seed: int = 0
 ) -> packing.Packing:
     return packing.pile(
-        Triangle(slope, height),
+        triangle(slope, height),
         entrainment_angle_deg=60.0,
         gap=1 / 30,
         pattern=pattern,
@@ -69,8 +69,8 @@ def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height:
 @settings(max_examples=30, deadline=None)
 @given(slope=slopes, height=heights)
 def test_exposed_grains_lie_their_gap_above_the_bed_line(slope: float, height: float) -> None:
-    bed, line = _pile(slope, height), Triangle(slope, height)
-    depth = line.depth(bed.centres[bed.windward], 0)
+    bed, line = _pile(slope, height), triangle(slope, height)
+    depth = line.depth(bed.centres[bed.windward], line.windward)
     np.testing.assert_allclose(-depth, 0.5 + 1 / 30, atol=1e-9)
 
 
@@ -90,7 +90,7 @@ def test_a_twin_has_the_grains_of_its_lattice_but_for_a_billionth(pattern: Patte
 def test_shifts_of_a_billionth_of_a_diameter_change_no_exposed_grain(
     slope: float, pattern: Pattern, seed: int
 ) -> None:
-    bed, line = _pile(slope, 15.0, pattern), Triangle(slope, 15.0)
+    bed, line = _pile(slope, 15.0, pattern), triangle(slope, 15.0)
     shift = np.random.default_rng(seed).uniform(-1e-9, 1e-9, bed.centres.shape)
     before = packing.exposed(bed.centres, line)
     after = packing.exposed(bed.centres + shift, line)
@@ -127,14 +127,14 @@ def test_horizontal_packing_is_a_stair() -> None:
 
 
 def test_arc_length_runs_over_the_crest() -> None:
-    line = Triangle(30.0, 10.0)
+    line = triangle(30.0, 10.0)
     points = np.array([[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0]])
-    np.testing.assert_allclose(line.arc_length(points), [0.0, 20.0, 40.0], atol=1e-12)
+    np.testing.assert_allclose(line.nearest(points)[1], [0.0, 20.0, 40.0], atol=1e-12)
 
 
 def _disordered(slope: float, seed: int, size: float = 0.05) -> packing.Packing:
     return packing.pile(
-        Triangle(slope, 15.0),
+        triangle(slope, 15.0),
         entrainment_angle_deg=60.0,
         gap=1 / 30,
         pattern="disordered",
@@ -175,7 +175,7 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
     faces = []
     for layers in (1, 2, 4):
         found = packing.pile(
-            packing.Triangle(20.0, 15.0),
+            triangle(20.0, 15.0),
             entrainment_angle_deg=60.0,
             gap=1 / 30,
             pattern=pattern,
@@ -189,10 +189,10 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
 
 
 def test_no_pile_has_more_rows_than_its_height() -> None:
-    triangle = packing.Triangle(20.0, 10.0)
+    line = triangle(20.0, 10.0)
     most, more = (
         packing.pile(
-            triangle, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=n
+            line, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=n
         )
         for n in (20, 1000)
     )
