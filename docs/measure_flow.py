@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.bed.shapes import triangle
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import Array, Measure, WallStress
@@ -170,7 +171,7 @@ def hills(cases: Path) -> None:
     for slope in SLOPES[:-1]:
         for roughness in ROUGHNESS:
             one = flow(slope, roughness)
-            stress, found = solved(one, cases), theory.hill(slope, HEIGHT, roughness)
+            stress, found = solved(one, cases), theory.hill(triangle(slope, HEIGHT), roughness)
             places = at * HEIGHT / np.sin(np.radians(slope))
             theirs, ours = (np.sqrt(s.mean_over(places, HEIGHT / 40)) for s in (stress, found))
             mean = windward_mean(one, stress)

@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.fidelity import checks, rungs
 from orchestrator.grains.cells import CellsCase, batches
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
 from orchestrator.study.scene import PileBed, Scene
 from orchestrator.study.study import Study
@@ -23,20 +23,20 @@ class Plan:
     ----------
     answers : dict of str to Scene
         By the id of the scene that was asked for: the scene as it is answered.
-    piles : dict of str to PileCase
+    piles : dict of str to Pile
         By the same id.
     cells : tuple of CellsCase
         Each answers all of its scenes.
-    checks : dict of str to PileCase
+    checks : dict of str to Pile
         Piles by DEM that check answers without it, by the id of the scene asked for.
     cases : dict of str to Case
         Every run once, by name, a case after those whose results it needs.
     """
 
     answers: dict[str, Scene]
-    piles: dict[str, PileCase]
+    piles: dict[str, Pile]
     cells: tuple[CellsCase, ...]
-    checks: dict[str, PileCase]
+    checks: dict[str, Pile]
     cases: dict[str, Case]
 
     def done(
@@ -83,7 +83,7 @@ def of(answers: Mapping[str, Scene], name: str, tolerance: float | None = None) 
     With a tolerance, answers without DEM are checked by it.
     """
     piles = {
-        asked: PileCase(scene) for asked, scene in answers.items() if isinstance(scene.bed, PileBed)
+        asked: Pile(scene) for asked, scene in answers.items() if isinstance(scene.bed, PileBed)
     }
     grains = (scene for scene in answers.values() if not isinstance(scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))

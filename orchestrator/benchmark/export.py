@@ -143,9 +143,9 @@ class Finished:
             for name, one in of_flow.items():
                 yield replace(measured.flow(one), seconds=self.seconds[name])
         for one in piles if 4 in levels else ():
-            yield replace(measured.pile(one), seconds=self.seconds[one.pile.name])
+            yield replace(measured.pile(one), seconds=self.seconds[one.pile.case.name])
         for one in piles if 5 in levels else ():
-            both = self.seconds[one.pile.name] + self.seconds[one.pile.flow.name]
+            both = self.seconds[one.pile.case.name] + self.seconds[one.pile.flow.name]
             yield replace(measured.line(one), seconds=both)
 
     def _timed(self, problem: Problem) -> Problem:

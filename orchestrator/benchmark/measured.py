@@ -19,7 +19,7 @@ from orchestrator.benchmark.problem import (
 )
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.tables import Tables
 
 STRESS, MEAN_STRESS = 0.10, 0.05
@@ -41,7 +41,7 @@ class Answered:
 
     Attributes
     ----------
-    pile : PileCase
+    pile : Pile
         The pile.
     row : mapping
         Its row in the study's table of scenes.
@@ -51,7 +51,7 @@ class Answered:
         Directory of the cases.
     """
 
-    pile: PileCase
+    pile: Pile
     row: Mapping[str, Any]
     curve: pd.DataFrame
     thresholds: pd.DataFrame
@@ -60,7 +60,7 @@ class Answered:
 
 
 def answered(
-    piles: Iterable[PileCase],
+    piles: Iterable[Pile],
     rows: Mapping[str, Mapping[str, Any]],
     tables: Tables,
     cases: Path,

@@ -112,7 +112,7 @@ class Ours:
             self.flows[pile.flow.name] = self._run(pile.flow)
         flow_took = self.flows[pile.flow.name]
         cases = {pile.flow.name} if kind == "flow" else set(planned.cases)
-        pile_took = NOTHING if kind == "flow" else self._run(pile)
+        pile_took = NOTHING if kind == "flow" else self._run(pile.case)
         made = tables.make(asked, planned, self.root, cases)
         nothing = pd.DataFrame()
         one = Answered(
@@ -126,7 +126,7 @@ class Ours:
         if kind == "flow":
             return _given(measured.flow(one)), flow_took
         if kind == "pile":
-            return _with_steps(_given(measured.pile(one)), self.root / pile.name), pile_took
+            return _with_steps(_given(measured.pile(one)), self.root / pile.case.name), pile_took
         return _given(measured.line(one)), flow_took + pile_took
 
     def _run(self, *cases: Case) -> Took:

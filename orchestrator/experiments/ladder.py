@@ -130,8 +130,8 @@ def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[st
         "flow_rung": key.pair[0],
         "grain_rung": key.pair[1],
         "same_model": rungs.rung("flow", key.pair[0]).same_model,
-        "flow_s": sum(states[run.name]["cpu_s"] for run in pile.needs),
-        "grains_s": own + sum(states[r.name]["cpu_s"] for r in pile.runs if r is pile),
+        "flow_s": sum(states[run.name]["cpu_s"] for run in pile.model.cases),
+        "grains_s": own + sum(states[r.name]["cpu_s"] for r in pile.method.cases),
     }
     for fraction in key.scene.protocol.fractions:
         found = of_pile(motion, speed, fraction, key.scene.fluid.density)

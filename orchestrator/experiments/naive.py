@@ -16,7 +16,7 @@ import pandas as pd
 from orchestrator.errors import InputError
 from orchestrator.fidelity import rungs
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.study.scene import PileBed, Scene
 from orchestrator.study.study import Study
 
@@ -70,7 +70,7 @@ def measured(scene: Scene, route: Route) -> Scene:
 
 
 def costs(
-    piles: Mapping[str, PileCase], fast: PileCase, cases: Path, seconds: Mapping[str, float]
+    piles: Mapping[str, Pile], fast: Pile, cases: Path, seconds: Mapping[str, float]
 ) -> pd.DataFrame:
     """What each route costs for the curve of a pile: route, core_s, extrapolated.
 
@@ -78,26 +78,26 @@ def costs(
     ----------
     piles : mapping
         The finished runs of the small pile, by route.
-    fast : PileCase
+    fast : Pile
         The pile in question, on the fast rung, finished.
     cases : Path
         Where they lie.
     seconds : mapping
         Solver's seconds by case.
     """
-    runs = len(Motion.from_csv(cases / fast.name).flow) - 1
+    runs = len(Motion.from_csv(cases / fast.case.name).flow) - 1
     rows: list[dict[str, Any]] = []
     # the dearest first: the others are compared with it
     for name, pile in reversed(list(piles.items())):
-        holds = len(Motion.from_csv(cases / pile.name).flow) - 1
-        whole = PileCase(rungs.rung("grains", "full pile, fast").of(fast.scene))
+        holds = len(Motion.from_csv(cases / pile.case.name).flow) - 1
+        whole = Pile(rungs.rung("grains", "full pile, fast").of(fast.scene))
         grains = whole.packing.mobile.sum() / pile.packing.mobile.sum()
         rows.append(
             {
                 "route": name,
-                "core_s": seconds[pile.name] / holds * grains * runs,
+                "core_s": seconds[pile.case.name] / holds * grains * runs,
                 "extrapolated": True,
             }
         )
-    rows.append({"route": FAST, "core_s": seconds[fast.name], "extrapolated": False})
+    rows.append({"route": FAST, "core_s": seconds[fast.case.name], "extrapolated": False})
     return pd.DataFrame(rows)

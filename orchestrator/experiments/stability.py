@@ -15,7 +15,7 @@ import pandas as pd
 from orchestrator.experiments.maps import Map, Run
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.plan import Plan, of
 from orchestrator.runs import case as case_states
@@ -54,7 +54,7 @@ class Answers:
 
     def pile(self, scene: Scene) -> dict[float, PileThreshold]:
         """The thresholds of a pile, by fraction."""
-        pile: PileCase = self.planned.piles[scene.id]
+        pile: Pile = self.planned.piles[scene.id]
         motion, speed = pile.motion(self.cases), pile.face(self.cases).speed
         return {
             fraction: threshold.of_pile(motion, speed, fraction, scene.fluid.density)

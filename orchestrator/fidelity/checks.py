@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.fidelity import rungs
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.study.scene import PileBed, Scene
 
@@ -26,13 +26,13 @@ def group(scene: Scene) -> str:
     return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.closure}"
 
 
-def plan(piles: Mapping[str, PileCase], tolerance: float) -> dict[str, PileCase]:
+def plan(piles: Mapping[str, Pile], tolerance: float) -> dict[str, Pile]:
     """The checks of piles that are answered without DEM; by the id of the scene asked for."""
-    groups: dict[str, list[tuple[float, str, PileCase]]] = {}
+    groups: dict[str, list[tuple[float, str, Pile]]] = {}
     for asked, pile in piles.items():
         if pile.scene.protocol.method != "dem":
-            by_dem = PileCase(_by_dem(pile.scene, tolerance))
-            groups.setdefault(group(pile.scene), []).append((by_dem.cost_s, asked, by_dem))
+            by_dem = Pile(_by_dem(pile.scene, tolerance))
+            groups.setdefault(group(pile.scene), []).append((by_dem.case.cost_s, asked, by_dem))
     cheapest = (min(members, key=lambda one: one[:2]) for members in groups.values())
     return {asked: pile for _, asked, pile in cheapest}
 
@@ -51,9 +51,7 @@ class Comparison:
     agree: bool
 
 
-def compare(
-    cheap: PileCase, check: PileCase, tolerance: float, cases: Path
-) -> Iterator[Comparison]:
+def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator[Comparison]:
     """Compare a pile's two answers at each fraction, from the finished cases.
 
     They agree where the cheap one lies in the interval of DEM, widened by the tolerance, or where
@@ -69,8 +67,8 @@ def compare(
 
 
 def ready(
-    piles: Mapping[str, PileCase], checks: Mapping[str, PileCase], done: Container[str]
-) -> dict[str, PileCase]:
+    piles: Mapping[str, Pile], checks: Mapping[str, Pile], done: Container[str]
+) -> dict[str, Pile]:
     """The checks whose runs are done, and those of the answers that they check."""
     return {
         asked: check
@@ -80,8 +78,8 @@ def ready(
 
 
 def overruled(
-    piles: Mapping[str, PileCase],
-    checks: Mapping[str, PileCase],
+    piles: Mapping[str, Pile],
+    checks: Mapping[str, Pile],
     tolerance: float,
     cases: Path,
     done: Container[str],

@@ -25,18 +25,17 @@ mean at 15 degrees already, 64 to 103 % at 30. docs/flow.md has the numbers.
 
 from functools import cache
 from itertools import pairwise
-from math import ceil, log, pi, radians, sqrt, tan
+from math import ceil, log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.closures import KARMAN
 
 Array = NDArray[np.float64]
 
-UPSTREAM, DOWNSTREAM = 10.0, 20.0
-"""Flat bed before the windward and behind the lee toe, h."""
 FACES = 100
 """Faces of the bed, per h."""
 CHORDS = 100
@@ -49,29 +48,31 @@ STEEPEST = 0.25
 
 
 @cache
-def flat(slope_deg: float, height_m: float) -> WallStress:
-    """The undisturbed stress, tau = tau_0, on the bed of a pile (height in m)."""
-    edges = _edges(slope_deg, height_m)
-    return _wall_stress(slope_deg, height_m, edges, np.ones(len(edges) - 1))
+def flat(line: BedLine) -> WallStress:
+    """The undisturbed stress, tau = tau_0, on a bed line (m)."""
+    edges = _edges(line)
+    return _wall_stress(line, edges, np.ones(len(edges) - 1))
 
 
 @cache
-def hill(slope_deg: float, height_m: float, roughness_m: float) -> WallStress:
+def hill(line: BedLine, roughness_m: float) -> WallStress:
     """The stress on the bed of a pile by the linear theory, averaged over each face exactly.
 
     Parameters
     ----------
-    slope_deg, height_m, roughness_m : float
-        Slope of the faces, degrees; height and z0, m.
+    line : BedLine
+        Of the pile, m.
+    roughness_m : float
+        z0, m.
     """
-    edges = _edges(slope_deg, height_m)
-    x, z = seen_by_the_flow(slope_deg, height_m)
-    strength, asymmetry = coefficients(_half_length(x, z, height_m) / roughness_m)
+    edges, height = _edges(line), float(line.crest[1])
+    x, z = seen_by_the_flow(line)
+    strength, asymmetry = coefficients(_half_length(x, z, height) / roughness_m)
     rise = np.diff(np.interp(edges, x, z)) / np.diff(edges)
     tau = 1 + strength * (hilbert(edges, x, z) + asymmetry * rise)
     middle = (edges[1:] + edges[:-1]) / 2
-    under = (middle > x[1] + LASTS * height_m) & (middle < x[-1])
-    return _wall_stress(slope_deg, height_m, edges, np.where(under, 0, np.maximum(tau, 0)))
+    under = (middle > x[1] + LASTS * height) & (middle < x[-1])
+    return _wall_stress(line, edges, np.where(under, 0, np.maximum(tau, 0)))
 
 
 def coefficients(length_over_roughness: float) -> tuple[float, float]:
@@ -97,16 +98,17 @@ def hilbert(edges: Array, x: Array, z: Array) -> Array:
     return np.asarray(np.diff(integral @ jumps) / np.diff(edges) / pi)
 
 
-def seen_by_the_flow(slope_deg: float, height_m: float) -> tuple[Array, Array]:
+def seen_by_the_flow(line: BedLine) -> tuple[Array, Array]:
     """Corners x, z (m) of the windward face and of the separation streamline behind it."""
-    slope = tan(radians(slope_deg))
+    crest, height_m = line.crest
+    slope = height_m / crest
     ratio = slope / STEEPEST / 4
     # to second order in the ratio; the exact length grows without bounds towards 37 degrees
     length = 1.5 * height_m / STEEPEST * (1 + ratio + 2 * ratio**2)
     t = np.linspace(0, 1, CHORDS + 1)
     rise = slope * length
     z = (1 - t) ** 2 * (height_m * (1 + 2 * t) + rise * t)
-    return np.append(0, height_m / slope + length * t), np.append(0, z)
+    return np.append(0, crest + length * t), np.append(0, z)
 
 
 def _half_length(x: Array, z: Array, height_m: float) -> float:
@@ -116,20 +118,17 @@ def _half_length(x: Array, z: Array, height_m: float) -> float:
     return float(down - x[1] / 2) / 2
 
 
-def _edges(slope_deg: float, height_m: float) -> Array:
-    half = height_m / tan(radians(slope_deg))
-    ends = np.array([-UPSTREAM * height_m, 0, half, 2 * half, 2 * half + DOWNSTREAM * height_m])
+def _edges(line: BedLine) -> Array:
+    height = float(line.crest[1])
     parts = [
-        np.linspace(start, end, ceil((end - start) / height_m * FACES) + 1)[:-1]
-        for start, end in pairwise(ends)
+        np.linspace(start, end, ceil((end - start) / height * FACES) + 1)[:-1]
+        for start, end in pairwise(line.x)
     ]
-    return np.append(np.concatenate(parts), ends[-1])
+    return np.append(np.concatenate(parts), line.x[-1])
 
 
-def _wall_stress(slope_deg: float, height_m: float, edges: Array, tau: Array) -> WallStress:
-    slope = tan(radians(slope_deg))
-    crest = height_m / slope
-    z = np.maximum(height_m - slope * np.abs(edges - crest), 0)
+def _wall_stress(line: BedLine, edges: Array, tau: Array) -> WallStress:
+    z = line.height(edges)
     length = np.hypot(np.diff(edges), np.diff(z))
     ends = np.cumsum(length)
     s = ends - length / 2 - ends[np.searchsorted(edges[1:], 0)]

@@ -14,7 +14,6 @@ import numpy as np
 
 from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
-from orchestrator.physics.closures import Powers
 from orchestrator.runs.files import canonical_json
 from orchestrator.study.scene import Scene
 
@@ -39,7 +38,7 @@ class CellsCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 5
+    recipe: ClassVar[int] = 6
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -73,8 +72,9 @@ class CellsCase(GrainCase):
             "ceiling_z": 1e3 * DIAMETER,
             "behind": 1e3 * DIAMETER,
         }
-        holds = protocol.holds(protocol.START, LAST, rules.step)
-        deck.write(directory, self._grains(), parameters, holds, margin=4 * DIAMETER)
+        flows = protocol.flows(protocol.START, LAST, rules.step)
+        force = self._forces(flows)
+        deck.write(directory, self._grains(), parameters, flows, force, margin=4 * DIAMETER)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``."""
@@ -89,34 +89,38 @@ class CellsCase(GrainCase):
         cells = [_cell(scene) for scene in self.scenes]
         centres = np.concatenate([cell[0] for cell in cells]) * DIAMETER
         across = np.repeat(np.arange(len(cells)) * SPACING * DIAMETER, 3)
-        force = np.zeros((len(deck.POWERS), len(centres), 2))
-        force[:, 2::3] = np.concatenate([cell[2] for cell in cells], axis=1)
         return deck.GrainTable(
             position=np.column_stack([centres[:, 0], across, centres[:, 1]]),
             kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
             along=np.repeat([cell[1] for cell in cells], 3, axis=0),
-            force=force,
             diameter=DIAMETER,
             density=DENSITY,
         )
 
+    def _forces(self, flows: deck.FloatArray) -> deck.FloatArray:
+        """Force on each grain at each flow, shape (flows, 3 cells, 2); on neighbours none."""
+        force = np.zeros((len(flows), 3 * len(self.scenes), 2))
+        for place, scene in enumerate(self.scenes):
+            force[:, 3 * place + 2] = _force(scene, flows)
+        return force
 
-def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray, deck.FloatArray]:
-    """Two neighbours and the grain (3, 2), unit vector up the slope (2,), force (powers, 1, 2)."""
+
+def _force(scene: Scene, flows: deck.FloatArray) -> deck.FloatArray:
+    """Force on the grain of a cell (N), of flows over the closed form's; shape (flows, 2)."""
+    _, along = _cell(scene)
+    ustar = flows * float(scene.closed_form(scene.closure).friction_velocity)
+    drag, lift = (force(ustar) * WEIGHT / scene.weight for force in scene.powers())
+    return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
+
+
+def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray]:
+    """Two neighbours and the grain (3, 2), unit vector up the slope (2,)."""
     alpha = np.radians(scene.bed.slope_deg)
     beta = np.radians(scene.bed.entrainment_angle_deg)
     along = np.array([np.cos(alpha), np.sin(alpha)])
     outward = np.array([-along[1], along[0]])
     behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
-    own_threshold = scene.closed_form(scene.closure).friction_velocity
-    scale = WEIGHT / scene.weight
-    drag, lift = (
-        Powers(tuple(scale * c for c in force.coefficients), force.exponents)
-        for force in scene.powers()
-    )
-    speed = np.atleast_1d(own_threshold)
-    force = deck.force_table(drag, lift, speed, along[None], outward[None])
-    return np.vstack([behind, ahead, [0.0, 0.0]]), along, force
+    return np.vstack([behind, ahead, [0.0, 0.0]]), along
 
 
 def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:

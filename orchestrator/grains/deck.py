@@ -7,14 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.physics.closures import Powers
-
 FloatArray = NDArray[np.float64]
 
 FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
 """Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only."""
-POWERS = (1.0, 1.5, 1.687, 2.0, 3.0)
-"""Exponents of the friction velocity in Eqs. 2 and 4; the deck has a pair of tables for each."""
 
 MEANING = {
     "diameter": "m",
@@ -27,7 +23,6 @@ MEANING = {
     "quiet": "a hold ends when nothing has passed for this long, sqrt(d/g')",
     "look": "time between two looks at the grains, sqrt(d/g')",
     "settle": "time before the first hold, sqrt(d/g')",
-    "settle_flow": "flow meanwhile, over that of the first hold",
     "marker": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
     "away": "displacement along the bed from which on a counted grain is gone, d",
@@ -52,8 +47,6 @@ class GrainTable:
         One of FIXED, MOBILE, COUNTED, PUSHED.
     along : ndarray, shape (n, 2)
         Unit vector downstream along the bed, in which displacement is counted.
-    force : ndarray, shape (len(POWERS), n, 2)
-        Vectors F_p: the flow's force on a grain is sum_p F_p flow**p, N.
     diameter, density : float
         Of every grain, m and kg/m3.
     """
@@ -61,7 +54,6 @@ class GrainTable:
     position: FloatArray
     kind: NDArray[np.int64]
     along: FloatArray
-    force: FloatArray
     diameter: float
     density: float
 
@@ -81,37 +73,15 @@ class GrainTable:
         return int((self.kind != FIXED).sum())
 
 
-def force_table(
-    drag: Powers, lift: Powers, speed: FloatArray, along: FloatArray, outward: FloatArray
-) -> FloatArray:
-    """Vectors F_p of n grains, shape (len(POWERS), n, 2).
-
-    Parameters
-    ----------
-    drag, lift : Powers
-        Closure of the scene; coefficients of shape () or (n,).
-    speed : ndarray, shape (n,)
-        The local friction velocity over the deck's flow speed; negative where the flow runs back.
-    along, outward : ndarray, shape (n, 2)
-        Unit vectors along the bed and normal to it. Drag follows the flow's direction, lift is
-        never negative.
-    """
-    table = np.zeros((len(POWERS), len(speed), 2))
-    for force, direction in ((drag, np.sign(speed)[:, None] * along), (lift, outward)):
-        for coefficient, power in zip(force.coefficients, force.exponents, strict=True):
-            size = coefficient * np.abs(speed) ** power
-            table[POWERS.index(power)] += size[:, None] * direction
-    return table
-
-
 def write(
     directory: Path,
     grains: GrainTable,
     parameters: Mapping[str, float | int],
-    holds: FloatArray,
+    flows: FloatArray,
+    force: FloatArray,
     margin: float,
 ) -> None:
-    """Write the grains, parameters and holds of a deck.
+    """Write the grains, parameters, flows and forces of a deck.
 
     Parameters
     ----------
@@ -121,8 +91,10 @@ def write(
         The grains; ids are their places, from 1.
     parameters : mapping
         Each becomes a variable of the deck.
-    holds : ndarray
-        The flow of each hold, in turn.
+    flows : ndarray, shape (holds + 1,)
+        The flow of the settling, then of each hold.
+    force : ndarray, shape (holds + 1, n, 2)
+        The flow's force on each grain at these flows, N; only pushed grains feel one.
     margin : float
         Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
     """
@@ -134,17 +106,21 @@ def write(
         for name, value in numbers.items()
     )
     (directory / "parameters.liggghts").write_text("".join(lines))
-    (directory / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in holds.tolist()))
-    for power, vectors in zip(POWERS, grains.force, strict=True):
-        _write_vectors(directory / "force", f"{power}.", vectors)
-    _write_vectors(directory / "along", "", grains.along)
+    (directory / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    pushed = np.flatnonzero(grains.kind >= COUNTED)
+    counted = np.flatnonzero(grains.kind == COUNTED)
+    for place, axis in enumerate("xz"):
+        _write_sets(directory / f"force.{axis}.txt", pushed, force[:, pushed, place])
+        _write_sets(directory / f"along.{axis}.txt", counted, grains.along[None, counted, place])
 
 
-def _write_vectors(folder: Path, prefix: str, vectors: FloatArray) -> None:
-    folder.mkdir(exist_ok=True)
-    for axis, values in zip("xz", vectors.T, strict=True):
-        lines = (f"{number} {value!r}\n" for number, value in enumerate(values.tolist(), 1))
-        (folder / f"{prefix}{axis}.txt").write_text(f"{len(values)}\n" + "".join(lines))
+def _write_sets(path: Path, grains: NDArray[np.int64], sets: FloatArray) -> None:
+    """Write sets of values of grains as LIGGGHTS reads them: a count, then ids and values."""
+    ids = [f"{number} " for number in (grains + 1).tolist()]
+    with path.open("w") as stream:
+        for values in sets.tolist():
+            stream.write(f"{len(ids)}\n")
+            stream.writelines(f"{a}{b!r}\n" for a, b in zip(ids, values, strict=True))
 
 
 def _data_file(grains: GrainTable, margin: float) -> str:

@@ -1,6 +1,7 @@
 """What the counted grains of a deck did: who passed the marker, at which flow, and how."""
 
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -209,8 +210,9 @@ def _mode(track: Track, found: Count) -> IntArray:
 def _looks(directory: Path) -> pd.DataFrame:
     path = directory / LEVELS
     try:
-        looks = pd.read_csv(path)
-        if looks.empty or not np.isfinite(looks.to_numpy(float)).all():
+        text = path.read_text(encoding="ascii")
+        looks = pd.read_csv(StringIO(text))
+        if looks.empty or not text.endswith("\n") or not np.isfinite(looks.to_numpy(float)).all():
             raise ValueError("it holds no whole line")
         return looks
     except (OSError, ValueError) as error:

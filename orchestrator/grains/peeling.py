@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.grains.deck import POWERS
+from orchestrator.grains.loaded_bed import LoadedBed
+from orchestrator.grains.loading import ForceTable, Loading
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -26,19 +27,35 @@ REACH = 2.4
 """Only grains this near can touch one on its way to the marker, d."""
 MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
-LEAST, MOST = 1e-6, 1e4
-"""Flows between which one is looked for."""
-ITERATIONS = 200
-CLOSE = 1e-14
-"""Of a flow: this near to the root is the root."""
+
+
+def of_bed(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
+    """Undisturbed friction velocity at which each windward grain leaves, m/s, shape (N,).
+
+    Parameters
+    ----------
+    bed : LoadedBed
+        The bed.
+    ratio : ndarray, shape (n,)
+        Local friction velocity over the undisturbed one, signed.
+    """
+    scene, loading = bed.scene, bed.loading(ratio)
+    alone = float(scene.closed_form(scene.closure).friction_velocity)
+    found = flows(
+        bed.packing.centres,
+        loading,
+        ForceTable(loading.drag, loading.lift, scene.weight, alone),
+        along=bed.tangents,
+        marker=scene.protocol.marker,
+    )
+    return np.asarray(found[bed.packing.windward])
 
 
 def flows(
     centres: FloatArray,
-    pushed: BoolArray,
-    force: FloatArray,
+    loading: Loading,
+    table: ForceTable,
     *,
-    weight: float,
     along: FloatArray,
     marker: float,
 ) -> FloatArray:
@@ -48,26 +65,24 @@ def flows(
     ----------
     centres : ndarray, shape (n, 2)
         x and z of each grain, diameters.
-    pushed : ndarray of bool, shape (n,)
-        Grains that carry a force and may leave.
-    force : ndarray, shape (len(POWERS), n, 2)
-        Vectors F_p: the force is sum_p F_p flow**p, N.
-    weight : float
-        Submerged weight of a grain, N.
-    along : ndarray, shape (2,)
-        Unit vector downstream along the bed.
+    loading : Loading
+        The forces; grains that carry one may leave.
+    table : ForceTable
+        Its force law over the submerged weight.
+    along : ndarray, shape (n, 2)
+        Unit vectors downstream along the bed.
     marker : float
         Displacement along it that counts as motion, diameters.
 
     Returns
     -------
     ndarray, shape (n,)
-        Infinite for grains that never leave.
+        Undisturbed friction velocity, m/s; infinite for grains that never leave.
     """
     places = [(x, z) for x, z in centres.tolist()]
-    near = dict(_neighbours(centres, pushed))
-    vectors = (force / weight).transpose(1, 0, 2).tolist()
-    up = (float(along[0]), float(along[1]))
+    near = dict(_neighbours(centres, loading.ratio != 0))
+    ratio, tangents = loading.ratio.tolist(), loading.along.tolist()
+    normals, ups = loading.outward.tolist(), along.tolist()
     present = np.ones(len(centres), bool)
     left = np.full(len(centres), np.inf)
 
@@ -76,7 +91,8 @@ def flows(
 
     def look(i: int) -> None:
         others = [places[k] for k in near[i] if present[k]]
-        next_flow[i], ways[i] = _Climb(places[i], others, vectors[i], up, marker).needed()
+        push = _Push(table, ratio[i], tangents[i], normals[i])
+        next_flow[i], ways[i] = _Climb(places[i], others, push, ups[i], marker).needed()
 
     for i in near:
         look(i)
@@ -106,13 +122,29 @@ def _neighbours(centres: FloatArray, chosen: BoolArray) -> Iterator[tuple[int, l
 
 
 @dataclass(frozen=True)
+class _Push:
+    """The flow's force on one grain."""
+
+    table: ForceTable
+    ratio: float
+    tangent: Sequence[float]
+    normal: Sequence[float]
+
+    def flow_to_reach(self, x: float, z: float, goal: float) -> float:
+        """The flow at which the force over W along a direction reaches a goal."""
+        drag_arm = (self.tangent[0] * x + self.tangent[1] * z) * math.copysign(1.0, self.ratio)
+        lift_arm = self.normal[0] * x + self.normal[1] * z
+        return self.table.reaching(drag_arm, lift_arm, goal) / abs(self.ratio)
+
+
+@dataclass(frozen=True)
 class _Climb:
     """The way of one grain over its neighbours; lengths in d, forces over W."""
 
     start: Place
     others: Sequence[Place]
-    vectors: Sequence[Sequence[float]]
-    along: Place
+    push: _Push
+    along: Sequence[float]
     marker: float
 
     def needed(self) -> tuple[float, list[Place]]:
@@ -138,8 +170,7 @@ class _Climb:
     def _flow_to_leave(self, place: Place, pivot: Place) -> float:
         """The flow at which the resultant passes through the contact: no moment about it."""
         lean = _lean(place, pivot)
-        x, z = math.cos(lean), math.sin(lean)
-        return _root([vector[0] * x + vector[1] * z for vector in self.vectors], z)
+        return self.push.flow_to_reach(math.cos(lean), math.sin(lean), math.sin(lean))
 
     def _next(self, place: Place, pivot: Place) -> tuple[Place, Place] | None:
         """Where the grain, rolling over its pivot, meets another before the marker, and which."""
@@ -165,34 +196,3 @@ class _Climb:
 def _lean(place: Place, neighbour: Place) -> float:
     """Direction to a neighbour: 0 below, pi/2 level and downstream."""
     return math.atan2(neighbour[0] - place[0], place[1] - neighbour[1])
-
-
-def _root(coefficients: Sequence[float], goal: float) -> float:
-    """The flow at which sum_p c_p flow**p reaches a goal; 0 or infinite if always or never."""
-    terms = [(c, p) for c, p in zip(coefficients, POWERS, strict=True) if c != 0]
-
-    def excess(flow: float) -> tuple[float, float]:
-        """Above the goal, and its slope in the logarithm of the flow."""
-        value = slope = 0.0
-        for c, p in terms:
-            raised = math.pow(flow, p)
-            value += c * raised
-            slope += c * p * raised
-        return value - goal, slope
-
-    low, high = LEAST, MOST
-    if excess(low)[0] >= 0:
-        return 0.0
-    if excess(high)[0] < 0:
-        return math.inf
-    flow = min(max(math.sqrt(abs(goal) / sum(abs(c) for c, _ in terms)), low), high)
-    for _ in range(ITERATIONS):
-        value, slope = excess(flow)
-        low, high = (flow, high) if value < 0 else (low, flow)
-        # Newton in the logarithm of the flow; where it leaves what encloses the root, halving
-        step = value / slope if slope > 0 else math.inf
-        guess = flow * math.exp(-step) if abs(step) < 20 else 0.0
-        if abs(step) < CLOSE:
-            return guess
-        flow = guess if low < guess < high else math.sqrt(low * high)
-    return flow

@@ -37,8 +37,8 @@ def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
     }
 
 
-def holds(first: float, last: float, step: float) -> FloatArray:
-    """The flows of holds that rise by one factor.
+def flows(first: float, last: float, step: float) -> FloatArray:
+    """The flow of the settling, then those of holds that rise by one factor.
 
     Parameters
     ----------
@@ -48,7 +48,8 @@ def holds(first: float, last: float, step: float) -> FloatArray:
         Relative rise from one hold to the next.
     """
     count = 1 + math.ceil(math.log(last / first) / math.log1p(step))
-    return np.asarray(first * (1 + step) ** np.arange(count))
+    rising = first * (1 + step) ** np.arange(count)
+    return np.concatenate([[SETTLE_FLOW * first], rising])
 
 
 def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
@@ -65,7 +66,6 @@ def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
         "quiet": protocol.quiet,
         "look": LOOK,
         "settle": SETTLE,
-        "settle_flow": SETTLE_FLOW,
         "marker": protocol.marker,
         "stir": STIR,
         "away": AWAY,

@@ -70,5 +70,5 @@ def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:
         return []
-    grains = [one for pile in grain_picture.chosen(results) for one in (pile, pile.flow)]
+    grains = [one for pile in grain_picture.chosen(results) for one in pile.runs]
     return [*grains, *(pile.flow for pile in flow_picture.chosen(results))]

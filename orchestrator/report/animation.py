@@ -49,7 +49,7 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Figure, bytes]]:
             alpha = labels.plain("alpha_deg", pile.bed.slope_deg)
             title = f"The crest empties, {alpha}, d = {d} (animation)"
             caption = captions.crest(pile, len(looks))
-            yield Figure(NAME, title, caption, (pile.name,), None), data
+            yield Figure(NAME, title, caption, (pile.case.name,), None), data
 
 
 def choose(passage: Passage, window: Window) -> NDArray[np.int64]:

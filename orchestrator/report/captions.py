@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.grains import motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.grains.protocol import LOOK
 from orchestrator.physics import curves
 from orchestrator.report import labels, reference, theory
@@ -99,7 +99,7 @@ def accuracy(dem: pd.DataFrame) -> str:
     )
 
 
-def stress(results: Results, piles: list[PileCase]) -> str:
+def stress(results: Results, piles: list[Pile]) -> str:
     """Of the friction velocity along the bed."""
     mean, crest = eq10_over_wall(results, [pile.flow.name for pile in piles])
     return (
@@ -166,7 +166,7 @@ def low_regime(rows: pd.DataFrame) -> str:
     )
 
 
-def flow(piles: list[PileCase]) -> str:
+def flow(piles: list[Pile]) -> str:
     """Of the picture of the flow."""
     speeds = listed(pile.scene.flow.speed for pile in piles)
     return (
@@ -177,7 +177,7 @@ def flow(piles: list[PileCase]) -> str:
     )
 
 
-def mesh(pile: PileCase) -> str:
+def mesh(pile: Pile) -> str:
     """Of the picture of the mesh."""
     flow, z0 = pile.flow, pile.bed.roughness
     return (
@@ -189,7 +189,7 @@ def mesh(pile: PileCase) -> str:
     )
 
 
-def grains(pile: PileCase, found: Snapshot, fraction: float) -> str:
+def grains(pile: Pile, found: Snapshot, fraction: float) -> str:
     """Of the picture of the grains."""
     return (
         f"After Fig. 13 of the paper. The first look at which {fraction:.0%} of the N = "
@@ -205,7 +205,7 @@ def grains(pile: PileCase, found: Snapshot, fraction: float) -> str:
     )
 
 
-def crest(pile: PileCase, looks: int) -> str:
+def crest(pile: Pile, looks: int) -> str:
     """Of the animation."""
     return (
         f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
@@ -217,7 +217,7 @@ def crest(pile: PileCase, looks: int) -> str:
     )
 
 
-def _forces(pile: PileCase) -> str:
+def _forces(pile: Pile) -> str:
     ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
     equation = "Eq. 2" if pile.scene.closure == "low" else "Eq. 4"
     return f"z₀ = {ratio}, {pile.bed.packing} packing, forces of {equation}."

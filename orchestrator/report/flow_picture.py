@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, flow_field, stress, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.flow_field import Window
@@ -33,22 +33,22 @@ def draw(results: Results) -> Iterator[Figure]:
     yield Figure("flow", "Flow over the pile", captions.flow(piles), names, canvas)
 
 
-def chosen(results: Results) -> list[PileCase]:
+def chosen(results: Results) -> list[Pile]:
     """A pile for each panel; a flow whose files were pruned has none."""
-    found: dict[tuple[float, float], PileCase] = {}
+    found: dict[tuple[float, float], Pile] = {}
     for pile in stress.choose(results):
         if is_whole(pile.flow, results.cases):
             found.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
     return list(found.values())
 
 
-def _window(piles: list[PileCase]) -> Window:
+def _window(piles: list[Pile]) -> Window:
     """Left, right, bottom, top, h; the same for all panels."""
     toe = max(2 / float(np.tan(np.radians(pile.bed.slope_deg))) for pile in piles)
     return -BEFORE, toe + BEHIND, 0.0, ABOVE
 
 
-def sampled(pile: PileCase, cases: Path, window: Window, unit: float) -> FloatArray:
+def sampled(pile: Pile, cases: Path, window: Window, unit: float) -> FloatArray:
     """The velocity over a pile in a window over the one at the lid; the window is in a unit, m."""
     left, right, bottom, top = window
     rows = round(COLUMNS * (top - bottom) / (right - left))
@@ -57,7 +57,7 @@ def sampled(pile: PileCase, cases: Path, window: Window, unit: float) -> FloatAr
     return found / pile.scene.flow.speed
 
 
-def _frame(piles: list[PileCase], cases: Path) -> Canvas:
+def _frame(piles: list[Pile], cases: Path) -> Canvas:
     window = _window(piles)
     figure = style.canvas(1.5 * len(piles) + 0.8)
     axes = list(figure.subplots(len(piles), 1, sharex=True, squeeze=False)[:, 0])
@@ -69,7 +69,7 @@ def _frame(piles: list[PileCase], cases: Path) -> Canvas:
     return figure
 
 
-def _panel(ax: Axes, pile: PileCase, window: Window, velocity: FloatArray) -> AxesImage:
+def _panel(ax: Axes, pile: Pile, window: Window, velocity: FloatArray) -> AxesImage:
     speed = np.linalg.norm(velocity, axis=-1)
     image = ax.imshow(speed, origin="lower", extent=window, cmap="viridis", vmin=0, vmax=1.1)
     _streamlines(ax, window, velocity)

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from orchestrator.grains.motion import MODES
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.report.snapshot import Snapshot
 
 LYING, FIXED, INSIDE = "#e6decc", "#8c8c8c", "#c9c9c9"
@@ -30,9 +30,9 @@ Window = tuple[float, float, float, float]
 """Left, right, bottom, top."""
 
 
-def windows(pile: PileCase) -> list[Window]:
+def windows(pile: Pile) -> list[Window]:
     """The whole pile and, if that is long, its crest; d."""
-    x, z = (float(edge) for edge in pile.triangle.crest)
+    x, z = (float(edge) for edge in pile.line.crest)
     whole = -6.0, 2 * x + 6, -2.5, z + 6
     return [whole, (x - 28, x + 14, z - 9, z + 5)] if x > LONG else [whole]
 
@@ -55,9 +55,9 @@ def edges(found: Snapshot) -> list[str]:
     return [str(c) for c in np.where(found.mode > 0, by_mode(found), UNCOUNTED)[found.gone]]
 
 
-def ground(ax: Axes, pile: PileCase, window: Window) -> None:
+def ground(ax: Axes, pile: Pile, window: Window) -> None:
     """Fill what lies under the bed line of the flow, and show no more than a window."""
-    (x, z), (left, right, bottom, top) = pile.triangle.crest, window
+    (x, z), (left, right, bottom, top) = pile.line.crest, window
     line = np.unique(np.clip([left, 0, x, 2 * x, right], left, right))
     height = np.interp(line, [0, x, 2 * x], [0, z, 0])
     ax.fill_between(line, height, bottom, color=INSIDE, lw=0, zorder=0.5, gid="inside")
@@ -96,7 +96,7 @@ def place(marks: dict[str, tuple[Line2D, Line2D]], found: Snapshot) -> None:
         gone.set_data(*found.start[own & found.gone].T)
 
 
-def mode_legend(figure: Canvas, pile: PileCase) -> None:
+def mode_legend(figure: Canvas, pile: Pile) -> None:
     """What colours and symbols by mode mean, under the panels."""
     entries: dict[str, tuple[Line2D | Patch, ...]] = {
         name: (_disc(colour, colour), _sample(marker, "white"))

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, flow_picture, labels, snapshot, spheres, style
 from orchestrator.report import grain_marks as marks
 from orchestrator.report.figure import Figure
@@ -40,7 +40,7 @@ SPEED = ScalarMappable(Normalize(0, 1), PALE)
 class Shown:
     """What a figure shows: a pile at an instant, in some windows, and the flow over the last."""
 
-    pile: PileCase
+    pile: Pile
     found: Snapshot
     windows: list[Window]
     velocity: FloatArray
@@ -51,7 +51,7 @@ def draw(results: Results) -> Iterator[Figure]:
 
     None where that pile's flow is a theory's, which has no field to show.
     """
-    for pile in (one for one in chosen(results) if one.needs):
+    for pile in (one for one in chosen(results) if one.model.cases):
         fraction = min(pile.scene.protocol.fractions, key=lambda f: abs(f - FRACTION))
         passage = snapshot.read(pile, results.cases)
         look = passage.first(fraction)
@@ -61,7 +61,7 @@ def draw(results: Results) -> Iterator[Figure]:
             yield _figure(Shown(pile, passage.at(look), windows, velocity), fraction)
 
 
-def chosen(results: Results) -> Iterator[PileCase]:
+def chosen(results: Results) -> Iterator[Pile]:
     """The pile that stands for all of its slope, by rising slope; of equals the study's first.
 
     A pile whose files were pruned stands for nothing.
@@ -81,7 +81,7 @@ def _figure(shown: Shown, fraction: float) -> Figure:
         f"grains-alpha{pile.bed.slope_deg:g}",
         f"Grains when {fraction:.0%} have moved, {alpha}, d = {labels.millimetres(d)}",
         captions.grains(pile, shown.found, fraction),
-        (pile.name, pile.flow.name),
+        (pile.case.name, pile.flow.name),
         _frame(shown),
     )
 

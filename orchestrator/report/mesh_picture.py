@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, flow_picture, stress, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.flow_field import Window
@@ -44,7 +44,7 @@ def read_edges(case: Path) -> FloatArray:
     return np.asarray(mesh.points[seen][:, :, [0, 2]])
 
 
-def _frame(pile: PileCase, edges: FloatArray) -> Canvas:
+def _frame(pile: Pile, edges: FloatArray) -> Canvas:
     half = 1 / float(np.tan(np.radians(pile.bed.slope_deg)))
     left, right, bottom, top = CREST
     windows = [

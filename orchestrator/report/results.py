@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs.case import is_whole
 from orchestrator.study.study import Study
@@ -58,21 +58,21 @@ class Results:
         """The values that the study's scenes have in a column, rising."""
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
-    def shown(self, scene_id: str) -> PileCase:
+    def shown(self, scene_id: str) -> Pile:
         """The pile that shows how a scene's grains move: where DEM only checked it, the check."""
         return self.plan.checks.get(scene_id, self.plan.piles[scene_id])
 
-    def has_files(self, pile: PileCase) -> bool:
+    def has_files(self, pile: Pile) -> bool:
         """Whether a pile was run, and it and its flow still have the files of pictures."""
-        return pile in pile.runs and all(is_whole(one, self.cases) for one in pile.runs)
+        return pile.method.cases != () and all(is_whole(one, self.cases) for one in pile.runs)
 
     @cached_property
-    def flows(self) -> dict[str, PileCase]:
+    def flows(self) -> dict[str, Pile]:
         """A pile for each flow case whose stress is in the tables, by the flow case's name."""
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
         piles = self.plan.piles.values()
-        return {pile.flow.name: pile for pile in piles if pile.flow.name in done}
+        return {flow.name: pile for pile in piles for flow in pile.model.cases if flow.name in done}
 
 
 def split(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.grains import counting, dump, motion
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -62,7 +62,7 @@ class Passage:
 
     Attributes
     ----------
-    pile : PileCase
+    pile : Pile
         The pile.
     looks : DataFrame
         The deck's table of looks, T rows.
@@ -76,7 +76,7 @@ class Passage:
         How each counted grain moved in the end.
     """
 
-    pile: PileCase
+    pile: Pile
     looks: pd.DataFrame
     exposed: FloatArray
     rest: FloatArray
@@ -109,9 +109,9 @@ class Passage:
         )
 
 
-def read(pile: PileCase, cases: Path) -> Passage:
+def read(pile: Pile, cases: Path) -> Passage:
     """Read the dumps of a finished pile."""
-    directory, d = cases / pile.name, pile.scene.grain.diameter
+    directory, d = cases / pile.case.name, pile.scene.grain.diameter
     looks = pd.read_csv(directory / motion.LEVELS)
     counted = np.flatnonzero(pile.packing.windward) + 1
     exposed = np.moveaxis(dump.read_passage(directory, counted, looks)[:2], 0, -1) / d
@@ -130,6 +130,7 @@ def _place(into: FloatArray, rows: pd.DataFrame, steps: IntArray, d: float) -> N
     )
 
 
-def _passed(exposed: FloatArray, pile: PileCase) -> BoolArray:
-    travel = (exposed[1:] - exposed[0]) @ pile.triangle.tangent
+def _passed(exposed: FloatArray, pile: Pile) -> BoolArray:
+    along = pile.tangents[pile.packing.windward]
+    travel = ((exposed[1:] - exposed[0]) * along).sum(axis=2)
     return counting.count(travel, pile.scene.protocol.marker, falls_out=False).moved

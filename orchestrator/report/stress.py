@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
@@ -52,12 +52,12 @@ def draw(results: Results) -> Iterator[Figure]:
     yield Figure("wall-stress", "Friction velocity over the pile", caption, names, figure)
 
 
-def choose(results: Results) -> list[PileCase]:
+def choose(results: Results) -> list[Pile]:
     """Piles whose flows stand for all.
 
     Of each slope and height that with the least z0, and that with the largest if it differs much.
     """
-    found: dict[tuple[float, float], list[PileCase]] = {}
+    found: dict[tuple[float, float], list[Pile]] = {}
     for pile in results.flows.values():
         found.setdefault((pile.bed.slope_deg, pile.bed.height), []).append(pile)
     chosen = []
@@ -69,7 +69,7 @@ def choose(results: Results) -> list[PileCase]:
     return chosen
 
 
-def _panel(panel: SubFigure, results: Results, pile: PileCase) -> None:
+def _panel(panel: SubFigure, results: Results, pile: Pile) -> None:
     top, below = panel.subplots(2, 1, sharex=True, height_ratios=[4, 1])
     table = results.tables["wall_stress"]
     rows = table[table["flow_case"] == pile.flow.name]
@@ -88,7 +88,7 @@ def _panel(panel: SubFigure, results: Results, pile: PileCase) -> None:
     top.set_title(title(pile), loc="left")
 
 
-def title(pile: PileCase) -> str:
+def title(pile: Pile) -> str:
     """Heading of a panel with one flow."""
     alpha = labels.written("alpha_deg", pile.bed.slope_deg)
     h, z0 = pile.bed.height, pile.bed.roughness
@@ -100,7 +100,7 @@ def _shade_reversed(ax: Axes, x: FloatArray, ustar: FloatArray) -> None:
     ax.fill_between(x, ustar, 0, where=(ustar < 0).tolist(), gid="reversed flow", **REVERSED)
 
 
-def _draw_grains(ax: Axes, results: Results, pile: PileCase) -> None:
+def _draw_grains(ax: Axes, results: Results, pile: Pile) -> None:
     """What the grains feel: the stress averaged over a length of the bed."""
     grains = results.joined("pile_grain")
     if grains.empty:
@@ -119,7 +119,7 @@ def _profile(ax: Axes, x: FloatArray, z: FloatArray) -> None:
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
 
 
-def _mark_corners(axes: tuple[Axes, Axes], pile: PileCase) -> None:
+def _mark_corners(axes: tuple[Axes, Axes], pile: Pile) -> None:
     half = 1 / np.tan(np.radians(pile.bed.slope_deg))
     for x, name in ((0.0, "toe"), (half, "crest"), (2 * half, "lee toe")):
         for ax in axes:

@@ -26,7 +26,8 @@ __all__ = ["COLUMNS", "Tables", "make", "read", "timings", "write"]
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {need.name: p for p in plan.piles.values() for need in p.needs if need.name in done}
+    piled = ((flow.name, pile) for pile in plan.piles.values() for flow in pile.model.cases)
+    flows = {name: pile for name, pile in piled if name in done}
     ready = [
         piles.Answer.read(scene_id, pile, cases)
         for scene_id, pile in plan.piles.items()

@@ -11,8 +11,9 @@ import pandas as pd
 
 from orchestrator.fidelity import checks, rungs
 from orchestrator.grains import threshold
+from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
-from orchestrator.grains.pile import Face, PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
@@ -23,17 +24,17 @@ class Answer:
     """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
     scene_id: str
-    pile: PileCase
+    pile: Pile
     motion: Motion
     face: Face
 
     @classmethod
-    def read(cls, scene_id: str, pile: PileCase, cases: Path) -> "Answer":
+    def read(cls, scene_id: str, pile: Pile, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
         return cls(scene_id, pile, pile.motion(cases), pile.face(cases))
 
 
-def wall_stress(piles: Iterable[PileCase], cases: Path) -> Iterator[pd.DataFrame]:
+def wall_stress(piles: Iterable[Pile], cases: Path) -> Iterator[pd.DataFrame]:
     """The friction velocity along the bed, for the solved flow of each pile."""
     for pile in piles:
         stress = pile.stress(cases)
@@ -136,7 +137,7 @@ def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
 
 
 def check_rows(
-    cheap: Mapping[str, PileCase], check: Mapping[str, PileCase], tolerance: float, cases: Path
+    cheap: Mapping[str, Pile], check: Mapping[str, Pile], tolerance: float, cases: Path
 ) -> Iterator[Row]:
     """The piles that DEM checked: both answers at each fraction."""
     for asked, pile in check.items():
@@ -155,12 +156,12 @@ def check_rows(
                 "shields_dem_high": _shields(scene, one.dem.tau_high),
                 "difference": one.cheap.tau / one.dem.tau - 1,
                 "agree": one.agree,
-                "case": pile.name,
+                "case": pile.case.name,
             }
 
 
-def _lid_speed_ratio(pile: PileCase) -> float:
-    return pile.flow.speed_m_s / pile.flow.ustar0_m_s
+def _lid_speed_ratio(pile: Pile) -> float:
+    return pile.model.lid_speed_ratio
 
 
 def _shields(scene: Scene, tau: Any) -> Any:

@@ -25,7 +25,7 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
                 **_choices(scene),
                 "method": scene.protocol.method,
                 "case": runs[-1] if scene.protocol.method == "dem" else None,
-                "flow_case": pile.needs[0].name if pile and pile.needs else None,
+                "flow_case": pile.flow.name if pile and pile.model.cases else None,
             }
 
 

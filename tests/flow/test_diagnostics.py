@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.bed.shapes import triangle
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.stress import WallStress
 
@@ -14,7 +15,7 @@ HEIGHT = 0.02
 @pytest.fixture
 def sound() -> WallStress:
     """The undisturbed stress with cells 1 mm high and reversed flow up to 6 h behind the crest."""
-    stress = theory.flat(15.0, HEIGHT)
+    stress = theory.flat(triangle(15.0, HEIGHT))
     crest = HEIGHT / np.tan(np.radians(15.0))
     behind = (stress.x_m > crest + 1e-3) & (stress.x_m < crest + 6 * HEIGHT)
     return replace(
@@ -43,4 +44,4 @@ def test_each_flaw_is_named(sound: WallStress) -> None:
 
 def test_the_end_of_the_reversed_flow(sound: WallStress) -> None:
     assert diagnostics.reattachment(sound, HEIGHT) == pytest.approx(6, abs=0.02)
-    assert diagnostics.reattachment(theory.flat(15.0, HEIGHT), HEIGHT) == 0
+    assert diagnostics.reattachment(theory.flat(triangle(15.0, HEIGHT)), HEIGHT) == 0

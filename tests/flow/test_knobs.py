@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator import plan
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.study import study
 
 TEXT = """
@@ -20,7 +20,7 @@ roughness = "d/30"
 """
 
 
-def piles(flow: str) -> list[PileCase]:
+def piles(flow: str) -> list[Pile]:
     return list(
         plan.make(
             study.parse(TEXT + flow, name="knobs", where="test", guarded=False)
@@ -30,7 +30,7 @@ def piles(flow: str) -> list[PileCase]:
 
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
     flat, hill = piles('[axes]\n"flow.model" = ["flat", "hill"]\n')
-    assert flat.needs == hill.needs == ()
+    assert flat.model.cases == hill.model.cases == ()
     np.testing.assert_allclose(flat.face(tmp_path).speed, 1)
     rising = hill.face(tmp_path).speed
     assert rising[0] < 0.7
@@ -65,7 +65,7 @@ def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
     shared = piles("roughness = 3.2e-5\n" + axes)
     assert len({pile.flow.name for pile in shared}) == 1
     assert {pile.flow.roughness_m for pile in shared} == {3.2e-5}
-    assert len({pile.name for pile in shared}) == 2
+    assert len({pile.case.name for pile in shared}) == 2
 
 
 def test_the_solvers_knobs_reach_its_case() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.bed.shapes import triangle
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS
 from orchestrator.flow.stress import WallStress
@@ -48,7 +49,7 @@ def test_coefficients_fulfil_the_equation_of_the_inner_layer() -> None:
 
 def test_the_streamline_leaves_and_meets_the_bed_smoothly() -> None:
     for slope in (10.0, 15.0, 20.0):
-        x, z = theory.seen_by_the_flow(slope, HEIGHT)
+        x, z = theory.seen_by_the_flow(triangle(slope, HEIGHT))
         falls = np.diff(z) / np.diff(x)
         assert falls[1] == pytest.approx(falls[0], rel=0.05)
         assert falls[-1] == pytest.approx(0, abs=0.01)
@@ -60,7 +61,7 @@ def test_the_streamline_leaves_and_meets_the_bed_smoothly() -> None:
 def test_the_theory_against_the_solved_flow(solve: Solve, slope: float) -> None:
     pile = replace(PILE, slope_deg=slope)
     solved = WallStress.from_csv(solve(pile) / WALL_STRESS)
-    found = theory.hill(slope, pile.height_m, pile.roughness_m)
+    found = theory.hill(triangle(slope, pile.height_m), pile.roughness_m)
     face = pile.height_m / np.sin(np.radians(slope))
     places = np.array([0.3, 0.5, 0.7, 0.9]) * face
     theirs, ours = (np.sqrt(one.mean_over(places, 0.2 * face)) for one in (solved, found))
@@ -70,7 +71,7 @@ def test_the_theory_against_the_solved_flow(solve: Solve, slope: float) -> None:
 
 
 def test_a_flat_beds_stress_is_the_undisturbed_one() -> None:
-    stress = theory.flat(15.0, HEIGHT)
+    stress = theory.flat(triangle(15.0, HEIGHT))
     assert (stress.tau_wall == 1).all()
     face = HEIGHT / np.sin(np.radians(15.0))
     np.testing.assert_allclose(stress.edges_m[[0, -1]], [-0.2, 2 * face + 0.4], rtol=1e-12)

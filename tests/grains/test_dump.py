@@ -25,10 +25,25 @@ def grains() -> deck.GrainTable:
         position=rows[:, 4:],
         kind=rows[:, 1].astype(np.int64),
         along=np.tile([np.cos(SLOPE), np.sin(SLOPE)], (len(rows), 1)),
-        force=np.zeros((len(deck.POWERS), len(rows), 2)),
         diameter=1e-3,
         density=2500.0,
     )
+
+
+def _finer_steps(copy: Path, flows: deck.FloatArray) -> None:
+    """Flows that take one grain after the other, with forces from the template's last set."""
+    last = float((copy / "holds.txt").read_text().split()[-1])
+    (copy / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    for path in (copy / "force.x.txt", copy / "force.z.txt"):
+        lines = path.read_text().splitlines()
+        rows = [line.split() for line in lines[-int(lines[0]) :]]
+        with path.open("w") as stream:
+            for flow in flows.tolist():
+                stream.write(lines[0] + "\n")
+                factor = (flow / last) ** 1.9
+                stream.writelines(
+                    f"{n} {float(f) * factor * (1 + 0.01 * int(n))}\n" for n, f in rows
+                )
 
 
 def _run(folder: Path, stir: float) -> Path:
@@ -36,8 +51,7 @@ def _run(folder: Path, stir: float) -> Path:
     shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
     text = (copy / "parameters.liggghts").read_text()
     (copy / "parameters.liggghts").write_text(re.sub(r"( stir equal) \S+", rf"\1 {stir}", text))
-    flows = protocol.holds(0.98, 1.5, 0.01)
-    (copy / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    _finer_steps(copy, protocol.flows(0.98, 1.5, 0.01))
     subprocess.run(["./Allrun"], cwd=copy, check=True)
     return copy
 

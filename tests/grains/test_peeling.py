@@ -9,23 +9,29 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from orchestrator.grains import peeling
-from orchestrator.grains.deck import POWERS
+from orchestrator.grains.loading import ForceTable, Loading
 
 FloatArray = NDArray[np.float64]
-SQUARE = POWERS.index(2.0)
 MARKER = 0.3
 
 
 def _flows(
     centres: FloatArray, drag: FloatArray, *, slope_deg: float = 0.0, lift: float = 0.0
 ) -> FloatArray:
-    """Forces drag flow**2 along the bed and lift flow**2 normal to it, over W; 0 drag is fixed."""
+    """Forces drag flow**2 along the bed, lift times that normal to it, over W; 0 drag is fixed."""
     alpha = math.radians(slope_deg)
-    along = np.array([math.cos(alpha), math.sin(alpha)])
-    force = np.zeros((len(POWERS), len(centres), 2))
-    pushed = drag != 0
-    force[SQUARE] = np.outer(drag, along) + np.outer(pushed * lift, [-along[1], along[0]])
-    return peeling.flows(centres, pushed, force, weight=1.0, along=along, marker=MARKER)
+    along = np.tile([math.cos(alpha), math.sin(alpha)], (len(centres), 1))
+    outward = np.tile([-math.sin(alpha), math.cos(alpha)], (len(centres), 1))
+
+    def square(ustar: FloatArray) -> FloatArray:
+        return ustar**2
+
+    def lifting(ustar: FloatArray) -> FloatArray:
+        return lift * ustar**2
+
+    loading = Loading(square, lifting, np.sqrt(drag), along, outward)
+    table = ForceTable(square, lifting, weight=1.0, unit=1.0)
+    return peeling.flows(centres, loading, table, along=along, marker=MARKER)
 
 
 def _row(count: int, beta_deg: float, slope_deg: float) -> tuple[FloatArray, int]:
@@ -50,7 +56,7 @@ def test_one_grain_leaves_at_the_pivot_of_eq_1(
     centres, _ = _row(1, beta_deg, slope_deg)
     found = _flows(centres, np.array([drag, 0.0, 0.0]), slope_deg=slope_deg, lift=lift)
     alpha, beta = math.radians(slope_deg), math.radians(beta_deg)
-    moment = drag * math.sin(beta) + lift * math.cos(beta)
+    moment = drag * (math.sin(beta) + lift * math.cos(beta))
     assert found[0] == pytest.approx(math.sqrt(math.cos(alpha - beta) / moment), rel=1e-9)
     assert np.isinf(found[1:]).all()
 
@@ -93,5 +99,5 @@ def test_flows_scale_with_the_root_of_the_force(scale: float) -> None:
     centres, count = _row(4, 60, 20)
     drag = np.append(np.array([1.0, 0.8, 1.3, 1.1]), np.zeros(count + 1))
     once = _flows(centres, drag, slope_deg=20, lift=0.2)
-    scaled = _flows(centres, drag * scale**2, slope_deg=20, lift=0.2 * scale**2)
+    scaled = _flows(centres, drag * scale**2, slope_deg=20, lift=0.2)
     np.testing.assert_allclose(scaled[:count] * scale, once[:count], rtol=1e-9)

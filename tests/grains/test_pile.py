@@ -11,7 +11,7 @@ import pytest
 from orchestrator import plan, tables
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import PileCase
+from orchestrator.grains.pile import Pile
 from orchestrator.runs import engine
 from orchestrator.study import study
 
@@ -36,7 +36,7 @@ def _study(packing: str = "aligned", step: float = 0.05) -> study.Study:
     return study.parse(SMALL.format(packing=packing, step=step), name="small", where="test")
 
 
-def _run(asked: study.Study, cases: Path) -> PileCase:
+def _run(asked: study.Study, cases: Path) -> Pile:
     planned = plan.make(asked)
     for one in planned.cases.values():
         engine.execute(one, cases, 300.0)
@@ -50,14 +50,14 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def slow(cases: Path) -> PileCase:
+def slow(cases: Path) -> Pile:
     return _run(_study(step=0.01), cases)
 
 
 def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
-    slow: PileCase, cases: Path
+    slow: Pile, cases: Path
 ) -> None:
-    motion, speed = Motion.from_csv(cases / slow.name), slow.face(cases).speed
+    motion, speed = Motion.from_csv(cases / slow.case.name), slow.face(cases).speed
     pivot = slow.pivot_thresholds(speed)
     for fraction in (0.1, 0.3, 0.5, 0.7):
         found = threshold.of_pile(motion, speed, fraction, slow.scene.fluid.density)
@@ -65,8 +65,8 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
         assert found.ustar0 == pytest.approx(expected, rel=0.03)
 
 
-def test_it_empties_from_the_crest_down(slow: PileCase, cases: Path) -> None:
-    motion, face = Motion.from_csv(cases / slow.name), slow.face(cases)
+def test_it_empties_from_the_crest_down(slow: Pile, cases: Path) -> None:
+    motion, face = Motion.from_csv(cases / slow.case.name), slow.face(cases)
     moved = motion.level > 0
     # from the crest to the toe no grain moves in an earlier hold than the one above it
     downward = np.argsort(-face.arc_length[moved])
@@ -75,7 +75,7 @@ def test_it_empties_from_the_crest_down(slow: PileCase, cases: Path) -> None:
     assert np.mean(np.diff(holds) >= 0) > 0.9
 
 
-def test_tables_reconcile(slow: PileCase, cases: Path) -> None:
+def test_tables_reconcile(slow: Pile, cases: Path) -> None:
     asked = _study(step=0.01)
     planned = plan.make(asked)
     made = tables.make(asked, planned, cases, planned.done(cases))
@@ -95,7 +95,7 @@ def test_tables_reconcile(slow: PileCase, cases: Path) -> None:
 
 
 def test_every_column_has_a_meaning_and_survives_its_files(
-    slow: PileCase, cases: Path, tmp_path: Path
+    slow: Pile, cases: Path, tmp_path: Path
 ) -> None:
     asked = _study(step=0.01)
     planned = plan.make(asked)
@@ -109,9 +109,9 @@ def test_every_column_has_a_meaning_and_survives_its_files(
 
 
 def test_a_copy_reruns_by_hand_and_gives_the_same_bytes(
-    slow: PileCase, cases: Path, tmp_path: Path
+    slow: Pile, cases: Path, tmp_path: Path
 ) -> None:
-    for name in (slow.flow.name, slow.name):
+    for name in (slow.flow.name, slow.case.name):
         copy = tmp_path / f'-{name} "copy" é'
         shutil.copytree(cases / name, copy)
         ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
@@ -123,11 +123,11 @@ def test_a_copy_reruns_by_hand_and_gives_the_same_bytes(
         assert subprocess.run(["sha256sum", "--quiet", "-c", "results.sha256"], cwd=copy).returncode
 
 
-def test_a_stair_of_horizontal_rows_holds_longer(slow: PileCase, cases: Path) -> None:
+def test_a_stair_of_horizontal_rows_holds_longer(slow: Pile, cases: Path) -> None:
     stair = _run(_study(packing="horizontal"), cases)
-    motion, speed = Motion.from_csv(cases / stair.name), stair.face(cases).speed
+    motion, speed = Motion.from_csv(cases / stair.case.name), stair.face(cases).speed
     found = threshold.of_pile(motion, speed, 0.1, stair.scene.fluid.density)
-    aligned = Motion.from_csv(cases / slow.name)
+    aligned = Motion.from_csv(cases / slow.case.name)
     reference = threshold.of_pile(aligned, slow.face(cases).speed, 0.1, slow.scene.fluid.density)
     assert found.ustar0 > 1.2 * reference.ustar0
 

@@ -28,7 +28,6 @@ def grains() -> GrainTable:
         position=rows[:, 4:],
         kind=rows[:, 1].astype(np.int64),
         along=np.tile([1.0, 0.0], (len(rows), 1)),
-        force=np.zeros((5, len(rows), 2)),
         diameter=DIAMETER,
         density=DENSITY,
     )
@@ -80,6 +79,9 @@ def test_a_step_too_large_keeps_the_grains_moving(
 
 def test_energy_that_grows(tmp_path: Path, grains: GrainTable) -> None:
     found = _settled(tmp_path, timestep=0.2, damping=0.7)
+    # a noisy run goes up and down by chance: its own energies, each later one the larger
+    table = rest.read(found)
+    table.assign(ke=sorted(table["ke"])).to_csv(found / rest.SETTLING, index=False)
     with pytest.raises(Exploded, match="the energy of the bed at rest grows"):
         _check(found, grains)
 

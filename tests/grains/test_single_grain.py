@@ -144,7 +144,9 @@ def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
     one = _cells(FEW)
     _run(one, tmp_path)
     path = tmp_path / one.name / name
-    os.truncate(path, path.stat().st_size * 2 // 3)
+    whole = path.read_bytes()
+    # within a line, wherever two thirds of the file are
+    path.write_bytes(whole[: whole.index(b"\n", len(whole) * 2 // 3) - 1])
     with pytest.raises(SolverError, match=name):
         one.collect(tmp_path / one.name)
 

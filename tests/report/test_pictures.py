@@ -111,7 +111,7 @@ def test_snapshot_is_the_first_look_with_enough_grains_moved(
         found, before = passage.at(look), passage.at(look - 1)
         needed = int(np.ceil(fraction * passage.pile.packing.count))
         assert before.moved < needed <= found.moved
-        along = (found.place - found.start) @ passage.pile.triangle.tangent
+        along = ((found.place - found.start) * passage.pile.tangents).sum(axis=1)
         assert (found.mode[found.exposed & (found.gone | (along >= 0.31))] > 0).all()
         curve = results.tables["pile_curve"]
         assert found.hold == curve[curve["moved"] >= needed]["hold"].iloc[0]

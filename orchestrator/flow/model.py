@@ -1,0 +1,134 @@
+"""Flow models: each gives the stress along a bed line, and says which cases it needs for that."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from orchestrator.bed.line import BedLine
+from orchestrator.bed.shapes import triangle
+from orchestrator.errors import InputError
+from orchestrator.flow import theory
+from orchestrator.flow.case import LID_OVER_HEIGHT, WALL_STRESS, FlowCase
+from orchestrator.flow.stress import WallStress, undisturbed_ustar
+from orchestrator.study.scene import PileBed, Scene
+
+FIELD_OF = {
+    "height_m": "bed.height",
+    "roughness_m": "bed.roughness",
+    "speed_m_s": "flow.speed",
+    "viscosity_m2_s": "flow.viscosity",
+    "first_cell_m": "flow.first_cell_height",
+    "cells_per_face": "flow.cells_per_face",
+    "growth": "flow.growth",
+    "correctors": "flow.correctors",
+}
+"""What a study file calls the parameters of a flow case."""
+
+
+@dataclass(frozen=True)
+class FlowModel(ABC):
+    """A way to find the stress on the bed of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a pile.
+    """
+
+    scene: Scene
+
+    @property
+    def line(self) -> BedLine:
+        """The bed line, m."""
+        assert isinstance(self.scene.bed, PileBed)
+        return triangle(self.scene.bed.slope_deg, self.scene.bed.height)
+
+    @property
+    def lid_speed_ratio(self) -> float:
+        """U_e over u*_0: the approaching flow's speed at the lid over its friction velocity."""
+        lid = LID_OVER_HEIGHT * float(self.line.crest[1])
+        return 1 / undisturbed_ustar(1.0, lid, self.scene.solve_roughness)
+
+    @property
+    def cases(self) -> tuple[FlowCase, ...]:
+        """The runs that it needs."""
+        return ()
+
+    @abstractmethod
+    def stress(self, cases: Path) -> WallStress:
+        """The stress along the bed; `cases` holds the finished runs."""
+
+
+class Flat(FlowModel):
+    """The undisturbed stress everywhere, as on a flat bed."""
+
+    def stress(self, cases: Path) -> WallStress:
+        """Tau = tau_0."""
+        return theory.flat(self.line)
+
+
+class Hill(FlowModel):
+    """Linear theory of the flow over a low hill."""
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress by `orchestrator.flow.theory`."""
+        return theory.hill(self.line, self.scene.solve_roughness)
+
+
+class Solved(FlowModel):
+    """Steady turbulent flow by OpenFOAM; scenes that differ in their grains alone share it."""
+
+    @property
+    def case(self) -> FlowCase:
+        """The run.
+
+        Raises
+        ------
+        InputError
+            If it cannot be built, naming the field of the study file.
+        """
+        bed, flow = self.scene.bed, self.scene.flow
+        assert isinstance(bed, PileBed)
+        try:
+            return _shared(
+                slope_deg=bed.slope_deg,
+                height_m=bed.height,
+                roughness_m=self.scene.solve_roughness,
+                speed_m_s=flow.speed,
+                viscosity_m2_s=flow.viscosity,
+                first_cell_m=self.scene.first_cell_height,
+                cells_per_face=flow.cells_per_face,
+                growth=flow.growth,
+                turbulence=flow.turbulence,
+                convection=flow.convection,
+                correctors=flow.correctors,
+            )
+        except InputError as error:
+            field = FIELD_OF.get(error.where, error.where)
+            raise InputError(error.what, where=field, remedy=error.remedy) from None
+
+    @property
+    def cases(self) -> tuple[FlowCase, ...]:
+        """The run."""
+        return (self.case,)
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress that the finished run left."""
+        return WallStress.from_csv(cases / self.case.name / WALL_STRESS)
+
+
+@cache
+def _shared(**fields: Any) -> FlowCase:
+    """One case for all scenes that share it, checked and digested once."""
+    return FlowCase(**fields)
+
+
+MODELS: dict[str, type[FlowModel]] = {"flat": Flat, "hill": Hill, "solve": Solved}
+"""The models by what a study file calls them, cheap to dear."""
+
+
+def model(scene: Scene) -> FlowModel:
+    """The flow model that a scene of a pile asks for."""
+    return MODELS[scene.flow.model](scene)

@@ -1,0 +1,171 @@
+"""The bed of a scene under its flow: bed line, packing, stress on the grains, forces."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.bed import packing
+from orchestrator.bed.line import BedLine
+from orchestrator.bed.packing import Packing
+from orchestrator.errors import InputError
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.model import FlowModel, model
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains.loading import Loading
+from orchestrator.study.scene import PileBed, Scene
+
+FloatArray = NDArray[np.float64]
+
+TOE = 0.05
+"""Part of the windward face, from its foot, that `flow.forced` may leave without a force."""
+
+_packed = cache(packing.pile)
+
+
+@dataclass(frozen=True)
+class Face:
+    """The exposed windward grains of a pile, N of them, from the toe to the crest.
+
+    Attributes
+    ----------
+    ids : ndarray of int, shape (N,)
+        Ids in the deck.
+    arc_length : ndarray, shape (N,)
+        Position along the bed line from the windward toe, m.
+    speed : ndarray, shape (N,)
+        Local friction velocity over the undisturbed one, signed.
+    """
+
+    ids: NDArray[np.int64]
+    arc_length: FloatArray
+    speed: FloatArray
+
+
+@dataclass(frozen=True)
+class LoadedBed:
+    """The bed of a scene of a pile, and the flow's forces on its n grains."""
+
+    scene: Scene
+
+    @property
+    def bed(self) -> PileBed:
+        """The scene's bed."""
+        assert isinstance(self.scene.bed, PileBed)
+        return self.scene.bed
+
+    @cached_property
+    def model(self) -> FlowModel:
+        """The flow over it."""
+        return model(self.scene)
+
+    @property
+    def flow(self) -> FlowCase:
+        """The run of the flow, of a scene whose flow is solved."""
+        (case,) = self.model.cases
+        return case
+
+    @cached_property
+    def line(self) -> BedLine:
+        """The bed line, diameters."""
+        return self.model.line.scaled(1 / self.scene.grain.diameter)
+
+    @cached_property
+    def packing(self) -> Packing:
+        """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        return _packed(
+            self.line,
+            entrainment_angle_deg=self.bed.entrainment_angle_deg,
+            gap=self.bed.roughness / self.scene.grain.diameter,
+            pattern=self.bed.packing,
+            mobile_layers=self.bed.mobile_layers,
+            disorder=self.bed.disorder if self.bed.packing == "disordered" else 0.0,
+            seed=self.bed.seed,
+        )
+
+    @cached_property
+    def tangents(self) -> FloatArray:
+        """Unit vector downstream along the bed line under each grain, shape (n, 2)."""
+        segments = np.where(self.packing.lee, self.line.lee, self.line.windward)
+        return np.asarray(self.line.tangents[segments])
+
+    @property
+    def normals(self) -> FloatArray:
+        """Unit vector out of the bed under each grain, shape (n, 2)."""
+        return np.column_stack([-self.tangents[:, 1], self.tangents[:, 0]])
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress along the bed; `cases` holds the finished runs of the flow."""
+        return self.model.stress(cases)
+
+    def ustar_over_ustar0(self, cases: Path) -> FloatArray:
+        """Signed friction velocity that drives each grain over the undisturbed one.
+
+        Parameters
+        ----------
+        cases : Path
+            Holds the finished flow case, if the stress is that of one.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Of the mean stress around each grain; positive is downstream.
+        """
+        flow, d = self.scene.flow, self.scene.grain.diameter
+        length = max(d, flow.average * self.bed.height)
+        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)
+        return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
+
+    @property
+    def _forgotten(self) -> NDArray[np.bool_]:
+        """Grains that go without the flow's force though they are exposed."""
+        windward, s = self.packing.windward, self.packing.arc_length
+        if self.scene.flow.forced == "all but crest":
+            return np.asarray(windward & (s == s[windward].max()))
+        if self.scene.flow.forced == "all but toe":
+            return np.asarray(windward & (s < TOE * self.line.crest_s))
+        return np.zeros_like(windward)
+
+    def loading(self, ratio: FloatArray) -> Loading:
+        """The forces on the grains; `ratio` as `ustar_over_ustar0` gives it.
+
+        Exposed grains that may move carry a force.
+        """
+        pushed = self.packing.mobile & (self.packing.windward | self.packing.lee)
+        drag, lift = self.scene.powers()
+        return Loading(drag, lift, np.where(pushed, ratio, 0.0), self.tangents, self.normals)
+
+    def face(self, cases: Path) -> Face:
+        """The windward grains and the stress on them, from the finished flow case."""
+        chosen = self.packing.windward
+        return Face(
+            ids=np.flatnonzero(chosen) + 1,
+            arc_length=self.packing.arc_length[chosen] * self.scene.grain.diameter,
+            speed=self.ustar_over_ustar0(cases)[chosen],
+        )
+
+    def alone(self, speed: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which each grain's own stress reaches Eq. 3 or 5, m/s.
+
+        Infinite for grains in flow that runs back.
+        """
+        threshold = float(self.scene.closed_form(self.scene.closure).friction_velocity)
+        return np.where(speed > 0, threshold / np.where(speed > 0, speed, 1), np.inf)
+
+    def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
+        """The same, sorted, shape (N,).
+
+        Raises
+        ------
+        InputError
+            If no grain feels a flow up the slope.
+        """
+        if not np.any(speed > 0):
+            raise InputError(
+                "no grain of the windward face feels a flow up the slope",
+                where=f"scene {self.scene.id}: flow",
+                remedy="look at the flow case; the mesh or the stress is wrong",
+            )
+        return np.sort(self.alone(speed))

@@ -1,0 +1,116 @@
+"""The run of LIGGGHTS for one pile: its deck, and what its end means."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.grains import deck, motion, peeling, protocol, rest
+from orchestrator.grains.case import GrainCase
+from orchestrator.grains.loaded_bed import FloatArray, LoadedBed
+from orchestrator.runs.case import Case
+from orchestrator.study.scene import Scene
+
+MARGIN = 3.0
+"""From the outermost grains to the walls of the box, and from a face to the height at which a
+grain in flight is gone, diameters."""
+
+
+@dataclass(frozen=True)
+class PileCase(GrainCase):
+    """The grains of one pile."""
+
+    scene: Scene
+    kind: ClassVar[str] = "pile"
+    recipe: ClassVar[int] = 9
+
+    @cached_property
+    def loaded(self) -> LoadedBed:
+        """Its bed under its flow."""
+        return LoadedBed(self.scene)
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        """The runs of its flow model."""
+        return self.loaded.model.cases
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The scene, but for what only the reading of the results depends on."""
+        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+
+    @property
+    def cost_s(self) -> float:
+        """Expected wall time, s."""
+        rules, line = self.scene.protocol, self.loaded.line
+        # the whole pile is half its rows thick on average
+        layers = min(self.loaded.bed.mobile_layers, line.crest[1] / 2)
+        grains = line.crest_s * (layers + 3)
+        holds = np.log(3.5) / np.log1p(rules.step)
+        return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains with their forces, and the holds of the protocol."""
+        ratio = self.loaded.ustar_over_ustar0(cases)
+        flows = self._flows(ratio)
+        force = self.loaded.loading(ratio).in_steps(flows.tolist())
+        margin = MARGIN * self.scene.grain.diameter
+        deck.write(directory, self._grains, self._numbers, flows, force, margin=margin)
+
+    def _flows(self, ratio: FloatArray) -> FloatArray:
+        """The flow of the settling, then of each hold: from before the first grain goes."""
+        bed, rules = self.loaded, self.scene.protocol
+        thresholds = np.sort(peeling.of_bed(bed, ratio))
+        if not 0 < thresholds[0] < np.inf or self.scene.flow.forced != "exposed":
+            # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
+            thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
+        last = thresholds[int(np.ceil(rules.until * bed.packing.count)) - 1]
+        if not np.isfinite(last):
+            last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
+        return protocol.flows(protocol.START * thresholds[0], protocol.BEYOND * last, rules.step)
+
+    @property
+    def _numbers(self) -> dict[str, float | int]:
+        """The parameters of the deck."""
+        bed, rules, d = self.loaded, self.scene.protocol, self.scene.grain.diameter
+        line = bed.line
+        ceiling = (MARGIN + 0.5) / line.tangents[line.windward, 0]
+        return {
+            "diameter": d,
+            "density": self.scene.grain.density,
+            "gravity": self.scene.reduced_gravity,
+            **protocol.contact(self.scene.grain, rules),
+            **protocol.raising(rules, int((1 - rules.until) * bed.packing.count + 1e-9)),
+            "slope": line.slopes_deg[line.windward],
+            "ceiling_x": line.crest[0] * d,
+            "ceiling_z": (line.crest[1] + ceiling) * d,
+            "behind": self._grains.last_mobile + protocol.AWAY * d,
+        }
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write what each windward grain did to ``motion.csv``."""
+        self.check(directory)
+        grain = self.scene.grain
+        rest.check(directory, self._grains, self.scene.weight, grain.stiffness, all_rest=True)
+        found = motion.read(directory, self._grains, self.scene.protocol.marker, falls_out=False)
+        found.to_csv(directory, self._grains)
+
+    @cached_property
+    def _grains(self) -> deck.GrainTable:
+        """The grains of the deck."""
+        bed, d = self.loaded.packing, self.scene.grain.diameter
+        kind = np.select(
+            [~bed.mobile, bed.windward, bed.lee],
+            [deck.FIXED, deck.COUNTED, deck.PUSHED],
+            deck.MOBILE,
+        )
+        x, z = bed.centres.T * d
+        return deck.GrainTable(
+            position=np.column_stack([x, np.zeros_like(x), z]),
+            kind=kind,
+            along=self.loaded.tangents,
+            diameter=d,
+            density=self.scene.grain.density,
+        )
