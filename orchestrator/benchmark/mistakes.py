@@ -1,8 +1,13 @@
-"""What a wrong number looks like: the ratio to the expected one tells many causes."""
+"""The likely cause of wrong numbers: what a known mistake would have answered instead."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.physics import closures
 
 CLOSE = 2e-3
 """Relative: a ratio this close to that of a known mistake is taken for it."""
@@ -10,30 +15,45 @@ STEADY = 1e-3
 """Ratios that differ less than this are one factor."""
 FEWEST = 3
 """Places at which a factor must hold to be called one."""
+EXACT = 1e-5
+"""Relative: a formula with a known mistake is met this closely; dry and submerged weight differ by
+2e-4 in air."""
+FEW = 0.05
+"""Of N: counts this close to those of a known mistake are taken for it."""
 ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians taken for degrees"}
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""
+GRAVITIES = (9.8, 9.80665, 10.0)
+"""What g is taken for, m/s2."""
+DERIVED = ("reynolds", "shields")
+"""What follows from the threshold's u*."""
+Told = Mapping[str, Any]
 
 
-def hint(kind: str, told: Mapping[str, Any], quantity: str, ratios: Sequence[float]) -> str:
-    """The likely cause of wrong numbers of a quantity, or nothing.
+def hint(told: Told, rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
+    """The likely cause of wrong numbers, or nothing.
 
     Parameters
     ----------
-    kind : str
-        Of the scene.
     told : mapping
-        Its parameters.
-    quantity : str
-        What is wrong.
-    ratios : sequence of float
-        Answers over expected values, of all its places.
+        The parameters of the scene.
+    rows : DataFrame
+        All its answers: columns ``quantity``, ``at``, ``value`` (expected) and ``found``.
+    wrong : DataFrame
+        Those that are wrong, the one first that is told of.
     """
-    if not ratios or not all(math.isfinite(r) for r in ratios):
+    kind, quantity = str(told["kind"]), str(wrong["quantity"].iloc[0])
+    if not np.isfinite(wrong["found"]).all():
         return ""
+    cause = _formula(told, wrong) if kind == "closed-form" else _counting(rows, wrong)
+    same = rows[rows["quantity"] == quantity]
+    return cause or _factor(kind, told, quantity, (same["found"] / same["value"]).tolist())
+
+
+def _factor(kind: str, told: Told, quantity: str, ratios: Sequence[float]) -> str:
+    """The cause of a quantity that is wrong by one factor at all places."""
     first = sorted(ratios)[len(ratios) // 2]
-    steady = max(ratios) - min(ratios) <= STEADY * abs(first)
-    if not steady:
+    if not max(ratios) - min(ratios) <= STEADY * abs(first):
         return ""
     for ratio, cause in (*_of_kind(kind, told, quantity), *_units()):
         if abs(first / ratio - 1) < CLOSE:
@@ -51,7 +71,7 @@ def _units() -> Iterator[tuple[float, str]]:
     yield -1.0, "the sign is turned"
 
 
-def _of_kind(kind: str, told: Mapping[str, Any], quantity: str) -> Iterator[tuple[float, str]]:
+def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]]:
     bodies = ((DISC, "the inertia of a disc"), (SHELL, "the inertia of a hollow sphere"))
     if kind == "incline":
         a, friction = math.radians(told["incline_deg"]), math.tan(math.radians(told["phi_deg"]))
@@ -71,3 +91,75 @@ def _of_kind(kind: str, told: Mapping[str, Any], quantity: str) -> Iterator[tupl
         right = math.exp(-zeta / root * (math.pi - 2 * math.asin(zeta)))
         yield math.exp(-zeta / root * math.pi) / right, "the contact pulls before it ends"
         yield 1 / right, "there is no damping"
+
+
+def _formula(told: Told, wrong: pd.DataFrame) -> str:
+    """The changed parameter with which the formulas of level 1 give the wrong numbers."""
+    own = wrong[~wrong["quantity"].isin(DERIVED)]
+    used = own if len(own) else wrong
+    for cause, change in _changes(told):
+        answer = _answer({**told, **change})
+        expected = [answer(q, at) for q, at in zip(used["quantity"], used["at"], strict=True)]
+        matters = not np.allclose(used["value"], expected, rtol=EXACT, atol=0)
+        if matters and np.allclose(used["found"], expected, rtol=EXACT, atol=0):
+            return cause
+    return ""
+
+
+def _changes(told: Told) -> Iterator[tuple[str, Told]]:
+    low = told["closure"] == "low"
+    yield "there is no lift", {"alpha_s": 0.0}
+    said = "Eq. 4 in place of Eq. 2" if low else "Eq. 2 in place of Eq. 4"
+    yield f"the other closure, {said}", {"closure": "high" if low else "low"}
+    yield "the sign of the slope is turned", {"alpha_deg": -told["alpha_deg"]}
+    yield "the slope is left out", {"alpha_deg": 0.0}
+    submerged = 1 - told["rho_f_kg_m3"] / told["rho_sol_kg_m3"]
+    yield (
+        "the weight is that of the dry grain, not of the submerged one",
+        {"g_m_s2": told["g_m_s2"] / submerged},
+    )
+    for g in GRAVITIES:
+        yield f"g is {g:g}, not {told['g_m_s2']:g} m/s2", {"g_m_s2": g}
+
+
+def _answer(told: Told) -> Callable[[str, str], float]:
+    """The formulas of level 1."""
+    flow = {
+        "diameter": told["d_m"],
+        "roughness": told["z0_m"],
+        "fluid_density": told["rho_f_kg_m3"],
+        "viscosity": told["nu_m2_s"],
+    }
+    lifted = {**flow, "lift_coefficient": told["alpha_s"]}
+    found = closures.threshold(
+        told["closure"],
+        **lifted,
+        density=told["rho_sol_kg_m3"],
+        slope_deg=told["alpha_deg"],
+        entrainment_angle_deg=told["beta_deg"],
+        gravity=told["g_m_s2"],
+    )
+    forces = {
+        "drag_n": closures.drag(told["closure"], **flow),
+        "lift_n": closures.lift(told["closure"], **lifted),
+    }
+    thresholds = {
+        "ustar_m_s": found.friction_velocity,
+        "reynolds": found.reynolds,
+        "shields": found.shields,
+    }
+    return lambda q, at: float(forces[q](float(at)) if q in forces else thresholds[q])
+
+
+def _counting(rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
+    """What a pile's counts say of the rule that they were made by."""
+    of = {name: own.set_index("at") for name, own in rows.groupby("quantity")}
+    if "carried_off" not in of or "moved" not in wrong["quantity"].to_numpy():
+        return ""
+    moved, carried = of["moved"], of["carried_off"]["value"]
+    last = carried.index[-1]
+    total = moved.loc[last, "value"] + of["not_moved"].loc[last, "value"]
+    without = moved.loc[last, "value"] - carried[last]
+    if abs(moved.loc[last, "found"] - without) <= FEW * total:
+        return "grains that were carried off are not counted as moved"
+    return ""

@@ -8,7 +8,7 @@ import pandas as pd
 
 from orchestrator.benchmark import charts, sheets
 from orchestrator.benchmark.pack import Pack
-from orchestrator.benchmark.verdict import Contender
+from orchestrator.benchmark.verdict import Contender, failures
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.facts import Sheet
@@ -88,11 +88,10 @@ def _failed(contenders: Sequence[Contender]) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "solver": one.name,
-            "scene": v.scene,
-            "kind": v.kind,
-            "why": textwrap.fill(v.message, WIDE),
+            "scenes": scenes,
+            "kind": kind,
+            "why": textwrap.fill(why, WIDE),
         }
         for one in contenders
-        for v in one.verdicts
-        if not v.passed
+        for kind, scenes, why in failures(one)
     )

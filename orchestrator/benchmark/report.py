@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark.pack import Pack
-from orchestrator.benchmark.verdict import Contender, Verdict
+from orchestrator.benchmark.verdict import Contender, Verdict, failures
 from orchestrator.report import settings
 from orchestrator.runs.files import write_durably
 
@@ -65,10 +65,9 @@ def _verdicts(contenders: Sequence[Contender]) -> Iterator[dict[str, Any]]:
 
 def _failures(contenders: Sequence[Contender]) -> list[str]:
     lines = [
-        f"{f'{one.name}: ' if len(contenders) > 1 else ''}{v.scene}: {v.message}"
+        f"{f'{one.name}: ' if len(contenders) > 1 else ''}{scenes}: {why}"
         for one in contenders
-        for v in one.verdicts
-        if not v.passed
+        for _, scenes, why in failures(one)
     ]
     more = len(lines) - SAID
     return lines if more <= 0 else [*lines[:SAID], f"and {more} more: see {VERDICTS}"]

@@ -52,7 +52,7 @@ def costs(pack: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
         of = {v.scene: v for v in one.verdicts}
         piles = [of[name] for name in names]
         rates = [n * v.steps / v.cpu_s / MILLION for n, v in zip(grains, piles, strict=True)]
-        table[f"{one.name}, s"] = [v.cpu_s for v in piles]
+        table[f"{one.name}, s"] = [v.cpu_s if v.answered else np.nan for v in piles]
         table[f"{one.name} over ours"] = [v.cpu_ratio for v in piles]
         table[f"{one.name}, M/s"] = rates
     # what nobody states has no column

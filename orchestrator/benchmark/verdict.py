@@ -1,7 +1,8 @@
 """Answers against expectations: each number, then each scene."""
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ COUNTS = ("moved", "not_moved")
 """Whole numbers, which may be small: they are judged, but a relative error says little of them."""
 ROUND = 1e-8
 """Relative: the digits of a pack's tables."""
+NUMBERS = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
+"""What differs in the messages of one cause."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,11 @@ class Verdict:
         Whether every judged number is within.
     message : str
         Why not.
+    cause : str
+        What it has in common with other failures of one cause: the likely mistake or, where none is
+        known, the message without its numbers.
+    answered : bool
+        Whether there were numbers to judge.
     error : float
         Median relative error of the judged numbers; NaN without an answer.
     worst : float
@@ -60,6 +68,8 @@ class Verdict:
     kind: str
     passed: bool
     message: str
+    cause: str
+    answered: bool
     error: float
     worst: float
     bias: float
@@ -73,13 +83,13 @@ class Verdict:
 
     @property
     def ratio(self) -> float:
-        """The solver's wall time over ours."""
-        return self.seconds / self.ours_seconds
+        """The solver's wall time over ours; NaN for a scene that it did not answer."""
+        return self.seconds / self.ours_seconds if self.answered else math.nan
 
     @property
     def cpu_ratio(self) -> float:
         """The same of the CPU time, which a busy machine disturbs less."""
-        return self.cpu_s / self.ours_cpu_s
+        return self.cpu_s / self.ours_cpu_s if self.answered else math.nan
 
 
 @dataclass(frozen=True)
@@ -102,6 +112,17 @@ class Contender:
     rows: pd.DataFrame
 
 
+def failures(of: Contender) -> Iterator[tuple[str, str, str]]:
+    """The failures of a solver, one for each cause: kind, scenes, and why the first failed."""
+    groups: dict[tuple[str, str], list[Verdict]] = {}
+    for v in of.verdicts:
+        if not v.passed:
+            groups.setdefault((v.kind, v.cause), []).append(v)
+    for (kind, _), (first, *others) in groups.items():
+        more = f" and {len(others)} more of kind {kind}" if others else ""
+        yield kind, first.scene + more, first.message
+
+
 def ours(contenders: Sequence[Contender]) -> Contender:
     """Ourselves as one more of them: our answers beside the first, the mean of our CPU times."""
     first = contenders[0]
@@ -114,6 +135,7 @@ def ours(contenders: Sequence[Contender]) -> Contender:
     verdicts = [
         replace(
             v,
+            answered=True,
             worst=float(worst.get(v.scene, math.nan)),
             cpu_s=float(cpu_s[v.scene]),
             ours_cpu_s=math.nan,
@@ -202,13 +224,17 @@ def _verdict(
     wrong = judged[~judged["within"].astype(bool)]
     signed = judged.loc[~judged["quantity"].isin(COUNTS), "error"]
     errors = signed.abs()
-    message = error or (_message(told, rows, wrong) if len(wrong) else "")
+    message, cause = error, ""
+    if not error and len(wrong):
+        message, cause = _message(told, rows, wrong)
     return Verdict(
         scene=str(told["scene"]),
         level=int(told["level"]),
         kind=str(told["kind"]),
         passed=not message,
         message=message,
+        cause=cause or NUMBERS.sub("#", message),
+        answered=not error,
         error=float(errors.median()) if not error else math.nan,
         worst=float(errors.max()) if not error else math.nan,
         bias=float(signed.median()) if not error else math.nan,
@@ -216,21 +242,20 @@ def _verdict(
     )
 
 
-def _message(told: Mapping[str, Any], rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
-    """The number that is furthest off, how many others are, and the likely cause."""
+def _message(told: Mapping[str, Any], rows: pd.DataFrame, wrong: pd.DataFrame) -> tuple[str, str]:
+    """The number that is furthest off and how many others are; and the likely cause."""
     # a count is named only if nothing else is off
     size = wrong["error"].abs().where(~wrong["quantity"].isin(COUNTS), 0.0)
-    first = wrong.iloc[int(size.to_numpy().argmax())]
+    place = int(size.to_numpy().argmax())
+    first = wrong.iloc[place]
     at = f" at {first['at']}" if first["at"] else ""
     said = f"{first['quantity']}{at} is {first['found']:.6g}, not {first['value']:.6g}"
     if first["low"] < first["high"]:
         said += f" ({first['low']:.6g} ... {first['high']:.6g})"
     if len(wrong) > 1:
         said += f", and {len(wrong) - 1} more are off"
-    same = rows[rows["quantity"] == first["quantity"]]
-    ratios = (same["found"] / same["value"]).tolist()
-    cause = hint(str(told["kind"]), told, str(first["quantity"]), ratios)
-    return f"{said}: {cause}" if cause else said
+    cause = hint(told, rows, pd.concat([wrong.iloc[[place]], wrong.drop(wrong.index[place])]))
+    return (f"{said}: {cause}" if cause else said), cause
 
 
 def _number(value: Any) -> float:

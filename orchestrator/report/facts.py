@@ -176,9 +176,10 @@ def programs(results: Results) -> Sheet:
 
 
 def versions(solvers: Mapping[str, str]) -> Sheet:
-    """Solvers with their versions, this package, and the libraries."""
+    """Solvers with their versions, this package, and the libraries that are not among them."""
     rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
-    return Sheet(("program", "version"), (*rows, *_installed(PACKAGES)))
+    others = (name for name in PACKAGES if name not in solvers)
+    return Sheet(("program", "version"), (*rows, *_installed(others)))
 
 
 def _installed(packages: Iterable[str]) -> Iterable[tuple[str, str]]:

@@ -1,5 +1,6 @@
 """Solvers as real processes: a right one passes, each wrong one is caught and told by name."""
 
+import json
 import shlex
 import shutil
 import subprocess
@@ -16,8 +17,8 @@ from orchestrator.errors import InputError
 from tests.benchmark.conftest import NATIVE
 from tests.conftest import Command
 
-FORMULA = "the first of level 1"
-"""A scene by its place: its name is a digest."""
+FORMULA, SLOPED = "the first of level 1", "the first of level 1 on a slope"
+"""Scenes by their place: their names are digests."""
 HEAD = """
 import math, os, sys, time
 from pathlib import Path
@@ -38,8 +39,12 @@ def _program(folder: Path, body: str) -> str:
 
 
 def _run(pack: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
-    first = min(path.name for path in (pack / "scenes").glob("1-*"))
-    choice = Choice(patterns=tuple(first if name == FORMULA else name for name in scenes))
+    table = pd.read_csv(pack / "scenes.csv").query("level == 1").sort_values("scene")
+    named = {
+        FORMULA: table["scene"].iloc[0],
+        SLOPED: table.query("alpha_deg > 0")["scene"].iloc[0],
+    }
+    choice = Choice(patterns=tuple(named.get(name, name) for name in scenes))
     return runner.run(pack, _program(folder, body), folder / "results", choice, limit_s)
 
 
@@ -50,7 +55,54 @@ def contact(self, scene, mass):
     {}
 solver.Contact.__init__ = contact
 """
+OTHER_SCENE = """
+right = solver.closed_form
+solver.KINDS["closed-form"] = lambda scene, case: right({{**scene, {}}}, case)
+"""
 WRONG = {
+    "no lift": (
+        "forces = solver.forces\n"
+        "solver.forces = lambda scene, u: (forces(scene, u)[0], 0.0)" + TAIL,
+        FORMULA,
+        "lift_n .* is 0, not .*: there is no lift",
+    ),
+    "lift left out of the threshold": (
+        "forces, threshold = solver.forces, solver.threshold\n"
+        "def alone(scene):\n"
+        "    solver.forces = lambda scene, u: (forces(scene, u)[0], 0.0)\n"
+        "    found = threshold(scene)\n"
+        "    solver.forces = forces\n"
+        "    return found\n"
+        "solver.threshold = alone" + TAIL,
+        FORMULA,
+        "shields .*: there is no lift",
+    ),
+    "the other closure": (
+        OTHER_SCENE.format("'closure': {'low': 'high', 'high': 'low'}[scene['closure']]") + TAIL,
+        FORMULA,
+        "the other closure, Eq. [24] in place of Eq. [24]",
+    ),
+    "down the slope": (
+        OTHER_SCENE.format("'alpha_deg': -scene['alpha_deg']") + TAIL,
+        SLOPED,
+        "the sign of the slope is turned",
+    ),
+    "a level bed": (
+        OTHER_SCENE.format("'alpha_deg': 0.0") + TAIL,
+        SLOPED,
+        "the slope is left out",
+    ),
+    "dry weight": (
+        OTHER_SCENE.format("'weight_n': scene['mass_kg'] * scene['g_m_s2']") + TAIL,
+        FORMULA,
+        "the weight is that of the dry grain, not of the submerged one",
+    ),
+    "another g": (
+        OTHER_SCENE.format("'g_m_s2': 9.8, 'weight_n': scene['weight_n'] * 9.8 / scene['g_m_s2']")
+        + TAIL,
+        FORMULA,
+        "g is 9.8, not 9.81 m/s2",
+    ),
     "drag 5 % high": (
         "forces = solver.forces\n"
         "solver.forces = lambda scene, u: (1.05 * forces(scene, u)[0], forces(scene, u)[1])" + TAIL,
@@ -118,6 +170,40 @@ def test_a_wrong_solver_is_caught_and_named(formulas: Path, tmp_path: Path, name
     assert verdicts["message"].str.contains(message).all(), verdicts["message"].tolist()
     assert len(found.failures) == len(verdicts) >= 1
     assert found.failures[0].split(": ")[0] in found.page.read_text()
+
+
+def test_one_mistake_in_many_scenes_is_one_line(formulas: Path, tmp_path: Path) -> None:
+    body = OTHER_SCENE.format("'g_m_s2': 10.0, 'weight_n': scene['weight_n'] * 10 / 9.81") + TAIL
+    found = _run(formulas, tmp_path, body, "1-[01]*")
+    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+    (line,) = found.failures
+    first, others = verdicts["scene"].iloc[0], len(verdicts) - 1
+    assert others >= 2
+    assert line.startswith(f"{first} and {others} more of kind closed-form: ")
+    assert line.endswith("g is 10, not 9.81 m/s2")
+    assert verdicts["cause"].nunique() == 1
+    assert line.split(": ")[0] in found.page.read_text()
+
+
+def test_declined_scenes_are_one_line_and_have_no_time(formulas: Path, tmp_path: Path) -> None:
+    found = _run(formulas, tmp_path, "sys.exit(2)", "2-incline-*")
+    (line,) = found.failures
+    assert line == "2-incline-5 and 5 more of kind incline: it ended with 2"
+    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+    assert not verdicts["answered"].any()
+    assert (verdicts["ours_seconds"] > 0).all()
+    assert verdicts[["ratio", "cpu_ratio"]].isna().all(axis=None)
+
+
+def test_each_program_is_listed_once(formulas: Path, tmp_path: Path) -> None:
+    pack = tmp_path / "pack"
+    shutil.copytree(formulas, pack)
+    manifest = json.loads((pack / "manifest.json").read_text())
+    manifest["programs"] = {"gmsh": "4.0.0", "liggghts": "3.8.0"}
+    (pack / "manifest.json").write_text(json.dumps(manifest))
+    found = _run(pack, tmp_path, TAIL, "2-collision-0.1")
+    assert found.page.read_text().count("<td>gmsh</td>") == 1
+    assert "<td>4.0.0</td>" in found.page.read_text()
 
 
 def test_a_lost_grain_is_caught(all_levels: Path, tmp_path: Path) -> None:
@@ -188,7 +274,7 @@ def test_compare_gives_the_same_verdicts(formulas: Path, orchestrator: Command) 
     assert compared.stdout.splitlines()[:-1] == ran.stdout.splitlines()[:-1]
     more = orchestrator("benchmark", "compare", str(formulas), "r", "--scene", "2-incline-*")
     assert more.returncode == 1
-    assert "2-incline-5: it wrote no answer.csv" in more.stderr
+    assert "2-incline-5 and 3 more of kind incline: it wrote no answer.csv" in more.stderr
 
 
 @pytest.mark.parametrize(
