@@ -17,8 +17,8 @@ from orchestrator.benchmark.problem import (
     parameters,
     place,
 )
-from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY, LAST
-from orchestrator.grains.protocol import SETTLE_FLOW, START
+from orchestrator.grains import cells
+from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.study.scene import Grain, Scene
 
 FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
@@ -74,11 +74,8 @@ def has_pivot(scene: Scene) -> bool:
 
 
 def _cell(scene: Scene) -> pd.DataFrame:
-    along, outward = _directions(scene)
-    beta = np.radians(scene.bed.entrainment_angle_deg)
-    sides = (-1.0, 1.0)
-    below = [side * np.cos(beta) * along - np.sin(beta) * outward for side in sides]
-    x, z = np.vstack([*below, np.zeros(2)]).T * scene.grain.diameter
+    centres, _ = cells.cell(scene)
+    x, z = centres.T * scene.grain.diameter
     kinds = ["fixed", "fixed", "mobile"]
     return pd.DataFrame(
         {"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": scene.grain.diameter, "kind": kinds}
@@ -86,22 +83,10 @@ def _cell(scene: Scene) -> pd.DataFrame:
 
 
 def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
-    count = int(np.ceil(np.log(LAST / START) / np.log1p(scene.protocol.step)))
-    flows = threshold * START * (1 + scene.protocol.step) ** np.arange(count + 1)
-    flows = np.concatenate([[SETTLE_FLOW * flows[0]], flows])
-    along, outward = _directions(scene)
-    drag, lift = scene.powers()
-    force = np.outer(drag(flows), along) + np.outer(lift(flows), outward)
-    return pd.DataFrame(
-        {"hold": range(len(flows)), "ustar_m_s": flows, "fx_n": force[:, 0], "fz_n": force[:, 1]}
-    )
-
-
-def _directions(scene: Scene) -> tuple[Any, Any]:
-    """Unit vectors up the slope and out of the bed."""
-    alpha = np.radians(scene.bed.slope_deg)
-    along = np.array([np.cos(alpha), np.sin(alpha)])
-    return along, np.array([-along[1], along[0]])
+    rising = cells.flows(scene)
+    fx, fz = cells.force(scene, rising).T
+    holds = {"hold": range(len(rising)), "ustar_m_s": rising * threshold, "fx_n": fx, "fz_n": fz}
+    return pd.DataFrame(holds)
 
 
 def checks() -> Iterator[Problem]:

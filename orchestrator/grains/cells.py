@@ -11,11 +11,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.runs.files import canonical_json
 from orchestrator.study.scene import Scene
+
+FloatArray = NDArray[np.float64]
 
 DIAMETER = 1e-3
 DENSITY = 2500.0
@@ -72,9 +75,9 @@ class CellsCase(GrainCase):
             "ceiling_z": 1e3 * DIAMETER,
             "behind": 1e3 * DIAMETER,
         }
-        flows = protocol.flows(protocol.START, LAST, rules.step)
-        force = self._forces(flows)
-        deck.write(directory, self._grains(), parameters, flows, force, margin=4 * DIAMETER)
+        rising = flows(self.scenes[0])
+        force = self._forces(rising)
+        deck.write(directory, self._grains(), parameters, rising, force, margin=4 * DIAMETER)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each grain did to ``motion.csv``."""
@@ -86,41 +89,46 @@ class CellsCase(GrainCase):
         found.to_csv(directory, grains)
 
     def _grains(self) -> deck.GrainTable:
-        cells = [_cell(scene) for scene in self.scenes]
-        centres = np.concatenate([cell[0] for cell in cells]) * DIAMETER
+        cells = [cell(scene) for scene in self.scenes]
+        centres = np.concatenate([one[0] for one in cells]) * DIAMETER
         across = np.repeat(np.arange(len(cells)) * SPACING * DIAMETER, 3)
         return deck.GrainTable(
             position=np.column_stack([centres[:, 0], across, centres[:, 1]]),
             kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
-            along=np.repeat([cell[1] for cell in cells], 3, axis=0),
+            along=np.repeat([one[1] for one in cells], 3, axis=0),
             diameter=DIAMETER,
             density=DENSITY,
         )
 
-    def _forces(self, flows: deck.FloatArray) -> deck.FloatArray:
+    def _forces(self, rising: FloatArray) -> FloatArray:
         """Force on each grain at each flow, shape (flows, 3 cells, 2); on neighbours none."""
-        force = np.zeros((len(flows), 3 * len(self.scenes), 2))
+        forces = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
-            force[:, 3 * place + 2] = _force(scene, flows)
-        return force
+            forces[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
+        return forces
 
 
-def _force(scene: Scene, flows: deck.FloatArray) -> deck.FloatArray:
-    """Force on the grain of a cell (N), of flows over the closed form's; shape (flows, 2)."""
-    _, along = _cell(scene)
-    ustar = flows * float(scene.closed_form(scene.closure).friction_velocity)
-    drag, lift = (force(ustar) * WEIGHT / scene.weight for force in scene.powers())
-    return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
-
-
-def _cell(scene: Scene) -> tuple[deck.FloatArray, deck.FloatArray]:
-    """Two neighbours and the grain (3, 2), unit vector up the slope (2,)."""
+def cell(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Two neighbours and the grain, d, shape (3, 2); the unit vector up the slope, shape (2,)."""
     alpha = np.radians(scene.bed.slope_deg)
     beta = np.radians(scene.bed.entrainment_angle_deg)
     along = np.array([np.cos(alpha), np.sin(alpha)])
     outward = np.array([-along[1], along[0]])
     behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
     return np.vstack([behind, ahead, [0.0, 0.0]]), along
+
+
+def flows(scene: Scene) -> FloatArray:
+    """Friction velocity of the settling and of each hold, over that of the closed form."""
+    return protocol.flows(protocol.START, LAST, scene.protocol.step)
+
+
+def force(scene: Scene, rising: FloatArray) -> FloatArray:
+    """Force of the flow on the scene's grain at such flows, N, shape (flows, 2)."""
+    _, along = cell(scene)
+    ustar = rising * float(scene.closed_form(scene.closure).friction_velocity)
+    drag, lift = (one(ustar) for one in scene.powers())
+    return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
 
 
 def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:
