@@ -55,6 +55,7 @@ def run(
     limit_s: float,
     stop: threading.Event | None = None,
     env: Mapping[str, str] | None = None,
+    fds: Sequence[int] = (),
 ) -> Ended:
     """Run a program to its end and keep what it says.
 
@@ -70,6 +71,8 @@ def run(
         Set by another thread to end the program early.
     env : mapping, optional
         Added to this process's environment.
+    fds : sequence of int, optional
+        Open files that it gets beside its output.
 
     Raises
     ------
@@ -85,6 +88,7 @@ def run(
             stdout=stream,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            pass_fds=fds,
             # OpenFOAM takes its case directory from PWD, not from getcwd
             env={**os.environ, "PWD": str(cwd), **(env or {})},
         )

@@ -1,0 +1,131 @@
+"""Run a program that nobody vouches for: limited, ended whole, and blind to what it may not see."""
+
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+
+from orchestrator.runs import keeper, process
+
+GIB = 2**30
+_WALLS = (
+    *("unshare", "--user", "--map-current-user", "--keep-caps", "--mount", "--ipc"),
+    *("--pid", "--fork", "--kill-child", "--mount-proc", "--"),
+)
+"""Namespaces: of processes, which end with the first of them, and of what is mounted."""
+_POWERLESS = (
+    *("setpriv", "--no-new-privs", "--bounding-set=-all", "--inh-caps=-all"),
+    *("--ambient-caps=-all", "--"),
+)
+"""What hides a directory could show it again: the program itself has no such right."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a program may take.
+
+    Attributes
+    ----------
+    seconds : float
+        Wall time, s.
+    memory : int
+        All its processes together, bytes.
+    disk : int
+        Files of its working directory together, and any single file, bytes.
+    printed : int
+        Its log, bytes.
+    processes : int
+        At once.
+    """
+
+    seconds: float = 600.0
+    memory: int = 4 * GIB
+    disk: int = 4 * GIB
+    printed: int = GIB // 16
+    processes: int = 256
+
+
+@dataclass(frozen=True)
+class Used:
+    """How a program ended, and what it took.
+
+    Attributes
+    ----------
+    returncode : int or None
+        None where it had to be ended.
+    broken : str
+        The limit that it broke, as a sentence, or nothing.
+    seconds, cpu_s : float
+        Wall and CPU time, s.
+    peak_mib : float
+        Memory of its largest process.
+    """
+
+    returncode: int | None
+    broken: str
+    seconds: float
+    cpu_s: float = float("nan")
+    peak_mib: float = float("nan")
+
+
+def run(
+    command: Sequence[str], *, cwd: Path, log: Path, limits: Limits, hide: Iterable[Path] = ()
+) -> Used:
+    """Run a program to the end of all its processes.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments; no shell reads them.
+    cwd, log : Path
+        Working directory, with room for all that it writes; file that takes what it prints.
+    limits : Limits
+        What it may take.
+    hide : iterable of Path
+        Directories that are empty for it, as far as `hides` says so.
+    """
+    return _run(command, cwd, log, limits, [str(path) for path in hide], walled=hides())
+
+
+@cache
+def hides() -> bool:
+    """Whether this system lets a program run without sight of some directories: it is tried."""
+    if not all(map(shutil.which, ("unshare", "setpriv"))):
+        return False
+    with tempfile.TemporaryDirectory() as folder:
+        cwd, secret = Path(folder), Path(folder) / "hidden" / "secret"
+        secret.parent.mkdir()
+        secret.touch()
+        seen = ["test", "!", "-e", str(secret)]
+        used = _run(seen, cwd, cwd / "log", Limits(), [str(secret.parent)], walled=True)
+    return used.returncode == 0
+
+
+def _run(
+    command: Sequence[str], cwd: Path, log: Path, limits: Limits, hide: list[str], *, walled: bool
+) -> Used:
+    with tempfile.TemporaryFile() as report:
+        order = {**asdict(limits), "report": report.fileno(), "hide": hide if walled else []}
+        start = [sys.executable, "-I", "-S", keeper.__file__, json.dumps(order)]
+        ended = process.run(
+            [*(_WALLS if walled else ()), *start, *(_POWERLESS if walled else ()), *command],
+            cwd=cwd,
+            log=log,
+            limit_s=limits.seconds,
+            env={"TMPDIR": str(cwd), "OLDPWD": str(cwd)},
+            fds=[report.fileno()],
+        )
+        report.seek(0)
+        told = report.read()
+    if log.stat().st_size > limits.printed:
+        os.truncate(log, limits.printed)
+    if told and not ended.timed_out:
+        return Used(**json.loads(told))
+    late = f"it did not end within {limits.seconds:g} s and was killed"
+    why = late if ended.timed_out else f"it could not be watched: {process.last_words(log)}"
+    return Used(None, why, ended.seconds)
