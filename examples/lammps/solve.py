@@ -1,7 +1,8 @@
 """LAMMPS behind the door of a benchmark pack:  python solve.py CASE OUT
 
 Copies the decks beside this file to the working directory, writes the parameters, runs ``lmp``
-there and turns what it wrote into an answer. Kinds: collision, incline, sliding, pivot, pile.
+there and turns what it wrote into an answer. Kinds: collision, incline, sliding, passing, pivot,
+pile.
 """
 
 import json
@@ -23,7 +24,12 @@ ENVIRONMENT = {
     "OMPI_MCA_orte_create_session_dirs": "0",
     "OMPI_MCA_pml": "ob1",
 }
-CHECKS = {"collision": "speed_m_s", "incline": "incline_deg", "sliding": "speed_m_s"}
+CHECKS = {
+    "collision": ("speed_m_s",),
+    "incline": ("incline_deg",),
+    "sliding": ("speed_m_s",),
+    "passing": ("force_n", "marker"),
+}
 
 
 def parameters(scene):
@@ -122,8 +128,8 @@ def run(deck, *variables):
 
 def check(kind, scene):
     """One of the decks for the contact law."""
-    key = CHECKS[kind]
-    run(f"in.{kind}", "-var", key.partition("_")[0], repr(scene[key]))
+    given = [("-var", key.partition("_")[0], repr(scene[key])) for key in CHECKS[kind]]
+    run(f"in.{kind}", *(word for words in given for word in words))
     rows = [line.split(",") for line in Path("answer.csv").read_text().split()]
     found = {(quantity, at): float(value) for quantity, at, value in rows}
     return lambda quantity, at: found[quantity, at]

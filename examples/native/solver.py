@@ -204,6 +204,18 @@ def pivot(scene, case):
     return lambda quantity, at: ustar
 
 
+def passing(scene, case):
+    """A grain is let rest, then pushed: when has it passed the marker?"""
+    bed, unit = Bed(scene, table(case / "grains.csv")), scene["time_unit_s"]
+    for _ in range(int(10 * unit / bed.dt)):
+        bed.step(0.0, 0.0)
+    x, steps = bed.x, 0
+    while bed.x - x < scene["marker"] * scene["d_m"]:
+        bed.step(scene["force_n"], 0.0)
+        steps += 1
+    return lambda quantity, at: steps * bed.dt / unit
+
+
 def pile(scene, case):
     """Each grain alone: it moves when its own stress reaches the threshold of one grain."""
     alone = threshold(scene)
@@ -239,6 +251,7 @@ KINDS = {
     "incline": incline,
     "sliding": sliding,
     "pivot": pivot,
+    "passing": passing,
     "pile": pile,
 }
 

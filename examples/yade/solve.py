@@ -2,7 +2,7 @@
 
 The contact is Law2_ScGeom_ViscElPhys_Basic: a linear spring with its dashpot that never pulls, and
 a tangential one that remembers. YADE's numerical damping is off. Kinds: collision, incline,
-sliding, pivot, pile.
+sliding, passing, pivot, pile.
 """
 
 import json
@@ -113,6 +113,25 @@ def sliding(scene, case):
     return lambda quantity, at: found[quantity, at]
 
 
+def passing(scene, case):
+    """A grain rests on two fixed ones and is pushed until it has passed the marker."""
+    set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
+    rows = door.table(case / "grains.csv")
+    ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in rows]
+    grain, unit = O.bodies[ids[-1]].state, scene["time_unit_s"]
+    run(10 * unit)
+    start, since = grain.pos[0], O.time
+    O.forces.setPermF(ids[-1], (scene["force_n"], 0, 0))
+    before = start
+    while grain.pos[0] - start < scene["marker"] * scene["d_m"]:
+        before = grain.pos[0]
+        run(0.01 * unit)
+    # straight between the last two looks
+    late = (grain.pos[0] - start - scene["marker"] * scene["d_m"]) / (grain.pos[0] - before)
+    value = (O.time - since) / unit - 0.01 * late
+    return lambda quantity, at: value
+
+
 def run(seconds):
     """Integrate for a time."""
     O.run(int(seconds / O.dt + 0.5), True)
@@ -208,6 +227,7 @@ KINDS = {
     "collision": collision,
     "incline": incline,
     "sliding": sliding,
+    "passing": passing,
     "pivot": bed,
     "pile": bed,
 }

@@ -29,10 +29,16 @@ DAMPINGS = (0.05, 0.1, 0.3)
 INCLINES_DEG = (5.0, 20.0, 45.0, 60.0, 70.0, 75.0)
 SPEEDS = (1.0, 2.0, 5.0)
 """Starts of a sliding grain, sqrt(d g')."""
+STIFFNESS = 1e4
+"""K d/W of the check decks' grain."""
 UNIT = float(np.sqrt(DIAMETER * GRAVITY))
 """sqrt(d g') of the check decks' grain, m/s."""
 MEETING = 0.1
 """Speed of each of two colliding grains, sqrt(d g')."""
+PUSHES = (1.5, 2.0, 3.0)
+"""Forces on the grain that passes the marker, over that at which it begins to roll."""
+PASSING_DEG, MARKER, PASSING_STIFFNESS = 60.0, 0.3, 1e5
+"""Its entrainment angle, its marker (d), and K d/W: springs of 1e4 would start it 1 % early."""
 LEAST_QUIET = 5.0
 """Holds shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
 
@@ -75,11 +81,14 @@ def has_pivot(scene: Scene) -> bool:
 
 def _cell(scene: Scene) -> pd.DataFrame:
     centres, _ = cells.cell(scene)
-    x, z = centres.T * scene.grain.diameter
+    return _three(centres * scene.grain.diameter, scene.grain.diameter)
+
+
+def _three(centres: Any, diameter: float) -> pd.DataFrame:
+    """Two fixed grains and a mobile one; centres in m, shape (3, 2)."""
+    x, z = centres.T
     kinds = ["fixed", "fixed", "mobile"]
-    return pd.DataFrame(
-        {"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": scene.grain.diameter, "kind": kinds}
-    )
+    return pd.DataFrame({"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": diameter, "kind": kinds})
 
 
 def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
@@ -97,11 +106,13 @@ def checks() -> Iterator[Problem]:
         yield _incline(incline)
     for speed in SPEEDS:
         yield _sliding(speed)
+    for push in PUSHES:
+        yield _passing(push)
 
 
-def _contact(damping: float = 0.1) -> dict[str, Any]:
+def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> dict[str, Any]:
     """The grain of the check decks."""
-    grain = Grain(diameter=DIAMETER, density=DENSITY, damping=damping)
+    grain = Grain(diameter=DIAMETER, density=DENSITY, damping=damping, stiffness=stiffness)
     weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
     return {
         "d_m": DIAMETER,
@@ -146,3 +157,47 @@ def _sliding(speed: float) -> Problem:
     roll_time = 2 * start / (7 * friction * told["reduced_gravity_m_s2"])
     told |= {"speed_m_s": start, "roll_time_s": roll_time, "timestep": 0.02}
     return Problem(2, f"sliding-{speed:g}", "sliding", told, {}, expectations(rows))
+
+
+def _passing(push: float) -> Problem:
+    told = _contact(stiffness=PASSING_STIFFNESS)
+    beta = np.radians(PASSING_DEG)
+    value = passing_time(push, MARKER)
+    asked = expectations([exact("passing_time_over_t", value, CHECK)])
+    told |= {
+        "alpha_deg": 0.0,
+        "beta_deg": PASSING_DEG,
+        "marker": MARKER,
+        "force_n": push * told["weight_n"] / float(np.tan(beta)),
+        "timestep": 0.2,
+    }
+    x, z = float(np.cos(beta)), -float(np.sin(beta))
+    tables = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
+    return Problem(2, f"passing-{push:g}", "passing", told, tables, asked)
+
+
+def passing_time(push: float, marker: float, inertia: float = 0.4) -> float:
+    """Time, sqrt(d/g'), in which a pushed grain rolls by the marker over its neighbour.
+
+    It rolls without slip on a circle of radius d, from rest: the work of the force and of the
+    weight is its energy, (1 + inertia) v^2/2.
+
+    Parameters
+    ----------
+    push : float
+        Force along the level bed over that at which the grain begins to roll.
+    marker : float
+        Displacement along the bed, d; the grain is over its neighbour at cos(beta).
+    inertia : float
+        Moment of inertia over m r^2.
+    """
+    lean = np.pi / 2 - np.radians(PASSING_DEG)
+    force = push * np.tan(lean)
+    # the angle from the vertical is lean - u^2: the speed is proportional to u at the start
+    end = np.sqrt(lean - np.arcsin(np.sin(lean) - marker))
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    u = end * (nodes + 1) / 2
+    angle = lean - u**2
+    work = force * (np.sin(lean) - np.sin(angle)) - (np.cos(angle) - np.cos(lean))
+    speed = np.sqrt(2 * work / (1 + inertia))
+    return float(np.sum(end / 2 * weights * 2 * u / speed))

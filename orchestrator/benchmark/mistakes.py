@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.benchmark import exact
 from orchestrator.physics import closures
 
 CLOSE = 2e-3
 """Relative: a ratio this close to that of a known mistake is taken for it."""
+SOFT = 1e-2
+"""The same where soft springs start a grain early."""
 STEADY = 1e-3
 """Ratios that differ less than this are one factor."""
 FEWEST = 3
@@ -23,11 +26,14 @@ FEW = 0.05
 ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians taken for degrees"}
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""
+MARKERS = (0.1, 0.2, 0.5)
+"""What the marker is taken for, d."""
 GRAVITIES = (9.8, 9.80665, 10.0)
 """What g is taken for, m/s2."""
 DERIVED = ("reynolds", "shields")
 """What follows from the threshold's u*."""
 Told = Mapping[str, Any]
+Bodies = tuple[tuple[float, str], ...]
 
 
 def hint(told: Told, rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
@@ -56,7 +62,7 @@ def _factor(kind: str, told: Told, quantity: str, ratios: Sequence[float]) -> st
     if not max(ratios) - min(ratios) <= STEADY * abs(first):
         return ""
     for ratio, cause in (*_of_kind(kind, told, quantity), *_units()):
-        if abs(first / ratio - 1) < CLOSE:
+        if abs(first / ratio - 1) < (SOFT if kind == "passing" else CLOSE):
             return cause
     if len(ratios) >= FEWEST:
         return f"{100 * (first - 1):+.3g} % at each of {len(ratios)} places: one factor is wrong"
@@ -91,6 +97,19 @@ def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]
         right = math.exp(-zeta / root * (math.pi - 2 * math.asin(zeta)))
         yield math.exp(-zeta / root * math.pi) / right, "the contact pulls before it ends"
         yield 1 / right, "there is no damping"
+    if kind == "passing":
+        yield from _passing(told, bodies)
+
+
+def _passing(told: Told, bodies: Bodies) -> Iterator[tuple[float, str]]:
+    marker = told["marker"]
+    push = told["force_n"] * math.tan(math.radians(told["beta_deg"])) / told["weight_n"]
+    right = exact.passing_time(push, marker)
+    for other in MARKERS:
+        cause = f"a grain counts as moved at {other:g} d, not at {marker:g} d"
+        yield exact.passing_time(push, other) / right, cause
+    for inertia, cause in (*bodies, (0.0, "there is no friction, or the grain does not turn")):
+        yield exact.passing_time(push, marker, inertia) / right, cause
 
 
 def _formula(told: Told, wrong: pd.DataFrame) -> str:

@@ -36,6 +36,7 @@ SAID = {
     "speed at half the time": ("speed_over_start", "0.5"),
     "speed when it rolls": ("speed_over_start", "2"),
     "spin when it rolls": ("spin_over_start", "2"),
+    "time of passing": ("passing_time_over_t", ""),
 }
 """What the check decks print, and what a pack asks."""
 
@@ -81,7 +82,7 @@ class Ours:
         """
         told = self.pack.scenes[name]
         kind = told["kind"]
-        if kind in ("collision", "incline", "sliding"):
+        if kind in ("collision", "incline", "sliding", "passing"):
             return check(kind, told, self.root / "checks")
         scene = self._scene(name.partition("-")[2], kind)
         asked = replace(self.study, groups=(Group("benchmark", (scene,)),))
@@ -143,7 +144,7 @@ def check(kind: str, told: Mapping[str, Any], folder: Path) -> Given:
     Parameters
     ----------
     kind : str
-        ``collision``, ``incline`` or ``sliding``.
+        ``collision``, ``incline``, ``sliding`` or ``passing``.
     told : mapping
         The parameters of the scene.
     folder : Path
@@ -179,6 +180,10 @@ def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
     if kind == "sliding":
         unit = np.sqrt(told["d_m"] * told["reduced_gravity_m_s2"])
         own["speed"] = float(told["speed_m_s"] / unit)
+    if kind == "passing":
+        beta = np.radians(told["beta_deg"])
+        own["push"] = float(told["force_n"] * np.tan(beta) / told["weight_n"])
+        own |= {"marker": told["marker"], "stiffness": told["stiffness"]}
     return own
 
 

@@ -18,7 +18,7 @@ COMMANDS = {
     "lmp": f"{shlex.join([sys.executable, f'{EXAMPLES}/lammps/solve.py'])} {{case}} {{out}}",
     "yade": f"yade -n -x -j1 {shlex.quote(f'{EXAMPLES}/yade/solve.py')} {{case}} {{out}}",
 }
-CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2")
+CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2", "2-passing-2")
 
 
 @pytest.mark.parametrize("program", COMMANDS)
@@ -30,7 +30,7 @@ def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, program: str)
     found = runner.run(all_levels, COMMANDS[program], tmp_path / "results", choice, 300.0)
     assert found.failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
-    assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "pivot", "pile"}
+    assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "passing", "pivot", "pile"}
     assert (verdicts.loc[verdicts["kind"] == "incline", "worst"] < 1e-3).all()
 
 

@@ -59,7 +59,26 @@ OTHER_SCENE = """
 right = solver.closed_form
 solver.KINDS["closed-form"] = lambda scene, case: right({{**scene, {}}}, case)
 """
+PASSING = """
+right = solver.passing
+solver.KINDS["passing"] = lambda scene, case: right({{**scene, {}}}, case)
+"""
 WRONG = {
+    "a criterion of 0.5 d": (
+        PASSING.format("'marker': 0.5") + TAIL,
+        "2-passing-2",
+        "passing_time_over_t .*: a grain counts as moved at 0.5 d, not at 0.3 d",
+    ),
+    "a criterion of 0.1 d": (
+        PASSING.format("'marker': 0.1") + TAIL,
+        "2-passing-1.5",
+        "a grain counts as moved at 0.1 d, not at 0.3 d",
+    ),
+    "a hollow sphere that passes": (
+        "solver.INERTIA = 2 / 3" + TAIL,
+        "2-passing-3",
+        "the inertia of a hollow sphere",
+    ),
     "no lift": (
         "forces = solver.forces\n"
         "solver.forces = lambda scene, u: (forces(scene, u)[0], 0.0)" + TAIL,

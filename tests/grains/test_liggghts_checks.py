@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from orchestrator.benchmark.exact import passing_time
 from tests.conftest import Deck
 
 MU = math.tan(math.radians(35))
@@ -47,3 +48,13 @@ def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
     assert _number(said, "speed at half the time") == pytest.approx(6 / 7, rel=0.01)
     assert _number(said, "speed when it rolls") == pytest.approx(5 / 7, rel=0.01)
     assert _number(said, "spin when it rolls") == pytest.approx(5 / 7, rel=0.01)
+
+
+@pytest.mark.parametrize("push", [1.5, 2.0, 3.0])
+@pytest.mark.parametrize("marker", [0.3, 0.5])
+def test_a_pushed_grain_passes_the_marker_in_time(
+    run_check: Deck, push: float, marker: float
+) -> None:
+    said = run_check("in.passing", push=push, marker=marker)
+    exact = passing_time(push, marker)
+    assert _number(said, "time of passing") == pytest.approx(exact, rel=0.005)
