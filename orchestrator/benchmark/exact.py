@@ -19,6 +19,8 @@ from orchestrator.benchmark.problem import (
 )
 from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
+from orchestrator.study import closed_form as study_form
+from orchestrator.study.closed_form import forces, regime_of
 from orchestrator.study.scene import Grain, Scene
 
 FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
@@ -46,8 +48,8 @@ LEAST_QUIET = 5.0
 def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
     started = time.perf_counter()
-    drag, lift = scene.powers()
-    found = scene.closed_form(scene.closure)
+    drag, lift = forces(scene)
+    found = study_form.closed_form(scene)
     flows = [float(f"{x * float(found.friction_velocity):.4g}") for x in FLOWS]
     rows: list[Row] = []
     for quantity, force in (("drag_n", drag), ("lift_n", lift)):
@@ -65,7 +67,7 @@ def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
 
 def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> Problem:
     """Level 2: one grain on its two neighbours; `ours` is the DEM's threshold, m/s."""
-    threshold = float(scene.closed_form(scene.closure).friction_velocity)
+    threshold = float(study_form.closed_form(scene).friction_velocity)
     # the mean of two holds is within half a step of what lies between them
     half = float(np.sqrt(1 + scene.protocol.step))
     interval = threshold / half, threshold * half
@@ -76,7 +78,7 @@ def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> P
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by holds is the closed form's, and means something."""
-    return scene.regime == scene.closure and scene.protocol.quiet >= LEAST_QUIET
+    return regime_of(scene) == scene.flow.closure and scene.protocol.quiet >= LEAST_QUIET
 
 
 def _cell(scene: Scene) -> pd.DataFrame:

@@ -145,7 +145,11 @@ def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[st
 def label(scene: Scene) -> str:
     """A scene in a few words."""
     assert isinstance(scene.bed, PileBed)
-    words = [f"{scene.bed.slope_deg:g}°", f"d = {1e3 * scene.grain.diameter:g} mm", scene.closure]
+    words = [
+        f"{scene.bed.slope_deg:g}°",
+        f"d = {1e3 * scene.grain.diameter:g} mm",
+        scene.flow.closure,
+    ]
     if scene.bed.packing == "disordered":
         words.append(f"gaps {scene.bed.disorder:g} d")
     return ", ".join(words)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestrator.errors import InputError
+from orchestrator.study.closed_form import resolved
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import PARTS, make_scene
 
@@ -154,4 +155,4 @@ def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> 
         parts[part].pop(field, None)
         if value != DEFAULT:
             parts[part][field] = value
-    return make_scene(parts, where, guarded=False).resolved()
+    return tuple(resolved([make_scene(parts, where, guarded=False)]))

@@ -23,7 +23,7 @@ CHEAP: Above = {"flow": "coarse", "grains": "peeling"}
 def group(scene: Scene) -> str:
     """What the piles of one check have in common."""
     assert isinstance(scene.bed, PileBed)
-    return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.closure}"
+    return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.flow.closure}"
 
 
 def plan(piles: Mapping[str, Pile], tolerance: float) -> dict[str, Pile]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from orchestrator.flow.case import LID_OVER_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
-from orchestrator.physics.closures import KARMAN
+from orchestrator.physics.constants import KARMAN
 from orchestrator.study.scene import PileBed, Scene, UnfitError
 
 

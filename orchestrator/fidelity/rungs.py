@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-from orchestrator.physics import closures
 from orchestrator.runs import assets
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import PileBed, Scene
 
 Part = Literal["flow", "grains"]
@@ -96,7 +96,7 @@ def _shared(scene: Scene) -> Scene:
 def _own_speed(scene: Scene) -> Scene:
     """The flow at the speed at which a single grain of the scene begins to move."""
     assert isinstance(scene.bed, PileBed)
-    ustar = float(scene.closed_form(scene.closure).friction_velocity)
+    ustar = float(closed_form(scene).friction_velocity)
     lid = 10 * scene.bed.height
     speed = ustar / 0.41 * math.log1p(lid / scene.bed.roughness)
     return changed(_solve(40, 1.1)(scene), {"flow.speed": float(f"{speed:.6g}")})
@@ -249,12 +249,9 @@ def is_open(scene: Scene) -> bool:
     )
 
 
-_threshold = cache(closures.threshold)  # thousands of scenes have the same grain
-
-
 def flies(scene: Scene) -> bool:
     """Whether the lift carries a grain before it rolls, which DEM alone shows."""
-    return float(_threshold(scene.closure, **scene.exposed()).lift) >= LIFTS * scene.weight
+    return float(closed_form(scene).lift) >= LIFTS * scene.weight
 
 
 def meaning(part: Part, name: str) -> str:

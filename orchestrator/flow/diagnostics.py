@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.flow.stress import WallStress
-from orchestrator.physics.closures import KARMAN
+from orchestrator.physics.constants import KARMAN
 from orchestrator.runs.files import write_durably
 
 UPSTREAM_OF_TOE = 9.0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.errors import InputError, SolverError
-from orchestrator.physics.closures import log_law_ustar
+from orchestrator.physics.log_law import log_law_ustar
 from orchestrator.runs.files import write_durably
 from orchestrator.solvers.openfoam import read_last_time, read_numbers
 

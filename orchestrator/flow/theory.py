@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
-from orchestrator.physics.closures import KARMAN
+from orchestrator.physics.constants import KARMAN
 
 Array = NDArray[np.float64]
 

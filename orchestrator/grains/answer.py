@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.physics import closures
+from orchestrator.study.closed_form import closed_form, regime_of
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 
@@ -40,7 +41,7 @@ def _length(text: str) -> float | str:
 
 def of(asked: Scene) -> dict[str, Any]:
     """The thresholds by both closures, and which of them holds."""
-    found = {closure: asked.closed_form(closure) for closure in closures.CLOSURES}
+    found = {closure: closed_form(asked, closure) for closure in closures.CLOSURES}
     answer: dict[str, Any] = {
         closure: {
             **{name: float(getattr(threshold, name)) for name in UNITS},
@@ -48,7 +49,7 @@ def of(asked: Scene) -> dict[str, Any]:
         }
         for closure, threshold in found.items()
     }
-    return {**answer, "regime": asked.regime}
+    return {**answer, "regime": regime_of(asked)}
 
 
 def text(answer: Mapping[str, Any]) -> str:

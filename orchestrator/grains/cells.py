@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.runs.files import canonical_json
+from orchestrator.study.closed_form import closed_form, forces
 from orchestrator.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -102,10 +103,10 @@ class CellsCase(GrainCase):
 
     def _forces(self, rising: FloatArray) -> FloatArray:
         """Force on each grain at each flow, shape (flows, 3 cells, 2); on neighbours none."""
-        forces = np.zeros((len(rising), 3 * len(self.scenes), 2))
+        pushes = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
-            forces[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
-        return forces
+            pushes[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
+        return pushes
 
 
 def cell(scene: Scene) -> tuple[FloatArray, FloatArray]:
@@ -126,8 +127,8 @@ def flows(scene: Scene) -> FloatArray:
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
     """Force of the flow on the scene's grain at such flows, N, shape (flows, 2)."""
     _, along = cell(scene)
-    ustar = rising * float(scene.closed_form(scene.closure).friction_velocity)
-    drag, lift = (one(ustar) for one in scene.powers())
+    ustar = rising * float(closed_form(scene).friction_velocity)
+    drag, lift = (one(ustar) for one in forces(scene))
     return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
 
 

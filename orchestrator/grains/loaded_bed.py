@@ -15,6 +15,7 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.loading import Loading
+from orchestrator.study.closed_form import closed_form, forces
 from orchestrator.study.scene import PileBed, Scene
 
 FloatArray = NDArray[np.float64]
@@ -134,7 +135,7 @@ class LoadedBed:
         Exposed grains that may move carry a force.
         """
         pushed = self.packing.mobile & (self.packing.windward | self.packing.lee)
-        drag, lift = self.scene.powers()
+        drag, lift = forces(self.scene)
         return Loading(drag, lift, np.where(pushed, ratio, 0.0), self.tangents, self.normals)
 
     def face(self, cases: Path) -> Face:
@@ -151,7 +152,7 @@ class LoadedBed:
 
         Infinite for grains in flow that runs back.
         """
-        threshold = float(self.scene.closed_form(self.scene.closure).friction_velocity)
+        threshold = float(closed_form(self.scene).friction_velocity)
         return np.where(speed > 0, threshold / np.where(speed > 0, speed, 1), np.inf)
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.study.closed_form import closed_form
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -40,7 +41,7 @@ def of_bed(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
         Local friction velocity over the undisturbed one, signed.
     """
     scene, loading = bed.scene, bed.loading(ratio)
-    alone = float(scene.closed_form(scene.closure).friction_velocity)
+    alone = float(closed_form(scene).friction_velocity)
     found = flows(
         bed.packing.centres,
         loading,

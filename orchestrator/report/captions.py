@@ -219,7 +219,7 @@ def crest(pile: Pile, looks: int) -> str:
 
 def _forces(pile: Pile) -> str:
     ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
-    equation = "Eq. 2" if pile.scene.closure == "low" else "Eq. 4"
+    equation = "Eq. 2" if pile.scene.flow.closure == "low" else "Eq. 4"
     return f"z₀ = {ratio}, {pile.bed.packing} packing, forces of {equation}."
 
 

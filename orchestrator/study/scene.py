@@ -5,15 +5,14 @@ names; everything else is in SI units or, where the comment says so, in units of
 """
 
 import re
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from orchestrator.physics import closures
-from orchestrator.physics.closures import Closure, Regime, Threshold
+from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import weight
 from orchestrator.runs.files import canonical_json, digest_text
 
 Positive = Annotated[float, Field(gt=0)]
@@ -41,7 +40,7 @@ class Fluid(Part):
     """rho_f, kg/m3"""
     viscosity: Positive = 1e-5
     """nu, kinematic, m2/s"""
-    gravity: Positive = closures.GRAVITY
+    gravity: Positive = GRAVITY
     """g, m/s2"""
 
 
@@ -123,9 +122,9 @@ class Flow(Part):
     """OpenFOAM's scheme for the convection of U"""
     correctors: Annotated[int, Field(ge=0, le=5)] = 1
     """of the pressure for cells that are not orthogonal, in each iteration"""
-    closure: Literal["auto", "low", "high"] = "auto"
-    """which of Eqs. 2 and 4 gives the forces; auto: the valid one, or both in the transition"""
-    lift_coefficient: Annotated[float, Field(ge=0)] = closures.LIFT_COEFFICIENT
+    closure: str = "auto"
+    """force law of the grains; auto: the paper's, Eq. 2 or Eq. 4 where each holds, else both"""
+    lift_coefficient: Annotated[float, Field(ge=0)] = LIFT_COEFFICIENT
     """alpha_s"""
     stress: Stress = "wall"
     """the flow's wall stress, or Eq. 10 at the first cell"""
@@ -135,6 +134,14 @@ class Flow(Part):
     forced: Forced = "exposed"
     """exposed grains of a pile that carry the flow's force: all, or without the topmost one, or
     without those on the lowest 5 % of the windward face"""
+
+    @field_validator("closure")
+    @classmethod
+    def _is_known(cls, value: str) -> str:
+        if value not in ("auto", *LAWS):
+            known = ", ".join(("auto", *LAWS))
+            raise UnfitError("flow.closure", f"unknown force law {value!r}", f"known: {known}")
+        return value
 
 
 class Protocol(Part):
@@ -202,7 +209,7 @@ class Scene(Part):
     def weight(self) -> float:
         """Submerged weight W of a grain, N."""
         return float(
-            closures.weight(
+            weight(
                 diameter=self.grain.diameter,
                 density=self.grain.density,
                 fluid_density=self.fluid.density,
@@ -227,66 +234,6 @@ class Scene(Part):
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
         return default_first_cell_height(self.bed.height, self.solve_roughness)
-
-    def closed_form(self, closure: Closure) -> Threshold:
-        """The threshold of one grain of this scene by Eq. 3 or Eq. 5."""
-        return closures.threshold(closure, **self.exposed())
-
-    def exposed(self) -> dict[str, float]:
-        """All that the closed form depends on: arguments of `closures.threshold`."""
-        return {
-            "diameter": self.grain.diameter,
-            "density": self.grain.density,
-            "fluid_density": self.fluid.density,
-            "viscosity": self.fluid.viscosity,
-            "slope_deg": self.bed.slope_deg,
-            "entrainment_angle_deg": self.bed.entrainment_angle_deg,
-            "roughness": self.bed.roughness,
-            "lift_coefficient": self.flow.lift_coefficient,
-            "gravity": self.fluid.gravity,
-        }
-
-    @cached_property
-    def regime(self) -> Regime:
-        """Which closure is valid at the scene's own single-grain threshold."""
-        decide_regimes([self])
-        return self.regime
-
-    @property
-    def closure(self) -> Closure:
-        """The one closure of a resolved scene."""
-        assert self.flow.closure != "auto", "resolve() the scene first"
-        return self.flow.closure
-
-    def resolved(self) -> tuple["Scene", ...]:
-        """The scene with its closure decided; in the transition one scene for each closure."""
-        if self.flow.closure != "auto":
-            return (self,)
-        chosen = closures.CLOSURES if self.regime == "transition" else (self.regime,)
-        flows = (self.flow.model_copy(update={"closure": closure}) for closure in chosen)
-        parts = {name: getattr(self, name) for name in Scene.model_fields}
-        return tuple(Scene(**{**parts, "flow": flow}) for flow in flows)
-
-    def powers(self) -> tuple[closures.Powers, closures.Powers]:
-        """Drag and lift on an exposed grain, as powers of the friction velocity."""
-        where = {
-            "diameter": self.grain.diameter,
-            "roughness": self.bed.roughness,
-            "fluid_density": self.fluid.density,
-            "viscosity": self.fluid.viscosity,
-        }
-        lift = closures.lift(self.closure, **where, lift_coefficient=self.flow.lift_coefficient)
-        return closures.drag(self.closure, **where), lift
-
-
-def decide_regimes(scenes: Sequence[Scene]) -> None:
-    """Find the regimes of many scenes at once, which is a hundred times faster than one by one."""
-    rows = [scene.exposed() for scene in scenes]
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    low, high = (closures.threshold(closure, **columns) for closure in closures.CLOSURES)
-    for scene, regime in zip(scenes, closures.regime(low, high).tolist(), strict=True):
-        # where the cached property looks
-        scene.__dict__["regime"] = regime
 
 
 class UnfitError(ValueError):

@@ -19,11 +19,11 @@ from pydantic import ValidationError
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.fidelity import limits
 from orchestrator.runs import assets
+from orchestrator.study.closed_form import resolved
 from orchestrator.study.scene import (
     PileBed,
     Scene,
     UnfitError,
-    decide_regimes,
     roughness_length,
 )
 
@@ -216,9 +216,7 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> 
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
     scenes = [make_scene(parts, where, guarded=guarded) for parts in _points(tables, grid)]
-    decide_regimes(scenes)
-    for scene in scenes:
-        yield from scene.resolved()
+    yield from resolved(scenes)
 
 
 def _points(

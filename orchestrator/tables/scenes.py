@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from orchestrator.plan import Plan
+from orchestrator.study.closed_form import regime_of
 from orchestrator.study.scene import PileBed, Scene
 from orchestrator.study.study import Study
 
@@ -38,8 +39,8 @@ def point(scene: Scene) -> Row:
         # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
         "z0_over_d": round(scene.bed.roughness / scene.grain.diameter, 9),
         "nu_m2_s": scene.fluid.viscosity,
-        "closure": scene.closure,
-        "regime": scene.regime,
+        "closure": scene.flow.closure,
+        "regime": regime_of(scene),
     }
 
 

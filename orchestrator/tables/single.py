@@ -8,6 +8,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.cells import CellsCase
 from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
@@ -30,7 +31,7 @@ def rows(plan: Plan, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
 
 
 def _row(scene: Scene, bracket: tuple[float, float, float]) -> Row:
-    exact = scene.closed_form(scene.closure)
+    exact = closed_form(scene)
     ustar, shields = float(exact.friction_velocity), float(exact.shields)
     value, low, high = bracket
     return {

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from orchestrator.fidelity import rungs
 from orchestrator.fidelity.rungs import Known, Part
 from orchestrator.study import study
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import PileBed, Scene
 
 
@@ -102,7 +103,7 @@ def test_a_ramp_stays_a_ramp() -> None:
 
 def test_grains_that_fly_before_they_roll_are_left_to_dem() -> None:
     flying = rungs.changed(_scene(slope_deg=20.0), {"flow.closure": "low"})
-    assert flying.closed_form("low").lift > flying.weight
+    assert closed_form(flying, "low").lift > flying.weight
     assert rungs.choose(flying, 0.2).protocol.method == "dem"
 
 

@@ -14,6 +14,7 @@ from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
+from orchestrator.study.closed_form import regime_of
 
 BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
 
@@ -49,7 +50,7 @@ protocol = { step = 0.005 }
 def test_threshold_of_the_pivot_law_in_both_regimes_from_one_run(tmp_path: Path) -> None:
     one = _cells(FIGURE)
     assert len(one.scenes) == 24
-    assert {scene.regime for scene in one.scenes} == {"low", "high"}
+    assert {regime_of(scene) for scene in one.scenes} == {"low", "high"}
     found = threshold.of_grains(_run(one, tmp_path))
     # the deck's flow is the friction velocity over that of the closed form
     np.testing.assert_allclose(found.value, 1.0, atol=0.005)

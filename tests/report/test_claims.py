@@ -14,6 +14,7 @@ from orchestrator.report.claims import base, counting
 from orchestrator.report.claims.base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
 from orchestrator.study import study
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene
 from orchestrator.tables import Tables, scenes
 
@@ -135,7 +136,7 @@ def _parameters(scene: Scene) -> dict[str, object]:
 
 
 def _closed_form(scene: Scene) -> dict[str, float]:
-    found = scene.closed_form(scene.closure)
+    found = closed_form(scene)
     shields, ustar = float(found.shields), float(found.friction_velocity)
     row = dict.fromkeys(("shields_dem", "shields_dem_low", "shields_closed_form"), shields)
     speeds = dict.fromkeys(("ustar_m_s", "ustar_closed_form_m_s"), ustar)

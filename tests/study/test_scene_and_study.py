@@ -7,6 +7,7 @@ import pytest
 from orchestrator.errors import InputError
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import study
+from orchestrator.study.closed_form import regime_of
 from orchestrator.study.scene import Grain, GrainBed, PileBed, Scene
 
 PILE = """
@@ -55,14 +56,14 @@ def test_a_group_overrides_the_tables_at_the_top() -> None:
 
 def test_the_transition_is_run_with_both_closures() -> None:
     found = _parse("[grain]\ndiameter = 2e-4\n")
-    assert [s.closure for s in found.scenes] == ["low", "high"]
-    assert {s.regime for s in found.scenes} == {"transition"}
+    assert [s.flow.closure for s in found.scenes] == ["low", "high"]
+    assert {regime_of(s) for s in found.scenes} == {"transition"}
 
 
 @pytest.mark.parametrize(("d", "nu", "regime"), [(5e-5, 1e-5, "low"), (1e-3, 1e-5, "high")])
 def test_auto_takes_the_valid_closure(d: float, nu: float, regime: str) -> None:
     (scene,) = _parse(f"[grain]\ndiameter = {d}\n[fluid]\nviscosity = {nu}\n").scenes
-    assert (scene.closure, scene.regime) == (regime, regime)
+    assert (scene.flow.closure, regime_of(scene)) == (regime, regime)
 
 
 def test_roughness_as_a_part_of_the_diameter() -> None:

@@ -1,0 +1,127 @@
+"""The closed form of a scene's single grain: its force law, its threshold, the paper's rule.
+
+Thousands of scenes share few grains. Thresholds are found for many of them at once, and each once.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import ForceLaw
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.regime import LAWS_OF, Regime, regime
+from orchestrator.physics.threshold import Threshold, threshold
+from orchestrator.study.scene import Scene
+
+FloatArray = NDArray[np.float64]
+Force = Callable[[ArrayLike], FloatArray]
+"""A force (N) of friction velocities (m/s)."""
+Key = tuple[str, tuple[float, ...]]
+
+PAPER = "auto"
+"""The paper's rule in a study file: Eq. 2 or Eq. 4 where each holds, both in the transition."""
+_KNOWN: dict[Key, Threshold] = {}
+
+
+def law(scene: Scene) -> ForceLaw:
+    """The force law of a resolved scene."""
+    return LAWS[scene.flow.closure]
+
+
+def exposure(scene: Scene) -> Exposure:
+    """What the force on a grain of a scene depends on besides the friction velocity."""
+    return Exposure(
+        scene.grain.diameter,
+        scene.bed.roughness,
+        scene.fluid.density,
+        scene.fluid.viscosity,
+        scene.flow.lift_coefficient,
+    )
+
+
+def forces(scene: Scene) -> tuple[Force, Force]:
+    """Drag and lift on an exposed grain of a resolved scene."""
+    here, there = law(scene), exposure(scene)
+    return partial(here.drag, exposure=there), partial(here.lift, exposure=there)
+
+
+def closed_form(scene: Scene, name: str | None = None) -> Threshold:
+    """The threshold of one grain of a scene; numbers of shape ().
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    name : str, optional
+        A force law; by default the scene's own.
+    """
+    return closed_forms([scene], name or scene.flow.closure)[0]
+
+
+def closed_forms(scenes: Sequence[Scene], name: str) -> list[Threshold]:
+    """The thresholds of many scenes under one force law, a hundred times faster than in turn."""
+    keys = [(name, _grain(scene)) for scene in scenes]
+    new = list(dict.fromkeys(key for key in keys if key not in _KNOWN))
+    if new:
+        columns = np.array([grain for _, grain in new]).T
+        _KNOWN.update(zip(new, _split(_threshold(LAWS[name], *columns)), strict=True))
+    return [_KNOWN[key] for key in keys]
+
+
+def _grain(scene: Scene) -> tuple[float, ...]:
+    """All numbers that the closed form depends on."""
+    return (
+        scene.grain.diameter,
+        scene.bed.roughness,
+        scene.fluid.density,
+        scene.fluid.viscosity,
+        scene.flow.lift_coefficient,
+        scene.grain.density,
+        scene.bed.slope_deg,
+        scene.bed.entrainment_angle_deg,
+        scene.fluid.gravity,
+    )
+
+
+def _threshold(here: ForceLaw, *columns: FloatArray) -> Threshold:
+    *exposed, density, slope_deg, angle_deg, gravity = columns
+    return threshold(
+        here,
+        Exposure(*exposed),
+        density=density,
+        slope_deg=slope_deg,
+        entrainment_angle_deg=angle_deg,
+        gravity=gravity,
+    )
+
+
+def _split(found: Threshold) -> Iterator[Threshold]:
+    columns = [getattr(found, name) for name in Threshold.__dataclass_fields__]
+    return (Threshold(*row) for row in zip(*columns, strict=True))
+
+
+def regime_of(scene: Scene) -> Regime:
+    """Which of Eqs. 2 and 4 holds at a scene's own single-grain threshold."""
+    return cast(Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high"))))
+
+
+def resolved(scenes: Sequence[Scene]) -> Iterator[Scene]:
+    """The scenes with one force law each; by the paper's rule one becomes two in the transition."""
+    asking = [scene for scene in scenes if scene.flow.closure == PAPER]
+    for name in ("low", "high"):
+        closed_forms(asking, name)
+    for scene in scenes:
+        named = scene.flow.closure
+        yield from _under(scene, LAWS_OF[regime_of(scene)] if named == PAPER else (named,))
+
+
+def _under(scene: Scene, names: Iterable[str]) -> Iterator[Scene]:
+    """The scene under each of some force laws."""
+    parts = {part: getattr(scene, part) for part in Scene.model_fields}
+    for name in names:
+        flow = scene.flow.model_copy(update={"closure": name})
+        yield scene if name == scene.flow.closure else Scene(**{**parts, "flow": flow})
