@@ -3,16 +3,14 @@
 import argparse
 import json
 import os
-import signal
 import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from orchestrator import __version__
+from orchestrator import __version__, signals, streams
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.errors import InputError, OrchestratorError, of_system
 from orchestrator.runs.cluster import SYSTEMS, Queue
@@ -32,12 +30,19 @@ NUMBERS: dict[str, tuple[float | None, str]] = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
-    signal.signal(signal.SIGTERM, _as_interrupt)
+    signals.listen()
+    streams.take()
     warnings.showwarning = _show_warning
-    if isinstance(sys.stdout, TextIOWrapper):
-        # the page's path is given as it is, even if it is no text
-        sys.stdout.reconfigure(errors="surrogateescape")
     options = _parser().parse_args(_plain(sys.argv[1:] if arguments is None else arguments))
+    code = _code(options)
+    lost = streams.lost()
+    if lost and not code:
+        print(f"orchestrator: the answer could not be written: {lost.strerror}", file=sys.stderr)
+        return 1
+    return code
+
+
+def _code(options: argparse.Namespace) -> int:
     try:
         return int(options.run(options))
     except OrchestratorError as error:
@@ -46,10 +51,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("orchestrator: stopped; the same command continues", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:
-        # the reader of our output has gone; keep the interpreter's own flush quiet about it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
     except OSError as error:
         print(f"orchestrator: {of_system(error)}", file=sys.stderr)
         return 1
@@ -80,10 +81,6 @@ def _plain(arguments: Sequence[str]) -> list[str]:
         else:
             plain.append(text)
     return plain
-
-
-def _as_interrupt(number: int, frame: object) -> NoReturn:
-    raise KeyboardInterrupt
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -1,7 +1,6 @@
 """The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
 
 import re
-import signal
 import threading
 from dataclasses import dataclass
 from math import cos, radians
@@ -12,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
-from orchestrator.runs import process
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
+
+ARGUMENTS = ["gmsh", "-v", "0", "-no_signal_handler"]
+"""The last is for PETSc, a part of gmsh that would take all signals: a hang-up would end this
+process, even under nohup. The one before keeps gmsh quiet about it."""
 
 _GMSH = threading.Lock()  # gmsh has one global state
 _TOLERANCE = 0.01
@@ -62,9 +64,8 @@ def write_mesh(directory: Path) -> None:
     """
     gmsh = _gmsh()
     with _GMSH:
-        with process.handler_kept(signal.SIGTERM):
-            # the default installs a signal handler, which only the main thread may
-            gmsh.initialize(readConfigFiles=False, interruptible=False)
+        # the default installs a signal handler, which only the main thread may
+        gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
         try:
             _check(_generated(gmsh, directory), directory)
             gmsh.write(str(directory / "pile.msh"))

@@ -78,17 +78,17 @@ def _working_in(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _environment(told: Mapping[str, str | None]) -> Iterator[None]:
-    kept = {name: os.environ.get(name) for name in told}
-    _tell(told)
+def _environment(variables: Mapping[str, str | None]) -> Iterator[None]:
+    kept = {name: os.environ.get(name) for name in variables}
+    _tell(variables)
     try:
         yield
     finally:
         _tell(kept)
 
 
-def _tell(told: Mapping[str, str | None]) -> None:
-    for name, value in told.items():
+def _tell(variables: Mapping[str, str | None]) -> None:
+    for name, value in variables.items():
         if value is None:
             os.environ.pop(name, None)
         else:

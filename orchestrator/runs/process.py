@@ -21,8 +21,6 @@ LAST_LETTERS = 200
 """Most of a log's last line that a message repeats."""
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
-_SIGACTION_BYTES = 512
-"""More than a `struct sigaction` takes on any machine."""
 
 
 @dataclass(frozen=True)
@@ -151,23 +149,10 @@ def _dies_with_its_parent() -> list[str]:
     return [setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []
 
 
-@contextlib.contextmanager
-def handler_kept(number: signal.Signals) -> Iterator[None]:
-    """Undo what a library does to the handler of a signal; gmsh resets that of SIGTERM.
-
-    Python sets handlers in its main thread alone; the C library does in any.
-    """
-    c, kept = ctypes.CDLL(None), ctypes.create_string_buffer(_SIGACTION_BYTES)
-    c.sigaction(number, None, kept)
-    try:
-        yield
-    finally:
-        c.sigaction(number, kept, None)
-
-
 def follow(parent: int) -> None:
     """Make this forked process end with its parent, and leave the signals of a user to that."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:

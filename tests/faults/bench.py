@@ -57,19 +57,38 @@ class Bench:
     drivers: "list[subprocess.Popen[str]]" = field(default_factory=list)
 
     @property
+    def environment(self) -> dict[str, str]:
+        """In which this package is found."""
+        return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+    @property
     def out(self) -> Path:
         """The study's directory."""
         return self.folder / "out"
 
     def start(
-        self, *, programs: Path | None = None, python: Sequence[str] = ("-m", "orchestrator")
+        self,
+        *,
+        programs: Path | None = None,
+        python: Sequence[str] = ("-m", "orchestrator"),
+        under: Sequence[str] = (),
     ) -> "subprocess.Popen[str]":
-        """Start the study's driver; `programs` holds programs that stand before the real ones."""
+        """Start the study's driver.
+
+        Parameters
+        ----------
+        programs : Path, optional
+            Holds programs that stand before the real ones.
+        python : sequence of str
+            What Python runs.
+        under : sequence of str
+            A command that becomes the driver, such as nohup.
+        """
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
         driver = subprocess.Popen(
-            [sys.executable, *python, "study", "small.toml", "--out", str(self.out)],
+            [*under, sys.executable, *python, "study", "small.toml", "--out", str(self.out)],
             cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)},
+            env={**self.environment, "PATH": os.pathsep.join(paths)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -1,8 +1,11 @@
 """Drivers, workers and solvers that are killed, at each stage of a study."""
 
 import contextlib
+import itertools
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -62,18 +65,35 @@ STAGES: dict[str, tuple[Seen, str]] = {
 """For each: how it is seen, and what there is only after its end."""
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+KILL, TERM, INT = signal.SIGKILL, signal.SIGTERM, signal.SIGINT
+HUP, QUIT = signal.SIGHUP, signal.SIGQUIT
+NOHUP = ("nohup",)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "under"),
+    [
+        ([KILL], ()),
+        ([TERM], ()),
+        ([INT], ()),
+        ([HUP], ()),
+        ([QUIT], ()),
+        ([TERM, INT, QUIT], NOHUP),
+    ],
+)
 def test_a_driver_that_is_ended_at_each_stage_in_turn(
-    pile: Bench, ledger: Ledger, number: signal.Signals
+    pile: Bench, ledger: Ledger, numbers: list[signal.Signals], under: tuple[str, ...]
 ) -> None:
     with contextlib.ExitStack() as faults:
-        for stage, (seen, after) in STAGES.items():
-            faults.enter_context(ledger.fault(f"{number.name} to the driver", stage))
+        stages = zip(itertools.cycle(numbers), STAGES.items(), strict=False)
+        for number, (stage, (seen, after)) in stages:
+            name = " ".join([number.name, "to the driver", *(f"under {word}" for word in under)])
+            faults.enter_context(ledger.fault(name, stage))
             # a run that ended before its driver did has to be run again to be seen
             for path in pile.out.glob(after):
                 path.unlink()
             (pile.folder / SINCE).touch()
-            driver = pile.start()
+            driver = pile.start(under=under)
             assert wait_for(partial(seen, pile.out), driver), stage
             driver.send_signal(number)
             code, said = ended(driver)
@@ -84,8 +104,49 @@ def test_a_driver_that_is_ended_at_each_stage_in_turn(
                 assert not list(pile.out.glob(after)), stage
             else:
                 assert code == 130, said
-                assert "the same command continues" in said
+                assert said.count("orchestrator: stopped; the same command continues") == 1
                 assert not (pile.out / "report.json").exists(), stage
+        pile.check_finished()
+
+
+def test_a_hang_up_under_nohup_at_each_stage_ends_nothing(pile: Bench, ledger: Ledger) -> None:
+    with contextlib.ExitStack() as faults:
+        (pile.folder / SINCE).touch()
+        driver = pile.start(under=NOHUP)
+        for stage, (seen, _) in STAGES.items():
+            faults.enter_context(ledger.fault("SIGHUP to the driver under nohup", stage))
+            assert wait_for(partial(seen, pile.out), driver), stage
+            driver.send_signal(HUP)
+        code, said = ended(driver)
+        assert code == 0, said
+        assert "stopped" not in said
+        pile.check_finished()
+
+
+@pytest.mark.parametrize("under", [(), NOHUP])
+def test_a_terminal_that_is_closed(pile: Bench, ledger: Ledger, under: tuple[str, ...]) -> None:
+    with ledger.fault(" ".join(["a closed terminal", *under]), "flow"):
+        master, slave = os.openpty()
+        command = [sys.executable, "-m", "orchestrator", "study", "small.toml", "--out", "out"]
+        driver = subprocess.Popen(
+            ["setsid", "--ctty", *under, *command],
+            cwd=pile.folder,
+            env=pile.environment,
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            text=True,
+        )
+        os.close(slave)
+        assert wait_for(lambda: any(pile.out.glob("cases/flow-*/log.simpleFoam")), driver)
+        os.close(master)
+        assert driver.wait(600) == (0 if under else 130)
+        assert none_left_in(pile.folder)
+        assert (
+            same_tables(pile.out, pile.undisturbed)
+            if under
+            else not (pile.out / "report.html").exists()
+        )
         pile.check_finished()
 
 
