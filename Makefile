@@ -5,7 +5,7 @@ PYTHON = .venv/bin/python
 ARGS =
 
 .DEFAULT_GOAL = help
-.PHONY: help study test test-faults known lint setup lock clean
+.PHONY: help study test test-faults calibration lint setup lock clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
@@ -20,10 +20,10 @@ test: lint  ## lint, then run the tests
 test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
 	$(PYTHON) -m pytest tests/faults $(ARGS)
 
-known: setup  ## measure the ladder and the maps anew, for the package and its docs
+calibration: setup  ## measure the fidelity levels and the maps anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
-	cp results/ladder/tables/rungs.csv results/stability/tables/maps.csv orchestrator/fidelity/known/
+	cp results/ladder/tables/levels.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
 	cp results/ladder/figures/gains.png docs/gains.png
 	cp results/stability/figures/maps.png docs/stability.png

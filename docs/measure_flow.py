@@ -22,7 +22,7 @@ HEIGHT = 0.02
 ROUGHNESS = (3.3e-6, 3.333e-5, 1e-4)
 SLOPES = (10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 GRAIN = 1e-3
-RUNGS = {
+LEVELS = {
     "80 cells a face": {"cells_per_face": 80},
     "40, the standard": {},
     "growth 1.15": {"growth": 1.15},
@@ -115,11 +115,11 @@ def similarity(cases: Path) -> None:
             print(f"| {slope:g} | {roughness:g} | {speed:g} | {mean} | {most} |", flush=True)
 
 
-def rungs(cases: Path) -> None:
+def levels(cases: Path) -> None:
     """Cost of coarser and finer meshes, and what they do to u*^2 on grains of 1 mm."""
     print("\n| mesh | slope | z0, m | cells | iterations | solver, core s | mean | worst grain |")
     print("|---|---|---|---|---|---|---|---|")
-    for name, change_of in RUNGS.items():
+    for name, change_of in LEVELS.items():
         for slope in (15.0, 30.0):
             for roughness in ROUGHNESS:
                 standard = flow(slope, roughness)
@@ -194,5 +194,5 @@ def bare_triangle(slope: float, roughness: float) -> float:
 if __name__ == "__main__":
     folder = Path(sys.argv[1]).absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    for measure in (flat_bed, similarity, rungs, models, hills, meshes):
+    for measure in (flat_bed, similarity, levels, models, hills, meshes):
         measure(folder)

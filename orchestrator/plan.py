@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import checks, rungs
+from orchestrator.fidelity import checks
+from orchestrator.fidelity.decision import Bound, Decision, decide
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
@@ -21,8 +22,8 @@ class Plan:
 
     Attributes
     ----------
-    answers : dict of str to Scene
-        By the id of the scene that was asked for: the scene as it is answered.
+    decisions : dict of str to Decision
+        By the id of the scene that was asked for: how it is answered, and why.
     piles : dict of str to Pile
         By the same id.
     cells : tuple of CellsCase
@@ -33,11 +34,15 @@ class Plan:
         Every run once, by name, a case after those whose results it needs.
     """
 
-    answers: dict[str, Scene]
+    decisions: dict[str, Decision]
     piles: dict[str, Pile]
     cells: tuple[CellsCase, ...]
     checks: dict[str, Pile]
     cases: dict[str, Case]
+
+    def runs(self, asked: str) -> tuple[Case, ...]:
+        """The cases that the answer to a pile is read from; none for a single grain."""
+        return self.piles[asked].runs if asked in self.piles else ()
 
     def done(
         self, directory: Path, names: Iterable[str] | None = None
@@ -52,74 +57,84 @@ class Plan:
         return {one.name: state for one, state in zip(asked, states, strict=True) if state}
 
 
-def make(study: Study, escalated: Mapping[str, Mapping[rungs.Part, str]] | None = None) -> Plan:
-    """The cases that a study needs.
+def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
+    """Decide how each scene of a study is answered, and list the cases that it needs.
 
     Parameters
     ----------
     study : Study
-        With a tolerance, each scene is answered on the cheapest rungs that are known to meet it.
-    escalated : mapping, optional
-        By scene id: rungs that turned out to be not good enough.
+        With a tolerance, each scene is answered on the cheapest levels that are known to meet it.
+    above : mapping, optional
+        By scene id: levels that turned out to be not good enough.
 
     Raises
     ------
     InputError
         If a scene asks for a flow that cannot be solved; with the study and the field.
     """
-    tolerance, above = study.tolerance, escalated or {}
-    if tolerance is None:
-        return of({scene.id: scene for scene in study.scenes}, study.name)
-    chosen = {
-        scene.id: rungs.choose(scene, tolerance, above=above.get(scene.id))
-        for scene in study.scenes
+    bounds = above or {}
+    decisions = {
+        scene.id: decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
     }
-    return of(chosen, study.name, tolerance)
+    return of(decisions, study.name, study.tolerance)
 
 
-def of(answers: Mapping[str, Scene], name: str, tolerance: float | None = None) -> Plan:
-    """The cases that answer some scenes; `name` names the study in messages.
+def of(decisions: Mapping[str, Decision], name: str, tolerance: float | None = None) -> Plan:
+    """List the cases that some decisions need; `name` names the study in messages.
 
     With a tolerance, answers without DEM are checked by it.
     """
-    piles = {
-        asked: Pile(scene) for asked, scene in answers.items() if isinstance(scene.bed, PileBed)
-    }
-    grains = (scene for scene in answers.values() if not isinstance(scene.bed, PileBed))
+    checked = checks.decisions(decisions, tolerance, _cost_s) if tolerance else {}
+    piles, check_piles = _piles(decisions), _piles(checked)
+    grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
-    checked = checks.plan(piles, tolerance) if tolerance else {}
     try:
-        ordered = [run for pile in (*piles.values(), *checked.values()) for run in pile.runs]
+        ordered = [run for pile in (*piles.values(), *check_piles.values()) for run in pile.runs]
     except InputError as error:
         place = f"{name}: {error.where}"
         raise InputError(error.what, where=place, remedy=error.remedy) from None
-    return Plan(dict(answers), piles, cells, checked, _in_order([*ordered, *cells]))
+    return Plan(dict(decisions), piles, cells, check_piles, _in_order([*ordered, *cells]))
+
+
+def _piles(decisions: Mapping[str, Decision]) -> dict[str, Pile]:
+    return {
+        asked: Pile(one.scene)
+        for asked, one in decisions.items()
+        if isinstance(one.scene.bed, PileBed)
+    }
+
+
+def _cost_s(scene: Scene) -> float:
+    return Pile(scene).case.cost_s
 
 
 def settled(study: Study, directory: Path) -> Plan:
-    """The plan after what the runs say: dearer rungs where one failed or DEM overrules it."""
-    escalated: dict[str, checks.Above] = {}
+    """The plan after what the runs say: dearer levels where one failed or DEM overrules it."""
+    above: dict[str, Bound] = {}
     while True:
-        planned = make(study, escalated)
+        planned = make(study, above)
         if study.tolerance is None:
             return planned
-        done = planned.done(directory)
-        more = {
-            **_failed(planned, directory),
-            **checks.overruled(planned.piles, planned.checks, study.tolerance, directory, done),
-        }
+        more = {**_failed(planned, directory), **_overruled(planned, study.tolerance, directory)}
         if not more:
             return planned
-        escalated |= more
+        above |= more
 
 
-def _failed(planned: Plan, directory: Path) -> dict[str, checks.Above]:
-    """The piles that were not asked for as they are and whose runs failed, with their rungs."""
+def _failed(planned: Plan, directory: Path) -> dict[str, Bound]:
+    """The piles that are not answered as they were asked and whose runs failed."""
     return {
-        asked: rungs.names(pile.scene)
-        for asked, pile in planned.piles.items()
-        if pile.scene.id != asked and any(failure(directory / run.name) for run in pile.runs)
+        asked: Bound(decision.levels, f"a run on {decision.levels_text} failed")
+        for asked, decision in planned.decisions.items()
+        if not decision.is_as_asked
+        and any(failure(directory / run.name) for run in planned.runs(asked))
     }
+
+
+def _overruled(planned: Plan, tolerance: float, directory: Path) -> dict[str, Bound]:
+    done = planned.done(directory)
+    found = (planned.decisions, planned.piles, planned.checks)
+    return checks.overruled(*found, tolerance, directory, done)
 
 
 def _in_order(cases: Iterable[Case]) -> dict[str, Case]:

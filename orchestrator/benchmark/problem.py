@@ -119,7 +119,7 @@ def parameters(scene: Scene, row: Mapping[str, Any]) -> dict[str, Any]:
     row : mapping
         Its row in the study's table of scenes: whatever that table says goes into the pack.
     """
-    hidden = ("scene_id", "group", "case", "flow_case", "bed")
+    hidden = ("scene_id", "group", "case", "flow_case", "bed", "why")
     told = {k: v for k, v in row.items() if k not in hidden and v is not None and v == v}
     grain = scene.grain
     return told | mechanics(

@@ -1,1 +1,1 @@
-"""Experiments on the method itself: what a rung costs and how far it is off, and where it fails."""
+"""Experiments on the method: what a fidelity level costs, how far it is off, where it fails."""

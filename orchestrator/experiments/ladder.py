@@ -1,6 +1,6 @@
-"""The ladder: what each rung costs, and how far its thresholds are from the dearest ones'.
+"""The ladder: what each level costs, and how far its thresholds are from the dearest ones'.
 
-Every scene is answered on many pairs of rungs. The grains' rungs are run on the reference's flow,
+Every scene is answered on many pairs of levels. The grains' levels are run on the reference's flow,
 the flow's with the grains by peeling, so that each error is that of one part; a few pairs as they
 are used show that the errors add up.
 """
@@ -16,8 +16,9 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.experiments import naive
-from orchestrator.fidelity import rungs
-from orchestrator.fidelity.rungs import Part, Rung
+from orchestrator.fidelity import calibration, decision, levels
+from orchestrator.fidelity.decision import Decision
+from orchestrator.fidelity.levels import LEVELS, Level, Part
 from orchestrator.grains.threshold import of_pile
 from orchestrator.plan import Plan
 from orchestrator.study.scene import PileBed, Scene
@@ -25,15 +26,16 @@ from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
 
 Pair = tuple[str, str]
-"""Names of a flow's and of a grains' rung."""
+"""Names of a level of the flow and of one of the grains."""
 Row = dict[str, Any]
+WHY = "the ladder measures these levels"
 
 REFERENCE: Pair = ("fine", "reference")
 AGAIN: Pair = ("fine", "soft reference")
 """The same with every number of the grains' run changed: the reference's own uncertainty."""
 FINER: Pair = ("finest", "peeling")
 BESIDE = "peeling"
-"""The grains' rung beside which the flow's are measured."""
+"""The grains' level beside which the flow's are measured."""
 USED: tuple[Pair, ...] = (
     ("hill", "pivot"),
     ("hill", "peeling"),
@@ -50,7 +52,7 @@ CURVE = np.arange(0.05, 0.86, 0.05)
 
 @dataclass(frozen=True)
 class Key:
-    """One scene on one pair of rungs."""
+    """One scene on one pair of levels."""
 
     scene: Scene
     pair: Pair
@@ -62,7 +64,7 @@ class Key:
 
 
 def keys(study: Study) -> Iterator[Key]:
-    """What the ladder runs: every pile of a study on its pairs of rungs."""
+    """What the ladder runs: every pile of a study on its pairs of levels."""
     for scene in study.scenes:
         if isinstance(scene.bed, PileBed):
             yield from (Key(scene, pair) for pair in dict.fromkeys(_pairs(scene)))
@@ -77,28 +79,26 @@ def _pairs(scene: Scene) -> Iterator[Pair]:
         yield from USED
 
 
-def _affordable(part: Part, scene: Scene) -> Iterator[Rung]:
+def _affordable(part: Part, scene: Scene) -> Iterator[Level]:
     assert isinstance(scene.bed, PileBed)
     face = scene.bed.height / math.sin(math.radians(scene.bed.slope_deg))
-    for one in rungs.LADDER[part]:
+    for one in LEVELS[part]:
         if one.on_lattices and scene.bed.packing == "disordered":
             continue
         if one.most_grains is None or face / scene.grain.diameter <= one.most_grains:
             yield one
 
 
-def answers(study: Study) -> dict[str, Scene]:
-    """The scenes of the ladder as they are answered, by their keys."""
-    return {key.text: _answer(key) for key in keys(study)}
-
-
-def _answer(key: Key) -> Scene:
-    flow, grains = key.pair
-    return rungs.rung("grains", grains).of(rungs.rung("flow", flow).of(key.scene))
+def answers(study: Study) -> dict[str, Decision]:
+    """How the scenes of the ladder are answered, by their keys."""
+    return {
+        key.text: decision.on_levels(key.scene, dict(zip(LEVELS, key.pair, strict=True)), WHY)
+        for key in keys(study)
+    }
 
 
 def fast(study: Study) -> str:
-    """Key of the first pile by DEM on the rung that the naive route is beside."""
+    """Key of the first pile by DEM on the level that the naive route is beside."""
     return next(k.text for k in keys(study) if k.pair == (REFERENCE[0], naive.FAST))
 
 
@@ -125,11 +125,11 @@ def _point(key: Key, planned: Plan, cases: Path, states: Mapping[str, Mapping[st
         **point(key.scene),
         "packing": pile.bed.packing,
         "asked": key.scene.protocol.method,
-        **{f"like_{part}": rungs.likeness(part, key.scene) for part in rungs.LADDER},
+        **{f"class_{part}": calibration.scene_class(part, key.scene) for part in LEVELS},
         "count": motion.count,
-        "flow_rung": key.pair[0],
-        "grain_rung": key.pair[1],
-        "same_model": rungs.rung("flow", key.pair[0]).same_model,
+        "flow_level": key.pair[0],
+        "grain_level": key.pair[1],
+        "same_model": levels.level("flow", key.pair[0]).same_model,
         "flow_s": sum(states[run.name]["cpu_s"] for run in pile.model.cases),
         "grains_s": own + sum(states[r.name]["cpu_s"] for r in pile.method.cases),
     }

@@ -1,4 +1,4 @@
-"""What a study's speed costs in accuracy: rungs of cheaper models against the dearest one."""
+"""What a study's speed costs in accuracy: cheaper fidelity levels against the dearest ones."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -31,27 +31,26 @@ REFERENCE: Look = {"color": "0.88", "lw": 0}
 MEASURED: Look = {"fc": "#0072b2", "ec": "#0072b2", "lw": 0.8}
 EXTRAPOLATED: Look = {"fc": "white", "ec": "#0072b2", "lw": 0.8, "hatch": "////"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
-RUNG = ["flow_rung", "grain_rung"]
+PAIR = ["flow_level", "grain_level"]
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
 """How the grains were answered; colours that are told apart by all."""
 UNITS = {"years": 3.156e7, "days": 86400.0, "h": 3600.0, "min": 60.0}
-NOTHING = "no rung has been run"
+NOTHING = "no pair of levels has been run"
 
 
-def against_cost(rungs: pd.DataFrame) -> Canvas:
+def against_cost(pairs: pd.DataFrame) -> Canvas:
     """The largest error over the fractions against the cost, a panel for each packing.
 
     Parameters
     ----------
-    rungs : DataFrame
-        A row for each rung and scene: scene, packing, flow_rung, grain_rung; cost_core_s, s of
-        one core; error_10 … error_70 and error_curve, relative and signed, of the threshold
-        stress at a fraction and of the whole curve, NaN where it is not reached;
-        reference_error, how well the reference itself is known; same_model, whether the
-        turbulence model is the reference's; pareto, whether no other rung is both cheaper and
-        better.
+    pairs : DataFrame
+        A row for each pair of levels and scene: scene, packing, flow_level, grain_level;
+        cost_core_s, s of one core; error_10 … error_70 and error_curve, relative and signed, of
+        the threshold stress at a fraction and of the whole curve, NaN where it is not reached;
+        reference_error, how well the reference itself is known; same_model, whether the turbulence
+        model is the reference's; pareto, whether no other pair is both cheaper and better.
     """
-    table = _marked(rungs)
+    table = _marked(pairs)
     parts = [_worst(part) for _, part in split(table, "packing")]
     figure = style.canvas(2.6 * len(parts) + 0.06 * table["number"].nunique() + 1.0)
     axes = list(figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0])
@@ -64,7 +63,7 @@ def against_cost(rungs: pd.DataFrame) -> Canvas:
         ax.set_ylabel("largest error of $τ_c$, %")
     axes[-1].set_xlabel("cost, s of one core")
     _scales(axes, axes, parts)
-    front = [Line2D([], [], label="no rung is cheaper and better", **FRONT)]
+    front = [Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)]
     looks = [*_look_entries(parts), *(front if table["pareto"].any() else [])]
     style.legends(figure, _method_entries(table), [*_key(table), *looks])
     figure.draw_without_rendering()  # tags are written into a finished layout
@@ -73,14 +72,14 @@ def against_cost(rungs: pd.DataFrame) -> Canvas:
     return figure
 
 
-def by_fraction(rungs: pd.DataFrame) -> Canvas:
+def by_fraction(pairs: pd.DataFrame) -> Canvas:
     """The error at each fraction and of the whole curve against the cost.
 
-    Rungs on the front of `against_cost` are numbered.
+    Pairs on the front of `against_cost` are numbered.
 
     The columns are those of `against_cost`; a row of panels for each packing.
     """
-    table = _marked(rungs)
+    table = _marked(pairs)
     packings = [part for _, part in split(table, "packing")]
     figure = style.canvas(1.7 * len(packings) + 0.06 * table["number"].nunique() + 1.3)
     grid = figure.subplots(
@@ -155,13 +154,13 @@ def _rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}".replace(",", " ") if value >= 10 else f"{value:.2g}"
 
 
-def _marked(rungs: pd.DataFrame) -> pd.DataFrame:
-    """With a number and a name for each rung, in the order in which they come, and its method."""
-    parts = [column for column in RUNG if rungs[column].nunique() > 1] or RUNG[-1:]
-    return rungs.assign(
-        number=rungs.groupby(RUNG, sort=False).ngroup() + 1,
-        name=rungs[parts].astype(str).agg(", ".join, axis=1) if len(rungs) else "",
-        method=[name if name in METHODS else "DEM" for name in rungs["grain_rung"]],
+def _marked(pairs: pd.DataFrame) -> pd.DataFrame:
+    """With a number and a name for each pair, in the order in which they come, and its method."""
+    parts = [column for column in PAIR if pairs[column].nunique() > 1] or PAIR[-1:]
+    return pairs.assign(
+        number=pairs.groupby(PAIR, sort=False).ngroup() + 1,
+        name=pairs[parts].astype(str).agg(", ".join, axis=1) if len(pairs) else "",
+        method=[name if name in METHODS else "DEM" for name in pairs["grain_level"]],
     )
 
 
@@ -172,15 +171,15 @@ def _worst(rows: pd.DataFrame) -> pd.DataFrame:
     largest = np.abs(np.where(known, errors, 0)).argmax(axis=1)
     error = np.take_along_axis(errors, largest[:, None], axis=1)[:, 0]
     found = rows.assign(error=error, complete=known.all(axis=1))
-    of_rung = found["error"].abs().groupby(found["number"]).transform("max")
-    return found.assign(worst=found["error"].abs() == of_rung)
+    of_pair = found["error"].abs().groupby(found["number"]).transform("max")
+    return found.assign(worst=found["error"].abs() == of_pair)
 
 
 def _one(rows: pd.DataFrame, column: str) -> pd.DataFrame:
     """With one of the errors as the one to be drawn."""
     found = rows.assign(error=rows[column], complete=True)
-    of_rung = found["error"].abs().groupby(found["number"]).transform("max")
-    return found.assign(worst=found["error"].abs() == of_rung)
+    of_pair = found["error"].abs().groupby(found["number"]).transform("max")
+    return found.assign(worst=found["error"].abs() == of_pair)
 
 
 def _shown(rows: pd.DataFrame) -> pd.DataFrame:
@@ -197,7 +196,7 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
 def _points(ax: Axes, rows: pd.DataFrame) -> None:
     shown = _shown(rows)
     for _, own in split(shown, "number"):
-        ax.plot(own["x"], own["y"], color="0.75", lw=0.6, zorder=1, gid="rung")
+        ax.plot(own["x"], own["y"], color="0.75", lw=0.6, zorder=1, gid="pair")
     for (method, marker, same, worst), own in split(
         shown, "method", "marker", "same_model", "worst"
     ):
@@ -225,7 +224,7 @@ def _title(rows: pd.DataFrame) -> str:
 
 
 def _left_out(ax: Axes, rows: pd.DataFrame) -> None:
-    """Say which rungs have no place in a panel, and why."""
+    """Say which pairs have no place in a panel, and why."""
     texts = []
     for why, which in (
         ("cost not measured", rows["cost_core_s"].isna()),
@@ -269,7 +268,7 @@ def _empty(ax: Axes) -> None:
 
 
 def _write_tags(ax: Axes, rows: pd.DataFrame, size: float, text: Callable[[Any], str]) -> None:
-    """Tag each rung that has a text."""
+    """Tag each pair that has a text."""
     shown = _shown(rows)
     worst = shown[shown["worst"]].drop_duplicates("number").sort_values("x")
     found = [Tag(text(row), row.x, row.y, METHODS[row.method]) for row in _each(worst)]

@@ -3,7 +3,7 @@
 Every grain of the pile is mobile and explicit, and each Re* is a run of its own that settles the
 bed and holds the flow. It is measured on a small pile, with few flows, and extrapolated: the time
 of a run is that of a hold, in proportion to the grains; the runs are as many as the holds by which
-the fast rung finds the same curve.
+the fast level finds the same curve.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,8 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import rungs
+from orchestrator.fidelity import levels
+from orchestrator.fidelity.decision import Decision, as_asked
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.study.scene import PileBed, Scene
@@ -23,7 +24,7 @@ from orchestrator.study.study import Study
 FEW = {"protocol.step": 0.2, "protocol.quiet": 10.0, "protocol.timestep": 0.2}
 """Few holds, at the time step that is safe, on which the time of one is measured."""
 FAST = "1 layer, fast"
-"""The rung that the routes are beside; the name of its own row."""
+"""The level that the routes are beside; the name of its own row."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Route:
 
 def routes(scene: Scene) -> tuple[Route, Route]:
     """With softened contacts, and with the paper's K = 1e6 N/m."""
-    paper = 1e6 * scene.grain.diameter / scene.weight
+    paper = levels.paper_stiffness(scene)
     return Route("every Re* alone, K d/W = 1e4", 1e4), Route("every Re* alone, K = 1e6 N/m", paper)
 
 
@@ -58,15 +59,15 @@ def small(study: Study) -> Scene:
     return piles[min(piles)]
 
 
-def answers(scene: Scene) -> dict[str, Scene]:
-    """The scenes to run: by the route's name."""
-    return {route.name: measured(scene, route) for route in routes(scene)}
+def answers(scene: Scene) -> dict[str, Decision]:
+    """The scenes to run, by the route's name."""
+    return {route.name: as_asked(measured(scene, route)) for route in routes(scene)}
 
 
 def measured(scene: Scene, route: Route) -> Scene:
     """The scene on one route."""
-    whole = rungs.rung("grains", "full pile, fast").of(scene)
-    return rungs.changed(whole, {**FEW, "grain.stiffness": route.stiffness})
+    whole = levels.level("grains", "full pile, fast").answer(scene)
+    return levels.changed(whole, {**FEW, "grain.stiffness": route.stiffness})
 
 
 def costs(
@@ -79,7 +80,7 @@ def costs(
     piles : mapping
         The finished runs of the small pile, by route.
     fast : Pile
-        The pile in question, on the fast rung, finished.
+        The pile in question, on the fast level, finished.
     cases : Path
         Where they lie.
     seconds : mapping
@@ -90,7 +91,7 @@ def costs(
     # the dearest first: the others are compared with it
     for name, pile in reversed(list(piles.items())):
         holds = len(Motion.from_csv(cases / pile.case.name).flow) - 1
-        whole = Pile(rungs.rung("grains", "full pile, fast").of(fast.scene))
+        whole = Pile(levels.level("grains", "full pile, fast").answer(fast.scene))
         grains = whole.packing.mobile.sum() / pile.packing.mobile.sum()
         rows.append(
             {

@@ -10,7 +10,7 @@ from orchestrator.experiments import ladder_figures as ladder
 from orchestrator.experiments import map_figures as maps
 from orchestrator.experiments.maps import Map
 from orchestrator.experiments.stability import WRONG
-from orchestrator.fidelity import limits, rungs
+from orchestrator.fidelity import levels, limits
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
@@ -22,8 +22,8 @@ ERROR_COLUMNS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
 def write_ladder(
     tables: Mapping[str, pd.DataFrame], file: Path, programs: Mapping[str, str]
 ) -> None:
-    """Write the page of the ladder: points, rungs and naive routes."""
-    sections = list(_ladder(tables["points"], tables["rungs"], tables["naive"]))
+    """Write the page of the ladder: points, levels and naive routes."""
+    sections = list(_ladder(tables["points"], tables["levels"], tables["naive"]))
     experiment.write("Speed against accuracy", sections, file, programs)
 
 
@@ -31,7 +31,7 @@ def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> 
     by_dem = together(points[points["asked"] == "dem"])
     yield Section(
         "Speed against accuracy",
-        "Every scene is answered on many pairs of rungs, one for the flow and one for the grains. "
+        "Every scene is answered on many pairs of levels, one for the flow and one for the grains. "
         "The error is that of tau_c at 10, 30, 50 and 70 % of the grains, against the dearest pair "
         "with the same model choices; the cost is processor time, of the flow's solve and of the "
         "grains' run together. No pair on the step line is beaten in both by another.\n\n"
@@ -55,12 +55,12 @@ def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> 
         "One explicit run of the whole pile for each Re*, at K d/W = 1e4 and at the paper's "
         "K = 1e6 N/m with the time step that it forces. The time of a hold is measured on a small "
         "pile; the pile of the figure has more grains, in proportion to which it is extrapolated, "
-        "and needs as many runs as the fast rung has holds.",
+        "and needs as many runs as the fast level has holds.",
         (Figure("gains", "Factors gained", "", (), ladder.gains(routes)),),
         (experiment.sheet(routes),),
     )
     yield Section(
-        "The rungs, and what is known of them",
+        "The fidelity levels, and what is known of them",
         "The largest error over the scenes of a kind, %, without the reference's own uncertainty. "
         "From this table `study --tolerance` chooses.",
         tables=(experiment.sheet(_meanings()), experiment.sheet(_wide(known))),
@@ -80,7 +80,7 @@ _CAPTION = (
 
 def together(points: pd.DataFrame) -> pd.DataFrame:
     """One row for each pair and packing: the mean cost, the largest errors with their signs."""
-    groups = points.groupby(["packing", "flow_rung", "grain_rung"], sort=False)
+    groups = points.groupby(["packing", "flow_level", "grain_level"], sort=False)
     table = groups[list(ERROR_COLUMNS)].agg(_worst)
     table = table.assign(
         scene=[f"{count} piles" for count in groups.size()],
@@ -94,10 +94,10 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
 
 def _means(rows: pd.DataFrame) -> pd.DataFrame:
     """The rows of `together` for people: errors in %."""
-    table = rows[["packing", "flow_rung", "grain_rung", "scene", "cost_core_s"]]
+    table = rows[["packing", "flow_level", "grain_level", "scene", "cost_core_s"]]
     table = table.assign(**{name: 100 * rows[name] for name in ERROR_COLUMNS})
     heads = {name: f"{name.removeprefix('error_')} %" for name in ERROR_COLUMNS}
-    heads |= {"cost_core_s": "core-s", "flow_rung": "flow", "grain_rung": "grains", "scene": "of"}
+    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains", "scene": "of"}
     return table.rename(columns=heads).sort_values(["packing", "core-s"])
 
 
@@ -108,22 +108,24 @@ def _worst(values: pd.Series) -> float:
 
 def _meanings() -> pd.DataFrame:
     rows = [
-        {"part": part, "rung": one.name, "what it is": one.meaning}
-        for part, listed in rungs.LADDER.items()
+        {"part": part, "level": one.name, "what it is": one.meaning}
+        for part, listed in levels.LEVELS.items()
         for one in listed
     ]
     return pd.DataFrame(rows)
 
 
 def _wide(known: pd.DataFrame) -> pd.DataFrame:
-    """A row for each rung and kind of scene, a column for each fraction, %."""
-    order = {one.name: place for place, one in enumerate((*rungs.FLOW, *rungs.GRAINS))}
-    index = ["part", "like", "rung", "scenes", "cost_core_s"]
+    """A row for each level and kind of scene, a column for each fraction, %."""
+    order = {one.name: place for place, one in enumerate((*levels.FLOW, *levels.GRAINS))}
+    index = ["part", "scene_class", "level", "scenes", "cost_core_s"]
     table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
     table.columns = pd.Index([f"{fraction:.0%}" for fraction in table.columns])
     table = table.reset_index()
-    table = table.assign(place=table["rung"].map(order)).sort_values(["part", "like", "place"])
-    heads = {"like": "kind of scene", "cost_core_s": "core-s"}
+    table = table.assign(place=table["level"].map(order)).sort_values(
+        ["part", "scene_class", "place"]
+    )
+    heads = {"scene_class": "class of scene", "cost_core_s": "core-s"}
     return table.drop(columns="place").rename(columns=heads)
 
 

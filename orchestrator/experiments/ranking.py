@@ -1,4 +1,4 @@
-"""What the ladder's points say: errors against the dearest rungs, the front, what is known."""
+"""What the ladder's points say: errors against the dearest levels, the front, what is known."""
 
 import math
 from collections.abc import Hashable, Iterator
@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.experiments.ladder import AGAIN, BESIDE, FINER, REFERENCE
-from orchestrator.fidelity.rungs import Part
+from orchestrator.fidelity.levels import Part
 from orchestrator.report.results import split
 
 Row = dict[str, Any]
@@ -32,7 +32,7 @@ def _columns(table: pd.DataFrame, start: str) -> list[str]:
 
 
 def _against(own: pd.DataFrame) -> pd.DataFrame:
-    pairs = list(zip(own["flow_rung"], own["grain_rung"], strict=True))
+    pairs = list(zip(own["flow_level"], own["grain_level"], strict=True))
     by_pair = dict(zip(pairs, own.index, strict=True))
     by_dem = REFERENCE in by_pair
     dearest, again = (REFERENCE, AGAIN) if by_dem else ((REFERENCE[0], BESIDE), FINER)
@@ -60,11 +60,11 @@ def with_front(table: pd.DataFrame) -> pd.DataFrame:
     rows = table.assign(worst=worst)[table["same_model"] & (table["asked"] == "dem")]
     front: set[tuple[Hashable, ...]] = set()
     for (packing,), own in split(rows, "packing"):
-        pairs = own.groupby(["flow_rung", "grain_rung"])
+        pairs = own.groupby(["flow_level", "grain_level"])
         both = pairs.agg({"cost_core_s": "mean", "worst": _largest})
         names = both[_undominated(both.to_numpy(float))].index
         front |= {(packing, *name) for name in names}
-    columns = (table[name] for name in ("packing", "flow_rung", "grain_rung"))
+    columns = (table[name] for name in ("packing", "flow_level", "grain_level"))
     return table.assign(pareto=[key in front for key in zip(*columns, strict=True)])
 
 
@@ -85,32 +85,32 @@ def _undominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def known(found: pd.DataFrame) -> pd.DataFrame:
-    """What is known of each rung, for each kind of scene and fraction: `rungs.known` reads it.
+    """What is known of each level, by class of scene and fraction; `calibration` reads it.
 
     The error is the largest over the scenes, infinite where one of the two did not reach the
     fraction; the uncertainty is how far the reference itself moved on scenes of that kind.
     """
-    grains = found[(found["flow_rung"] == REFERENCE[0]) & (found["asked"] == "dem")]
-    flow = found[(found["grain_rung"] == BESIDE) & found["same_model"]]
+    grains = found[(found["flow_level"] == REFERENCE[0]) & (found["asked"] == "dem")]
+    flow = found[(found["grain_level"] == BESIDE) & found["same_model"]]
     rows = [
-        *_known("grains", "grain_rung", grains, REFERENCE[1], AGAIN[1]),
-        *_known("flow", "flow_rung", flow, REFERENCE[0], FINER[0]),
+        *_known("grains", "grain_level", grains, REFERENCE[1], AGAIN[1]),
+        *_known("flow", "flow_level", flow, REFERENCE[0], FINER[0]),
     ]
-    return pd.DataFrame(rows).sort_values(["part", "rung", "like", "fraction"])
+    return pd.DataFrame(rows).sort_values(["part", "level", "scene_class", "fraction"])
 
 
 def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
-    for like, alike in table.groupby(f"like_{part}", sort=True):
-        by_rung = {rung: rows.set_index("scene_id") for rung, rows in alike.groupby(name)}
-        for rung, rows in by_rung.items():
+    for scene_class, alike in table.groupby(f"class_{part}", sort=True):
+        by_level = {level: rows.set_index("scene_id") for level, rows in alike.groupby(name)}
+        for level, rows in by_level.items():
             for column in _columns(table, TAU):
                 yield {
                     "part": part,
-                    "rung": rung,
-                    "like": like,
+                    "level": level,
+                    "scene_class": scene_class,
                     "fraction": float(column[len(TAU) :]),
-                    "error": _shift(rows, by_rung[dearest], column),
-                    "uncertainty": _shift(by_rung.get(again), by_rung[dearest], column),
+                    "error": _shift(rows, by_level[dearest], column),
+                    "uncertainty": _shift(by_level.get(again), by_level[dearest], column),
                     "cost_core_s": float(rows[f"{part}_s"].mean()),
                     "scenes": len(rows),
                 }

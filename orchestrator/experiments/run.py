@@ -18,7 +18,7 @@ from orchestrator.study.study import TIME_LIMIT_S, Study
 
 
 def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
-    """Measure what each rung costs and how far it is off, on the piles of a study.
+    """Measure what each level costs and how far it is off, on the piles of a study.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
         found = ladder.points(study, planned, space.cases, states)
         tables = {
             "points": ranking.with_front(ranking.errors(found)),
-            "rungs": ranking.known(found),
+            "levels": ranking.known(found),
             "naive": naive.costs(
                 {name: planned.piles[name] for name in beside},
                 planned.piles[ladder.fast(study)],

@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.experiments.maps import Map, Run
+from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
@@ -70,13 +71,13 @@ class Answers:
 
 def plan(maps: list[Map]) -> Plan:
     """The runs of some maps, those that they share once."""
-    scenes = {
-        scene.id: scene
+    decisions = {
+        scene.id: as_asked(scene)
         for one in maps
         for run in one.runs
         for scene in (*run.scenes, *(run.references if one.judge == "pile" else ()))
     }
-    return of(scenes, "stability")
+    return of(decisions, "stability")
 
 
 def judge(one: Map, answers: Answers) -> pd.DataFrame:

@@ -1,23 +1,23 @@
-"""Piles by DEM that check the cheap answers of a study with a tolerance.
+"""Piles by DEM that check the answers without DEM of a study with a tolerance.
 
-Of the piles of each slope, packing and closure that were answered without DEM, the one that DEM
-answers fastest is answered by it as well, on a flow that is not a cheap one either. Where the two
-differ by more than the tolerance, all of them go to dearer rungs.
+Of the piles of each slope, packing and closure that the tool chose to answer without DEM, the one
+that DEM answers fastest is answered by it as well, on a flow that is not a cheap one either. Where
+the two differ by more than the tolerance, all of them go to dearer levels.
 """
 
 import math
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.fidelity import rungs
+from orchestrator.fidelity.decision import Bound, Decision, decide
+from orchestrator.fidelity.levels import changed
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.study.scene import PileBed, Scene
 
-Above = Mapping[rungs.Part, str]
-CHEAP: Above = {"flow": "coarse", "grains": "peeling"}
-"""The dearest rungs that need a check; it is made on dearer ones."""
+CHEAP = Bound({"flow": "coarse", "grains": "peeling"}, "it checks answers without DEM")
+"""The dearest levels that need a check; it is made on dearer ones."""
 
 
 def group(scene: Scene) -> str:
@@ -26,25 +26,48 @@ def group(scene: Scene) -> str:
     return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.flow.closure}"
 
 
-def plan(piles: Mapping[str, Pile], tolerance: float) -> dict[str, Pile]:
-    """The checks of piles that are answered without DEM; by the id of the scene asked for."""
-    groups: dict[str, list[tuple[float, str, Pile]]] = {}
-    for asked, pile in piles.items():
-        if pile.scene.protocol.method != "dem":
-            by_dem = Pile(_by_dem(pile.scene, tolerance))
-            groups.setdefault(group(pile.scene), []).append((by_dem.case.cost_s, asked, by_dem))
+def decisions(
+    answers: Mapping[str, Decision], tolerance: float, cost_s: Callable[[Scene], float]
+) -> dict[str, Decision]:
+    """Decide on the checks of the piles that the tool chose to answer without DEM.
+
+    Parameters
+    ----------
+    answers : mapping of str to Decision
+        By the id of the scene asked for.
+    tolerance : float
+        Relative error of tau_c.
+    cost_s : callable
+        Expected wall time of a pile by DEM, s.
+
+    Returns
+    -------
+    dict of str to Decision
+        By the id of the scene asked for whose answer it checks.
+    """
+    groups: dict[str, list[tuple[float, str, Decision]]] = {}
+    for asked, answer in answers.items():
+        if _needs_check(answer):
+            check = _by_dem(answer.scene, tolerance)
+            member = (cost_s(check.scene), asked, check)
+            groups.setdefault(group(answer.scene), []).append(member)
     cheapest = (min(members, key=lambda one: one[:2]) for members in groups.values())
-    return {asked: pile for _, asked, pile in cheapest}
+    return {asked: check for _, asked, check in cheapest}
 
 
-def _by_dem(scene: Scene, tolerance: float) -> Scene:
-    asked = rungs.changed(scene, {"protocol.method": "dem", "flow.model": "solve"})
-    return rungs.choose(asked, tolerance, above=CHEAP)
+def _needs_check(answer: Decision) -> bool:
+    is_pile = isinstance(answer.scene.bed, PileBed)
+    return is_pile and not answer.is_as_asked and answer.scene.protocol.method != "dem"
+
+
+def _by_dem(scene: Scene, tolerance: float) -> Decision:
+    asked = changed(scene, {"protocol.method": "dem", "flow.model": "solve"})
+    return decide(asked, tolerance, CHEAP)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A cheap answer and DEM's, at one fraction of one pile."""
+    """An answer without DEM and DEM's, at one fraction of one pile."""
 
     cheap: PileThreshold
     dem: PileThreshold
@@ -54,8 +77,8 @@ class Comparison:
 def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator[Comparison]:
     """Compare a pile's two answers at each fraction, from the finished cases.
 
-    They agree where the cheap one lies in the interval of DEM, widened by the tolerance, or where
-    neither reaches the fraction.
+    They agree where the one without DEM lies in the interval of DEM, widened by the tolerance, or
+    where neither reaches the fraction.
     """
     density = cheap.scene.fluid.density
     answers = [(pile.motion(cases), pile.face(cases).speed) for pile in (cheap, check)]
@@ -78,20 +101,21 @@ def ready(
 
 
 def overruled(
+    answers: Mapping[str, Decision],
     piles: Mapping[str, Pile],
     checks: Mapping[str, Pile],
     tolerance: float,
     cases: Path,
     done: Container[str],
-) -> dict[str, Above]:
-    """For each pile of a group whose check disagrees, the rungs that are not good enough."""
+) -> dict[str, Bound]:
+    """For each pile of a group whose check disagrees, the levels that are not good enough."""
     lost = {
         group(piles[asked].scene)
         for asked, check in ready(piles, checks, done).items()
         if not all(one.agree for one in compare(piles[asked], check, tolerance, cases))
     }
     return {
-        asked: rungs.names(pile.scene)
-        for asked, pile in piles.items()
-        if pile.scene.protocol.method != "dem" and group(pile.scene) in lost
+        asked: Bound(answer.levels, f"DEM overruled {answer.levels_text}")
+        for asked, answer in answers.items()
+        if _needs_check(answer) and group(answer.scene) in lost
     }

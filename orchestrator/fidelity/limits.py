@@ -1,7 +1,7 @@
 """Where the methods hold: what a study refuses, and what it is warned of.
 
 Each limit was read off a map of `orchestrator stability`, which runs scenes beyond it; the map's
-table lies in ``known/maps.csv``.
+table lies in ``calibration/maps.csv``.
 """
 
 import warnings

@@ -8,7 +8,7 @@ from platform import python_version
 import pandas as pd
 
 from orchestrator import __version__
-from orchestrator.fidelity import rungs as ladder
+from orchestrator.fidelity import levels as fidelity
 from orchestrator.report import labels
 from orchestrator.report.results import Results, by_dem, held, split, valid, varying
 from orchestrator.runs.case import IDENTITY
@@ -264,30 +264,25 @@ def _stray_grains(results: Results) -> list[str]:
     return found
 
 
-def rungs(results: Results) -> Sheet | None:
-    """On which rungs of the ladder the piles were answered, and what is known of them."""
-    table = results.tables.get("pile_threshold", pd.DataFrame())
+def levels(results: Results) -> Sheet | None:
+    """On which fidelity levels the piles were answered, why, and what is known of them."""
+    table = results.joined("pile_threshold")
     if table.empty:
         return None
     rows = []
-    for (flow, grains), own in split(table, "flow_rung", "grain_rung"):
+    for (flow, grains, why), own in split(table, "flow_level", "grain_level", "why"):
         known = own["error_estimate"].max()
         rows.append(
             (
                 f"{flow} | {grains}",
-                _meaning(str(flow), str(grains)),
+                fidelity.meaning({"flow": str(flow), "grains": str(grains)}),
+                str(why),
                 str(own["scene_id"].nunique()),
                 "not known" if pd.isna(known) else f"{100 * known:.1f} %",
             )
         )
-    return Sheet(
-        ("flow | grains", "what they are", "piles", "known error of τ_c, up to"), tuple(rows)
-    )
-
-
-def _meaning(flow: str, grains: str) -> str:
-    meanings = (ladder.meaning("flow", flow), ladder.meaning("grains", grains))
-    return "; ".join(text for text in meanings if text)
+    head = ("flow | grains", "what they are", "why", "piles", "known error of τ_c, up to")
+    return Sheet(head, tuple(rows))
 
 
 def checks(results: Results) -> Sheet | None:

@@ -50,7 +50,7 @@ def render(
         case_count=len(results.plan.cases),
         piles=facts.piles(results),
         single_grains=facts.single_grains(results),
-        rungs=facts.rungs(results),
+        levels=facts.levels(results),
         checks=facts.checks(results),
         remarks=facts.remarks(results, failures),
         card=claims.card(judged, [figure.name for figure, _ in figures]),

@@ -22,11 +22,6 @@ def presets() -> Path:
     return PACKAGE / "study" / "presets"
 
 
-def known() -> Path:
-    """The folder of what the ladder and the maps found."""
-    return PACKAGE / "fidelity" / "known"
-
-
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
     *("log.*", "postProcessing", "polyMesh", "settling.csv", "levels.csv", "*.dump"),

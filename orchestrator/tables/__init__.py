@@ -29,7 +29,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     piled = ((flow.name, pile) for pile in plan.piles.values() for flow in pile.model.cases)
     flows = {name: pile for name, pile in piled if name in done}
     ready = [
-        piles.Answer.read(scene_id, pile, cases)
+        piles.Answer.read(plan.decisions[scene_id], pile, cases)
         for scene_id, pile in plan.piles.items()
         if all(one.name in done for one in pile.runs)
     ]
@@ -53,7 +53,7 @@ def _checks(
 ) -> Iterator[dict[str, Any]]:
     if study.tolerance is not None:
         ready = checks.ready(plan.piles, plan.checks, done)
-        yield from piles.check_rows(plan.piles, ready, study.tolerance, cases)
+        yield from piles.check_rows(plan.decisions, plan.piles, ready, study.tolerance, cases)
 
 
 def _concat(frames: Iterable[pd.DataFrame]) -> pd.DataFrame:

@@ -1,6 +1,5 @@
 """The tables of piles: the stress on them, their grains, their answer to the flow."""
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.fidelity import checks, rungs
+from orchestrator.fidelity import checks
+from orchestrator.fidelity.decision import Decision
 from orchestrator.grains import threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
@@ -23,15 +23,20 @@ from orchestrator.tables.scenes import Row, point
 class Answer:
     """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
-    scene_id: str
+    decision: Decision
     pile: Pile
     motion: Motion
     face: Face
 
     @classmethod
-    def read(cls, scene_id: str, pile: Pile, cases: Path) -> "Answer":
+    def read(cls, decision: Decision, pile: Pile, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
-        return cls(scene_id, pile, pile.motion(cases), pile.face(cases))
+        return cls(decision, pile, pile.motion(cases), pile.face(cases))
+
+    @property
+    def scene_id(self) -> str:
+        """Id of the scene that was asked for."""
+        return self.decision.asked.id
 
 
 def wall_stress(piles: Iterable[Pile], cases: Path) -> Iterator[pd.DataFrame]:
@@ -102,7 +107,6 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
     pile, motion, speed = answer.pile, answer.motion, answer.face.speed
     scene = pile.scene
     pivot = pile.pivot_thresholds(speed)
-    rung, error = rungs.names(scene), rungs.error(scene)
     for fraction in scene.protocol.fractions:
         found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
         yield {
@@ -112,7 +116,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "stress": scene.flow.stress,
             "fraction": fraction,
             "shields": _shields(scene, found.tau),
-            **_interval(scene, found, error),
+            **_interval(scene, found, answer.decision.error_estimate or 0.0),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
@@ -120,36 +124,41 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
             "share_carried_off": found.carried_off,
-            "flow_rung": rung["flow"],
-            "grain_rung": rung["grains"],
-            "error_estimate": error if math.isfinite(error) else None,
+            **_levels(answer.decision),
+            "error_estimate": answer.decision.error_estimate,
             "case": pile.runs[-1].name if pile.runs else None,
         }
 
 
+def _levels(decision: Decision) -> Row:
+    return {"flow_level": decision.levels["flow"], "grain_level": decision.levels["grains"]}
+
+
 def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
-    """What the holds and the count enclose; at least the known error of the rungs."""
-    known = error if math.isfinite(error) else 0.0
+    """What the holds and the count enclose; at least the known error of the levels."""
     return {
-        "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - known))),
-        "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + known))),
+        "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - error))),
+        "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + error))),
     }
 
 
 def check_rows(
-    cheap: Mapping[str, Pile], check: Mapping[str, Pile], tolerance: float, cases: Path
+    decisions: Mapping[str, Decision],
+    cheap: Mapping[str, Pile],
+    check: Mapping[str, Pile],
+    tolerance: float,
+    cases: Path,
 ) -> Iterator[Row]:
     """The piles that DEM checked: both answers at each fraction."""
     for asked, pile in check.items():
-        scene, rung = cheap[asked].scene, rungs.names(cheap[asked].scene)
+        scene = cheap[asked].scene
         for one in checks.compare(cheap[asked], pile, tolerance, cases):
             yield {
                 "scene_id": asked,
                 **point(scene),
                 "packing": pile.bed.packing,
                 "fraction": one.cheap.fraction,
-                "flow_rung": rung["flow"],
-                "grain_rung": rung["grains"],
+                **_levels(decisions[asked]),
                 "shields": _shields(scene, one.cheap.tau),
                 "shields_dem": _shields(scene, one.dem.tau),
                 "shields_dem_low": _shields(scene, one.dem.tau_low),

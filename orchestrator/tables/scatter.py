@@ -31,7 +31,7 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
 
 def _twins(scenes: pd.DataFrame) -> pd.Series:
     """A number that scenes share which differ in the seed alone."""
-    same = [name for name in scenes if name not in ("group", "seed", "case")]
+    same = [name for name in scenes if name not in ("group", "seed", "why", "case")]
     return scenes.groupby(same, dropna=False).ngroup()
 
 

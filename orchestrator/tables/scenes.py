@@ -16,7 +16,8 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
     cell_of = {scene.id: one.name for one in plan.cells for scene in one.scenes}
     for group in study.groups:
         for asked in group.scenes:
-            scene, pile = plan.answers[asked.id], plan.piles.get(asked.id)
+            decision, pile = plan.decisions[asked.id], plan.piles.get(asked.id)
+            scene = decision.scene
             runs = [one.name for one in pile.runs] if pile else [cell_of.get(scene.id)]
             yield {
                 "scene_id": asked.id,
@@ -25,6 +26,7 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
                 **point(scene),
                 **_choices(scene),
                 "method": scene.protocol.method,
+                "why": decision.why,
                 "case": runs[-1] if scene.protocol.method == "dem" else None,
                 "flow_case": pile.flow.name if pile and pile.model.cases else None,
             }

@@ -23,7 +23,8 @@ def rows(plan: Plan, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
         for scene, bracket, fallen in zip(one.scenes, brackets, motion.fallen > 0, strict=True):
             row = _row(scene, bracket)
             measured[scene.id] = {**row, "fell_upstream": bool(fallen), "case": one.name}
-    for asked, scene in plan.answers.items():
+    for asked, decision in plan.decisions.items():
+        scene = decision.scene
         if scene.id in measured:
             yield {"scene_id": asked, **measured[scene.id]}
         elif asked not in plan.piles and scene.protocol.method != "dem":

@@ -19,8 +19,8 @@ FLOWS, GRAINS = ("fine", "medium", "coarse"), ("stiff", "soft", "pivot")
 
 
 @pytest.fixture
-def rungs() -> pd.DataFrame:
-    """Nine rungs of three scenes; errors rise by threes as the cost falls by threes."""
+def pairs() -> pd.DataFrame:
+    """Nine pairs of levels of three scenes; errors rise by threes as the cost falls by threes."""
     rows = []
     for scene, packing in (("15°", "aligned"), ("30°", "aligned"), ("15°", "disordered")):
         for number, (flow, grain) in enumerate(product(FLOWS, GRAINS)):
@@ -28,7 +28,7 @@ def rungs() -> pd.DataFrame:
             errors = dict(zip((*ladder.ERRORS, "error_curve"), error * np.arange(5), strict=True))
             rows.append(
                 {
-                    "scene": scene, "packing": packing, "flow_rung": flow, "grain_rung": grain,
+                    "scene": scene, "packing": packing, "flow_level": flow, "grain_level": grain,
                     "cost_core_s": 3e3 / 3.0**number, **errors, "reference_error": 0.002,
                     "same_model": flow != "coarse", "pareto": number % 2 == 0,
                 }
@@ -50,9 +50,9 @@ def tags(ax: Axes) -> list[Annotation]:
     return [t for t in ax.texts if isinstance(t, Annotation) and t.get_gid() == "tag"]
 
 
-def test_points_are_the_largest_errors(rungs: pd.DataFrame) -> None:
-    figure = ladder.against_cost(rungs)
-    for ax, (packing, rows) in zip(figure.axes, rungs.groupby("packing"), strict=True):
+def test_points_are_the_largest_errors(pairs: pd.DataFrame) -> None:
+    figure = ladder.against_cost(pairs)
+    for ax, (packing, rows) in zip(figure.axes, pairs.groupby("packing"), strict=True):
         assert ax.get_title("left").startswith(str(packing))
         expected = set(zip(rows["cost_core_s"], 3 * rows["error_30"].abs(), strict=True))
         assert sorted(points(ax)) == [pytest.approx(pair) for pair in sorted(expected)]
@@ -66,9 +66,9 @@ def test_points_are_the_largest_errors(rungs: pd.DataFrame) -> None:
     assert hollow == [False] * 6 + [True] * 3
 
 
-def test_each_error_has_a_panel_of_its_own(rungs: pd.DataFrame) -> None:
-    figure = ladder.by_fraction(rungs)
-    rows = rungs[rungs["packing"] == "disordered"]
+def test_each_error_has_a_panel_of_its_own(pairs: pd.DataFrame) -> None:
+    figure = ladder.by_fraction(pairs)
+    rows = pairs[pairs["packing"] == "disordered"]
     for ax, column in zip(figure.axes[5:], ladder.HEADS, strict=True):
         expected = rows[column].abs().clip(lower=ladder.FLOOR).tolist()
         assert [y for _, y in sorted(points(ax), reverse=True)] == pytest.approx(expected)
@@ -90,14 +90,14 @@ def assert_apart(figure: Canvas) -> int:
     return boxes
 
 
-def test_texts_cover_nothing(rungs: pd.DataFrame) -> None:
-    assert assert_apart(ladder.against_cost(rungs)) == 18
-    crowd = rungs.assign(cost_core_s=100 + rungs.index.to_numpy() % 9)
+def test_texts_cover_nothing(pairs: pd.DataFrame) -> None:
+    assert assert_apart(ladder.against_cost(pairs)) == 18
+    crowd = pairs.assign(cost_core_s=100 + pairs.index.to_numpy() % 9)
     assert assert_apart(ladder.against_cost(crowd)) == 18
 
 
-def test_what_is_not_known_has_no_place(rungs: pd.DataFrame) -> None:
-    one = rungs[rungs["packing"] == "disordered"].reset_index(drop=True)
+def test_what_is_not_known_has_no_place(pairs: pd.DataFrame) -> None:
+    one = pairs[pairs["packing"] == "disordered"].reset_index(drop=True)
     one.loc[0, "cost_core_s"] = np.nan
     one.loc[1, list(ladder.ERRORS)] = np.nan
     one.loc[2, "error_70"] = np.nan
@@ -112,9 +112,9 @@ def test_what_is_not_known_has_no_place(rungs: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("draw", [ladder.against_cost, ladder.by_fraction])
-def test_a_ladder_without_rungs_says_so(rungs: pd.DataFrame, draw: type, tmp_path: Path) -> None:
-    unknown = rungs.assign(cost_core_s=np.nan)
-    for table in (rungs.iloc[:0], unknown):
+def test_a_ladder_without_pairs_says_so(pairs: pd.DataFrame, draw: type, tmp_path: Path) -> None:
+    unknown = pairs.assign(cost_core_s=np.nan)
+    for table in (pairs.iloc[:0], unknown):
         figure = draw(table)
         assert ladder.NOTHING in [text.get_text() for text in figure.axes[0].texts]
         assert style.save(figure, tmp_path, "empty").startswith(b"\x89PNG")

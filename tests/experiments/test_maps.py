@@ -9,13 +9,12 @@ import pytest
 from orchestrator import pipeline
 from orchestrator.errors import InputError
 from orchestrator.experiments import maps, stability
-from orchestrator.fidelity import limits
-from orchestrator.runs import assets
+from orchestrator.fidelity import calibration, limits
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
 ALL = maps.load_all()
-KNOWN = assets.known() / "maps.csv"
+MAPS = calibration.FOLDER / "maps.csv"
 
 SMALL = """
 title = "Small"
@@ -114,7 +113,7 @@ def test_a_study_whose_answer_is_merely_worse_is_warned(
 
 
 def _runs(name: str) -> pd.DataFrame:
-    table = pd.read_csv(KNOWN)
+    table = pd.read_csv(MAPS)
     return table[table["map"] == name]
 
 
@@ -126,7 +125,7 @@ def test_the_time_steps_that_are_allowed_were_good_on_the_map() -> None:
 
 
 def test_what_blows_up_on_the_map_was_noticed_by_the_run_itself() -> None:
-    table = pd.read_csv(KNOWN)
+    table = pd.read_csv(MAPS)
     bad = table[table["verdict"].isin(stability.VERDICTS)]
     assert len(bad) > 20
     assert bad["caught"].all()

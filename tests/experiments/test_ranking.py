@@ -17,11 +17,11 @@ def _point(pair: tuple[str, str], factor: float = 1.0, **other: Any) -> dict[str
         "scene_id": "a",
         "packing": "aligned",
         "asked": "dem",
-        "like_flow": "wall",
-        "like_grains": "aligned",
+        "class_flow": "wall",
+        "class_grains": "aligned",
         "same_model": True,
-        "flow_rung": pair[0],
-        "grain_rung": pair[1],
+        "flow_level": pair[0],
+        "grain_level": pair[1],
         "flow_s": 1.0,
         "grains_s": 1.0,
         **{name: factor * value for name, value in TAU.items()},
@@ -43,7 +43,7 @@ def _table() -> pd.DataFrame:
 
 
 def test_errors_are_relative_to_the_dearest_pair() -> None:
-    found = ranking.errors(_table()).set_index(["flow_rung", "grain_rung"])
+    found = ranking.errors(_table()).set_index(["flow_level", "grain_level"])
     assert found.loc[REFERENCE, "error_10"] == pytest.approx(0.0)
     assert found.loc[(REFERENCE[0], BESIDE), "error_50"] == pytest.approx(-0.02)
     assert found.loc[(REFERENCE[0], "1 layer, fast"), "error_curve"] == pytest.approx(0.03)
@@ -56,13 +56,13 @@ def test_a_fraction_that_was_not_reached_has_no_error() -> None:
         [_table(), pd.DataFrame([_point((REFERENCE[0], "pivot"), **{"tau_0.5": math.nan})])]
     )
     found = ranking.errors(table.reset_index(drop=True))
-    assert found[found["grain_rung"] == "pivot"]["error_50"].isna().all()
+    assert found[found["grain_level"] == "pivot"]["error_50"].isna().all()
 
 
 def test_the_front_holds_what_nothing_beats_in_both() -> None:
     found = ranking.with_front(ranking.errors(_table()))
     on_front = found[found["pareto"]]
-    front = set(zip(on_front["flow_rung"], on_front["grain_rung"], strict=True))
+    front = set(zip(on_front["flow_level"], on_front["grain_level"], strict=True))
     assert ("coarse", BESIDE) in front
     assert REFERENCE in front
     assert (REFERENCE[0], "1 layer, fast") not in front  # dearer and worse than peeling
@@ -70,7 +70,7 @@ def test_the_front_holds_what_nothing_beats_in_both() -> None:
 
 
 def test_known_errors_stand_beside_the_references_own_uncertainty() -> None:
-    found = ranking.known(_table()).set_index(["part", "rung", "fraction"])
+    found = ranking.known(_table()).set_index(["part", "level", "fraction"])
     assert found.loc[("grains", BESIDE, 0.1), "error"] == pytest.approx(0.02)
     assert found.loc[("grains", BESIDE, 0.1), "uncertainty"] == pytest.approx(0.01)
     assert found.loc[("grains", REFERENCE[1], 0.1), "error"] == pytest.approx(0.0)
@@ -81,7 +81,7 @@ def test_known_errors_stand_beside_the_references_own_uncertainty() -> None:
 
 def test_what_only_one_of_two_reaches_is_infinitely_off() -> None:
     table = _table()
-    table.loc[table["grain_rung"] == "1 layer, fast", "tau_0.5"] = math.nan
-    found = ranking.known(table).set_index(["part", "rung", "fraction"])
+    table.loc[table["grain_level"] == "1 layer, fast", "tau_0.5"] = math.nan
+    found = ranking.known(table).set_index(["part", "level", "fraction"])
     assert found.loc[("grains", "1 layer, fast", 0.5), "error"] == math.inf
     assert found.loc[("grains", "1 layer, fast", 0.1), "error"] == pytest.approx(0.03)

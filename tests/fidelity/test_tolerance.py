@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli, pipeline
-from orchestrator.fidelity import rungs
-from orchestrator.fidelity.rungs import Known
+from orchestrator.fidelity import calibration, decision
+from orchestrator.fidelity.calibration import Known
+from orchestrator.fidelity.levels import LEVELS
 from orchestrator.study import study
 
 PILES = """
@@ -34,8 +35,16 @@ bed = {{ height = 0.012 }}
 """
 
 
-def _run(packing: str, out: Path) -> dict[str, pd.DataFrame]:
-    asked = study.parse(PILES.format(packing=packing), name="piles", where="test")
+BY_HAND = """
+[[group]]
+name = "asked for by the pivot"
+bed = { height = 0.008 }
+protocol = { method = "pivot" }
+"""
+
+
+def _run(packing: str, out: Path, more: str = "") -> dict[str, pd.DataFrame]:
+    asked = study.parse(PILES.format(packing=packing) + more, name="piles", where="test")
     finished = pipeline.run(asked, out, workers=2)
     assert not finished.failures
     return {path.stem: pd.read_csv(path) for path in (out / "tables").glob("*.csv")}
@@ -44,8 +53,9 @@ def _run(packing: str, out: Path) -> dict[str, pd.DataFrame]:
 def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     tables = _run("aligned", tmp_path)
     found, check = tables["pile_threshold"], tables["check"]
-    assert set(found["grain_rung"]) <= {"pivot", "peeling"}
+    assert set(found["grain_level"]) <= {"pivot", "peeling"}
     assert (found["error_estimate"] <= 0.2).all()
+    assert set(tables["scenes"]["why"]) == {"cheapest within the tolerance"}
     # the smaller of the two piles stands for both
     assert check["scene_id"].nunique() == 1
     assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
@@ -56,22 +66,27 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     assert (half >= found["error_estimate"] - 1e-9).all()
 
 
-def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_rung(
+def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # told that the pivot of each grain is good for level rows, which it is not
-    wrong = {
+    wrong: dict[tuple[str, str, str], dict[float, Known]] = {
         (part, one.name, like): {0.5: Known(0.01, 0.0, cost)}
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
-        for cost, one in enumerate(rungs.LADDER[part])  # type: ignore[index]
+        for cost, one in enumerate(LEVELS[part])  # type: ignore[index]
         if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
     }
-    monkeypatch.setattr(rungs, "known", lambda: wrong)
-    monkeypatch.setattr(rungs, "_cheapest", rungs._cheapest.__wrapped__)
-    tables = _run("horizontal", tmp_path)
-    found = tables["pile_threshold"]
-    assert "pivot" not in set(found["grain_rung"])
+    monkeypatch.setattr(calibration, "measured", lambda: wrong)
+    monkeypatch.setattr(decision, "_cheapest", decision._cheapest.__wrapped__)
+    tables = _run("horizontal", tmp_path, BY_HAND)
+    found = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])
+    by_hand = found["group"] == "asked for by the pivot"
+    assert "pivot" not in set(found[~by_hand]["grain_level"])
     assert found["shields"].notna().any()
+    assert found[~by_hand]["why"].str.contains("DEM overruled coarse | pivot", regex=False).all()
+    # what the study itself wants without DEM stays, and is not checked
+    assert set(found[by_hand]["grain_level"]) == {"pivot"}
+    assert not set(found[by_hand]["scene_id"]) & set(tables["check"]["scene_id"])
 
 
 def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(

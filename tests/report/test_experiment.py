@@ -21,7 +21,7 @@ def written(tmp_path: Path) -> Path:
         canvas = style.canvas(1.0)
         canvas.subplots().plot([0, 1])
         figures.append(Figure(name, f"The {name}", f"What <{name}> shows.", (), canvas))
-    table = pd.DataFrame({"rung": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
+    table = pd.DataFrame({"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
     sections = [
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
         Section("Found", "", figures[1:], [experiment.sheet(table)], ["No more than <this>."]),

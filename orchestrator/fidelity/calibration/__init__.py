@@ -1,0 +1,108 @@
+"""Calibration data: the known errors of the fidelity levels, by class of scene.
+
+``levels.csv`` holds what ``orchestrator ladder`` measured against the dearest levels, ``maps.csv``
+what ``orchestrator stability`` found.
+"""
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, reduce
+from operator import add
+from pathlib import Path
+
+from orchestrator.fidelity.levels import Levels, Part
+from orchestrator.study.scene import PileBed, Scene
+
+FOLDER = Path(__file__).parent
+DISORDERS = (0.02, 0.05, 0.2)
+"""Sizes of disorder up to which errors are known together, d."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a level, or of one for each part, on a class of scenes at a fraction.
+
+    Attributes
+    ----------
+    error : float
+        Largest relative error of tau_c against the reference.
+    uncertainty : float
+        How far the reference itself moved when its numbers were changed.
+    cost_core_s : float
+        Mean core-seconds of a scene.
+    """
+
+    error: float
+    uncertainty: float
+    cost_core_s: float
+
+    def __add__(self, other: "Known") -> "Known":
+        return Known(
+            self.error + other.error,
+            self.uncertainty + other.uncertainty,
+            self.cost_core_s + other.cost_core_s,
+        )
+
+    @property
+    def total(self) -> float:
+        """Error and uncertainty together."""
+        return self.error + self.uncertainty
+
+
+UNKNOWN = Known(math.inf, 0.0, math.inf)
+
+
+def scene_class(part: Part, scene: Scene) -> str:
+    """The class of scenes that share the known error of a level.
+
+    The flow's depends on how the stress is read, the grains' on their packing; both on whether the
+    slope is the limiting one, on which a row waits for a touch.
+    """
+    assert isinstance(scene.bed, PileBed)
+    ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
+    if part == "flow":
+        return scene.flow.stress + ending
+    packing: str = scene.bed.packing
+    if packing == "disordered":
+        size = next(size for size in DISORDERS if scene.bed.disorder <= size)
+        packing = f"disordered up to {size:g} d"
+    return packing + ending
+
+
+def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:
+    """What is known of a level for each part at each fraction; errors of the parts add up.
+
+    Parameters
+    ----------
+    levels, classes : mapping
+        By part: the level's name, and the class of the scene.
+    fractions : sequence of float
+        n/N.
+    """
+    return [
+        reduce(add, (known_at(part, name, classes[part], at) for part, name in levels.items()))
+        for at in fractions
+    ]
+
+
+def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known:
+    """What is known of one level at a fraction; infinite errors where nothing is."""
+    rows = measured().get((part, level, scene_class), {})
+    if fraction in rows or not rows:
+        return rows.get(fraction, UNKNOWN)
+    # between the fractions that were measured the worst of them has to do
+    return max(rows.values(), key=lambda row: row.error)
+
+
+@cache
+def measured() -> dict[tuple[str, str, str], dict[float, Known]]:
+    """What was measured, by part, level and class of scene, then by fraction."""
+    found: dict[tuple[str, str, str], dict[float, Known]] = {}
+    with (FOLDER / "levels.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            key = (row["part"], row["level"], row["scene_class"])
+            numbers = (float(row[name]) for name in ("error", "uncertainty", "cost_core_s"))
+            found.setdefault(key, {})[float(row["fraction"])] = Known(*numbers)
+    return found

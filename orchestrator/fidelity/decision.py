@@ -1,0 +1,196 @@
+"""The decision how a scene is answered: its fidelity levels, their known error, the reason."""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from orchestrator.fidelity import calibration, levels
+from orchestrator.fidelity.calibration import UNKNOWN, Known
+from orchestrator.fidelity.levels import LEVELS, Levels, Part, changed
+from orchestrator.study.closed_form import closed_form
+from orchestrator.study.scene import PileBed, Scene
+
+QUIET_ENOUGH = 6.0
+"""A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and
+its rate is a part of what is asked."""
+LIFT_OFF = 0.95
+"""Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
+piles of the preset `paper` those below 0.93 have thresholds, those above 0.98 none."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """How a scene is answered.
+
+    Attributes
+    ----------
+    asked, scene : Scene
+        As the study asks for it, and as it is answered.
+    levels : mapping of str to str
+        Of a pile, the fidelity level of each part by name; empty for a single grain.
+    known : Known
+        The error of tau_c on these levels and its uncertainty, at the fraction of the scene where
+        the two together are largest; infinite where it is not known.
+    why : str
+        The reason, for people.
+    """
+
+    asked: Scene
+    scene: Scene
+    levels: Levels
+    known: Known
+    why: str
+
+    @property
+    def is_as_asked(self) -> bool:
+        """Whether the scene is answered as the study asks for it."""
+        return self.scene == self.asked
+
+    @property
+    def levels_text(self) -> str:
+        """The names of the levels in one text."""
+        return " | ".join(self.levels.values())
+
+    @property
+    def error_estimate(self) -> float | None:
+        """The known error with its uncertainty; None where it is not known."""
+        return self.known.total if math.isfinite(self.known.total) else None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Levels that are not good enough for a scene: dearer ones are chosen.
+
+    Attributes
+    ----------
+    levels : mapping of str to str
+        By part, the name of the dearest one that is not.
+    because : str
+        What they fail in, for people.
+    """
+
+    levels: Levels
+    because: str
+
+
+LIFTED = Bound({"grains": "peeling"}, "the lift carries grains off, which DEM alone shows")
+NO_BOUND = Bound({}, "")
+
+
+def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) -> Decision:
+    """Choose the cheapest levels that are known to be within a tolerance of the dearest ones.
+
+    Parameters
+    ----------
+    scene : Scene
+        Resolved.
+    tolerance : float or None
+        Relative error of tau_c at each of the scene's fractions; None: every scene as it is asked.
+    above : Bound, optional
+        Levels that turned out to be not good enough.
+
+    Returns
+    -------
+    Decision
+        On the levels with the least known error where none is within the tolerance; as asked where
+        nothing is known, or where the way to the answer is a part of what is asked.
+    """
+    if tolerance is None:
+        return as_asked(scene)
+    if why := _asks_for(scene):
+        return as_asked(scene, why)
+    if not isinstance(scene.bed, PileBed):
+        closed_form = changed(scene, {"protocol.method": "pivot"})
+        why = "the closed form is exact for a single grain in a held flow"
+        return Decision(scene, closed_form, {}, UNKNOWN, why)
+    bound = above or (LIFTED if lifts_off(scene) else NO_BOUND)
+    named, why = _cheapest(
+        tuple((part, calibration.scene_class(part, scene)) for part in LEVELS),
+        scene.protocol.fractions,
+        tuple(bound.levels.items()),
+        tolerance,
+    )
+    why = f"{why}; {bound.because}" if bound.because else why
+    return on_levels(scene, dict(named), why) if named else as_asked(scene, why)
+
+
+def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:
+    """The decision to answer a scene as it is."""
+    if not isinstance(scene.bed, PileBed):
+        return Decision(scene, scene, {}, UNKNOWN, why)
+    held = levels.holding(scene)
+    return Decision(scene, scene, held, _known(scene, held), why)
+
+
+def on_levels(scene: Scene, named: Levels, why: str) -> Decision:
+    """The decision to answer a pile on some levels."""
+    answered = scene
+    for part, name in named.items():
+        answered = levels.level(part, name).answer(answered)
+    return Decision(scene, answered, named, _known(scene, named), why)
+
+
+def _known(scene: Scene, named: Levels) -> Known:
+    classes = {part: calibration.scene_class(part, scene) for part in named}
+    found = calibration.known(named, classes, scene.protocol.fractions)
+    return max(found, key=lambda one: one.total)
+
+
+def _asks_for(scene: Scene) -> str:
+    """How a scene wants to be answered; empty where the tool may choose.
+
+    It may where DEM in a held, solved flow is asked for, which is what the levels approximate.
+    """
+    if scene.protocol.method != "dem":
+        return f"the study asks for the method {scene.protocol.method}"
+    if scene.flow.model != "solve":
+        return f"the study asks for the flow model {scene.flow.model}"
+    return "" if scene.protocol.quiet >= QUIET_ENOUGH else "the study asks for a ramp of the flow"
+
+
+def lifts_off(scene: Scene) -> bool:
+    """Whether the lift carries a grain off before it rolls, which DEM alone shows."""
+    return float(closed_form(scene).lift) >= LIFT_OFF * scene.weight
+
+
+Named = tuple[tuple[Part, str], ...]
+"""What a mapping by part holds, in a form that can be cached by."""
+
+
+@cache  # a study has thousands of scenes of a few classes
+def _cheapest(
+    classes: Named, fractions: tuple[float, ...], above: Named, tolerance: float
+) -> tuple[Named, str]:
+    """A level for each part, and why; no levels where nothing is known."""
+    pairs = sorted(_pairs(classes, fractions, dict(above)), key=lambda pair: pair.cost_core_s)
+    within = next((pair for pair in pairs if pair.error <= tolerance), None)
+    if within:
+        return within.levels, "cheapest within the tolerance"
+    best = min(pairs, key=lambda pair: pair.error, default=None)
+    if best is None or math.isinf(best.error):
+        return (), "no error is known: as the study asks"
+    return best.levels, "least known error: none is within the tolerance"
+
+
+@dataclass(frozen=True)
+class _Pair:
+    levels: Named
+    error: float
+    cost_core_s: float
+
+
+def _pairs(
+    classes: Named, fractions: tuple[float, ...], above: Mapping[Part, str]
+) -> Iterator[_Pair]:
+    for names in itertools.product(*(_above(part, above.get(part)) for part, _ in classes)):
+        named = tuple(zip((part for part, _ in classes), names, strict=True))
+        found = calibration.known(dict(named), dict(classes), fractions)
+        yield _Pair(named, max(one.error for one in found), found[0].cost_core_s)
+
+
+def _above(part: Part, name: str | None) -> list[str]:
+    listed = [one.name for one in LEVELS[part]]
+    start = 0 if name is None else listed.index(name) + 1
+    return [one.name for one in LEVELS[part][start:] if one.same_model]

@@ -1,0 +1,41 @@
+"""Fidelity levels: what they change, and by what they are recognised."""
+
+import pytest
+
+from orchestrator.fidelity import levels
+from orchestrator.fidelity.levels import AS_ASKED, LEVELS, Part, changed
+from tests.fidelity.conftest import MakePile
+
+
+@pytest.mark.parametrize("part", list(LEVELS))
+def test_a_scene_that_is_on_a_level_as_it_is_asked_is_recognised(
+    part: Part, pile: MakePile
+) -> None:
+    for one in LEVELS[part]:
+        assert levels.holding(one.answer(pile()))[part] == one.name
+    other = changed(pile(), {"flow.growth": 1.15, "protocol.step": 0.05})
+    assert levels.holding(other)[part] == AS_ASKED
+
+
+def test_a_level_changes_how_a_scene_is_answered_not_what_it_asks(pile: MakePile) -> None:
+    scene = pile()
+    for one in (*levels.FLOW, *levels.GRAINS):
+        answered = one.answer(scene)
+        assert answered.fluid == scene.fluid
+        assert answered.bed.slope_deg == scene.bed.slope_deg
+        assert answered.flow.stress == scene.flow.stress
+        assert answered.protocol.fractions == scene.protocol.fractions
+
+
+def test_beds_of_nearly_one_roughness_share_a_flow(pile: MakePile) -> None:
+    shared = levels.level("flow", "shared")
+    near = [shared.answer(pile(roughness=z0)).flow.roughness for z0 in (3.0e-5, 3.4e-5)]
+    assert near[0] == near[1]
+    assert shared.answer(pile(roughness=1e-4)).flow.roughness != near[0]
+
+
+def test_the_meaning_of_levels_leaves_out_what_is_none() -> None:
+    assert levels.meaning({"flow": "hill", "grains": AS_ASKED}) == (
+        "linear theory of the flow over a low hill"
+    )
+    assert levels.meaning({"flow": AS_ASKED, "grains": AS_ASKED}) == ""
