@@ -53,7 +53,7 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     planned = plan.make(asked)
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))
-    return pack.write(root, problems, asked.text, case.programs(space.cases))
+    return pack.write(root, problems, (asked.name, asked.text), case.programs(space.cases))
 
 
 def _formulas(root: Path, levels: Sequence[int]) -> int:
@@ -66,7 +66,9 @@ def _formulas(root: Path, levels: Sequence[int]) -> int:
         )
     asked = study.load(DEFAULT)
     programs = {"liggghts": liggghts.version()} if 2 in levels and _has_decks() else {}
-    return pack.write(root, formulas(asked, plan.make(asked), levels, {}), asked.text, programs)
+    return pack.write(
+        root, formulas(asked, plan.make(asked), levels, {}), (asked.name, asked.text), programs
+    )
 
 
 def formulas(

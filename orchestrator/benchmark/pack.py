@@ -1,10 +1,8 @@
 """A pack on disk: written as one step, never used unless its files are those of its manifest."""
 
-import json
 import os
 import platform
-import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -12,16 +10,16 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.benchmark.problem import SCENE, SCHEMA, Problem, csv
+from orchestrator.benchmark import intake
+from orchestrator.benchmark.intake import SCENES
+from orchestrator.benchmark.problem import ASK, SCENE, SCHEMA, Problem, csv
 from orchestrator.errors import InputError
-from orchestrator.runs.files import digest_files, read_json, write_json
+from orchestrator.runs import claim
+from orchestrator.runs.files import digest_files, text_of
 
 MANIFEST = "manifest.json"
 EXPECTED = "expected.csv"
-SCENES = "scenes"
 STUDY = "study.toml"
-FILES = (MANIFEST, EXPECTED, "scenes.csv", "times.csv", STUDY, "README.md")
-"""Beside the directory of the scenes."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Pack:
 
     def files(self) -> list[Path]:
         """Every file of the pack but the manifest."""
-        return _files(self.root)
+        return list(intake.members(self.root).values())
 
     def verify(self) -> None:
         """See that no file has changed.
@@ -81,62 +79,57 @@ class Pack:
                 )
 
 
-def _files(root: Path) -> list[Path]:
-    named = (root / name for name in FILES if name != MANIFEST)
-    return [
-        *(path for path in named if path.is_file()),
-        *(path for path in (root / SCENES).rglob("*") if path.is_file()),
-    ]
-
-
 def read(root: Path) -> Pack:
     """Read a pack and see that it is what was exported.
 
     Raises
     ------
     InputError
-        If it is none, of another schema, or changed.
+        If it is none, of another schema, changed, or holds what no pack holds.
     """
-    manifest = read_json(root / MANIFEST)
-    if not isinstance(manifest, dict) or not {"schema", "scenes", "sha256"} <= manifest.keys():
+    if not os.path.lexists(root / MANIFEST):
         raise InputError(
-            f"there is no pack here: {MANIFEST} is missing or cannot be read",
+            f"there is no pack here: {MANIFEST} is missing",
             where=str(root),
             remedy="write one with: python -m orchestrator benchmark export",
         )
-    if manifest["schema"] != SCHEMA:
-        raise InputError(
-            f"its schema is {manifest['schema']!r}, this program knows {SCHEMA}",
-            where=str(root / MANIFEST),
-            remedy="export it again",
-        )
+    manifest = intake.manifest(root / MANIFEST)
     pack = Pack(root, {}, pd.DataFrame(), manifest)
     pack.verify()
-    scenes = {
-        name: json.loads((pack.directory(name) / SCENE).read_text(encoding="utf-8"))
-        for name in manifest["scenes"]
-    }
-    return Pack(root, scenes, _expected(root / EXPECTED), manifest)
+    _check_scenes(root, manifest["scenes"])
+    scenes = {name: intake.scene(pack.directory(name) / SCENE, name) for name in manifest["scenes"]}
+    expected = intake.expected(root / EXPECTED, scenes)
+    for name, asked in expected.groupby("scene", sort=False):
+        path = pack.directory(str(name)) / ASK
+        intake.check(path)
+        if path.read_bytes() != csv(asked[["quantity", "at"]]).encode():
+            intake.refuse(f"it does not ask what {EXPECTED} answers", path)
+    return Pack(root, scenes, expected, manifest)
 
 
-def _expected(path: Path) -> pd.DataFrame:
-    table = pd.read_csv(path, dtype={"scene": str, "quantity": str, "at": str})
-    return table.assign(at=table["at"].fillna(""))
+def _check_scenes(root: Path, scenes: Sequence[str]) -> None:
+    """See that all say the same of which scenes there are."""
+    strange = {path.name for path in (root / SCENES).iterdir()} ^ set(scenes)
+    if strange:
+        intake.refuse(f"the manifest and {SCENES} differ: {min(strange)}", root)
+    lines = (root / "scenes.csv").read_text("utf-8", errors="replace").splitlines()
+    if [line.partition(",")[0] for line in lines] != ["scene", *scenes]:
+        intake.refuse("its scenes are not those of the manifest", root / "scenes.csv")
 
 
 def write(
-    root: Path, problems: Iterable[Problem], study_text: str, programs: Mapping[str, str]
+    root: Path, problems: Iterable[Problem], study: tuple[str, str], programs: Mapping[str, str]
 ) -> int:
     """Write a pack, in place of one that is there, and return how many scenes it has.
 
     Parameters
     ----------
     root : Path
-        Its directory; new, empty, or that of a pack.
+        Its directory; new, empty, or that of a pack of the same study.
     problems : iterable of Problem
         Its scenes.
-    study_text : str
-        The study file that they come from.
+    study : tuple of str
+        Name and text of the study file that they come from.
     programs : mapping of str to str
         Programs that gave the expected answers, with versions.
 
@@ -145,37 +138,27 @@ def write(
     InputError
         If the directory holds something else.
     """
-    _claim(root)
-    listed = list(problems)
-    for one in listed:
-        one.write(root / SCENES / one.scene)
-    (root / STUDY).write_text(study_text, encoding="utf-8")
-    for name, table in _tables(listed).items():
-        (root / f"{name}.csv").write_text(csv(table), encoding="utf-8")
-    (root / "README.md").write_text(_readme(programs), encoding="utf-8")
-    manifest = {
-        "schema": SCHEMA,
-        "scenes": [one.scene for one in listed],
-        "programs": dict(programs),
-        "machine": {"processor": processor(), "cores": os.cpu_count()},
-        "sha256": digest_files(_files(root), root=root),
-    }
-    # last: a directory without it is no pack
-    write_json(root / MANIFEST, manifest)
+    name, text = study
+    with claim.claimed(root, claim.PACK, name) as folder:
+        about = {"kind": claim.PACK.word, "name": name}
+        folder.note(MANIFEST, text_of(about))  # it is no pack until all is there
+        listed = list(problems)
+        scenes = folder.clear(SCENES, intake.is_member)
+        for one in listed:
+            one.write(scenes / one.scene)
+        tables = {f"{name}.csv": csv(table) for name, table in _tables(listed).items()}
+        for file, content in {STUDY: text, "README.md": _readme(programs), **tables}.items():
+            folder.put(file, content)
+        manifest = {
+            **about,
+            "schema": SCHEMA,
+            "scenes": [one.scene for one in listed],
+            "programs": dict(programs),
+            "machine": {"processor": processor(), "cores": os.cpu_count()},
+            "sha256": digest_files(intake.members(root).values(), root=root),
+        }
+        folder.note(MANIFEST, text_of(manifest))
     return len(listed)
-
-
-def _claim(root: Path) -> None:
-    root.mkdir(parents=True, exist_ok=True)
-    strange = {path.name for path in root.iterdir()} - {*FILES, SCENES, ".gitignore"}
-    if strange:
-        raise InputError(
-            f"the directory holds something that is no pack: {min(strange)}",
-            where=str(root),
-            remedy="name a new one",
-        )
-    (root / MANIFEST).unlink(missing_ok=True)
-    shutil.rmtree(root / SCENES, ignore_errors=True)
 
 
 def _tables(problems: list[Problem]) -> dict[str, pd.DataFrame]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.benchmark import intake
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict, ours, within
 
@@ -61,8 +62,7 @@ def costs(pack: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
 
 def _mobile(pack: Pack, scene: str) -> int:
     # of the fixed ones a solver may leave out what nothing can touch
-    kinds = pd.read_csv(pack.directory(scene) / "grains.csv")["kind"]
-    return int((kinds != "fixed").sum())
+    return intake.mobile(pack.directory(scene) / "grains.csv")
 
 
 def scenes(contenders: Sequence[Contender]) -> pd.DataFrame:

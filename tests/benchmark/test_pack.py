@@ -126,7 +126,7 @@ def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
     (tmp_path / "mine" / "thesis.tex").write_text("\\end")
     for arguments, words in (
         (("new", "--level", "3"), ("--level", "--from")),
-        (("mine",), ("thesis.tex", "name a new one")),
+        (("mine",), ("thesis.tex", "not a benchmark pack")),
         (("new", "--from", "mine"), ("no study",)),
     ):
         ended = orchestrator("benchmark", "export", *arguments)
