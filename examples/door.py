@@ -70,21 +70,25 @@ class Bed:
             return float(top["x_m"]), float(top["z_m"]) + 1e3 * d
         return float(top["x_m"]), float(top["z_m"]) + MARGIN * d / self.along[0]
 
-    def answer(self, moved_in):
-        """Write nothing; give the answer to a question, from the hold in which each grain moved.
+    def answer(self, moved_in, carried):
+        """Write nothing; give the answer to a question, from what each counted grain did.
 
-        `moved_in` has a number for each counted grain: the hold, or 0 for one that never moved.
+        `moved_in` has the hold in which it moved, or 0 for never; `carried` says whether it was
+        gone before it had passed the marker.
         """
-        return _Answer(self, moved_in)
+        return _Answer(self, moved_in, carried)
 
 
 class _Answer:
-    def __init__(self, bed, moved_in):
-        self.bed, self.moved_in, self.flow = bed, moved_in, bed.flow
+    def __init__(self, bed, moved_in, carried):
+        self.bed, self.moved_in, self.carried, self.flow = bed, moved_in, carried, bed.flow
 
     def __call__(self, quantity, at):
         if quantity == "moved":
             return self._moved(int(at))
+        if quantity == "carried_off":
+            pairs = zip(self.moved_in, self.carried, strict=True)
+            return sum(0 < level <= int(at) for level, gone in pairs if gone)
         if quantity == "not_moved":
             return self.bed.counted - self._moved(int(at))
         if quantity == "ustar_m_s":

@@ -95,25 +95,23 @@ def write_bed(bed, folder):
 
 
 def moved_in(bed, folder):
-    """The hold in which each counted grain first passed the marker, or was gone; 0 for never."""
+    """The hold in which each counted grain passed the marker or was gone; whether it was gone."""
     looks = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
     frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     rows = [[line.split() for line in frame.splitlines()[8:]] for frame in frames]
     found = [{int(a): (float(x), float(z)) for a, x, z in frame} for frame in rows]
     start, marker = found[0], bed.scene["marker"] * bed.scene["d_m"]
-    first = [0] * bed.counted
+    first, gone = [0] * bed.counted, [False] * bed.counted
     for hold, frame in zip(looks, found[1:], strict=True):
         for number in range(1, bed.counted + 1):
-            if first[number - 1] == 0 and _passed(start[number], frame.get(number), bed, marker):
-                first[number - 1] = hold
-    return first
+            now = frame.get(number)
+            if first[number - 1] == 0 and (now is None or _far(start[number], now, bed) >= marker):
+                first[number - 1], gone[number - 1] = hold, now is None
+    return first, gone
 
 
-def _passed(start, now, bed, marker):
-    if now is None:
-        return True
-    travel = sum(a * (b - c) for a, b, c in zip(bed.along, now, start, strict=True))
-    return travel >= marker
+def _far(start, now, bed):
+    return sum(a * (b - c) for a, b, c in zip(bed.along, now, start, strict=True))
 
 
 def run(deck, *variables):
@@ -159,7 +157,7 @@ def main(case, out):
         write_variables(Path("bed.lammps"), bed_parameters(bed, values["dt"]))
         write_bed(bed, Path())
         run("in.bed")
-        answer, took = bed.answer(moved_in(bed, Path())), steps(Path())
+        answer, took = bed.answer(*moved_in(bed, Path())), steps(Path())
     door.write(case, out, answer, took)
     return 0
 

@@ -239,6 +239,7 @@ def pile(scene, case):
     answers = {
         "moved": lambda at: moved[int(at)],
         "not_moved": lambda at: len(counted) - moved[int(at)],
+        "carried_off": lambda at: 0,
         "ustar0_m_s": lambda at: first(float(at))[1],
         "shields": lambda at: shields(float(at)),
     }

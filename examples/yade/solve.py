@@ -148,7 +148,7 @@ def bed(scene, case):
     # one run with looks inside: between two runs YADE waits a twentieth of a second
     O.engines += [PyRunner(command="protocol.look()", iterPeriod=period, initRun=False)]
     O.run(-1, True)
-    return asked.answer(protocol.moved_in)
+    return asked.answer(protocol.moved_in, protocol.carried)
 
 
 class Protocol:
@@ -160,7 +160,7 @@ class Protocol:
         scene, grains = asked.scene, asked.grains
         mobile = [row["kind"] != "fixed" for row in grains]
         self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
-        self.moved_in = [0] * asked.counted
+        self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
         self.marker = scene["marker"] * scene["d_m"]
         self.quiet_looks = int(scene["quiet"] / door.LOOK + 0.5)
         self.ceiling = asked.ceiling
@@ -201,6 +201,7 @@ class Protocol:
         for place, (number, start) in enumerate(zip(self.counted, self.start, strict=True)):
             if self.moved_in[place] == 0 and self._passed(number, start):
                 self.moved_in[place] = self.hold
+                self.carried[place] = O.bodies[number] is None
         return self.moved_in.count(0) < before
 
     def _passed(self, number, start):

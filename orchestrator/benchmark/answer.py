@@ -4,6 +4,7 @@ import csv
 import difflib
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
@@ -111,13 +112,22 @@ def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
 
 def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     total = found.get(("count", ""), count)
-    for (quantity, at), rest in found.items():
-        moved = found.get(("moved", at), 0.0)
-        if quantity == "not_moved" and total is not None and moved + rest != total:
-            lost = "are lost" if moved + rest < total else "are too many"
+    moved = sorted((float(at), n) for (quantity, at), n in found.items() if quantity == "moved")
+    for (_, before), (hold, n) in pairwise(moved):
+        if n < before:
             raise AnswerError(
-                f"grains {lost}: {moved:g} moved and {rest:g} not, at hold {at}, of {total:g}"
+                f"moved falls from {before:g} to {n:g} at hold {hold:g}: a grain that has moved "
+                "has moved for ever"
             )
+    for (quantity, at), n in found.items():
+        gone = found.get(("moved", at), 0.0)
+        if quantity == "not_moved" and total is not None and gone + n != total:
+            lost = "are lost" if gone + n < total else "are too many"
+            raise AnswerError(
+                f"grains {lost}: {gone:g} moved and {n:g} not, at hold {at}, of {total:g}"
+            )
+        if quantity == "carried_off" and n > gone:
+            raise AnswerError(f"{n:g} grains are carried off at hold {at}, of {gone:g} that moved")
 
 
 def _said(one: Key) -> str:

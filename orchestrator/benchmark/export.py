@@ -140,13 +140,15 @@ class Finished:
         found = {} if thresholds is None else thresholds.set_index("scene_id")["ustar_m_s"]
         yield from map(self._timed, formulas(self.asked, self.planned, levels, dict(found)))
         piles = measured.answered(self.planned.piles.values(), self.rows, self.tables, self.cases)
+        # a theory's stress is no question at levels 3 and 5
+        solved = [one for one in piles if one.pile.model.cases]
         if 3 in levels:
-            of_flow = {one.pile.flow.name: one for one in piles}
+            of_flow = {one.pile.flow.name: one for one in solved}
             for name, one in of_flow.items():
                 yield replace(measured.flow(one), seconds=self.seconds[name])
         for one in piles if 4 in levels else ():
             yield replace(measured.pile(one), seconds=self.seconds[one.pile.case.name])
-        for one in piles if 5 in levels else ():
+        for one in solved if 5 in levels else ():
             both = self.seconds[one.pile.case.name] + self.seconds[one.pile.flow.name]
             yield replace(measured.line(one), seconds=both)
 

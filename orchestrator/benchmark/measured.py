@@ -46,7 +46,8 @@ class Answered:
     row : mapping
         Its row in the study's table of scenes.
     curve, thresholds, stress : DataFrame
-        Its rows in the tables ``pile_curve``, ``pile_threshold`` and ``wall_stress``.
+        Its rows in the tables ``pile_curve``, ``pile_threshold`` and, where its flow is solved,
+        ``wall_stress``.
     cases : Path
         Directory of the cases.
     """
@@ -65,21 +66,26 @@ def answered(
     tables: Tables,
     cases: Path,
 ) -> list[Answered]:
-    """The piles of a study with what its tables say of each; `rows` are its scenes by id.
+    """The piles that DEM answered, with what the tables say of each; `rows` are its scenes by id.
 
     Twins of lattices are left out: they are in the intervals of the others.
     """
     if "pile_curve" not in tables:
         return []
+    nothing = pd.DataFrame()
     curves = dict(iter(tables["pile_curve"].groupby("scene_id")))
     thresholds = dict(iter(tables["pile_threshold"].groupby("scene_id")))
-    stresses = dict(iter(tables["wall_stress"].groupby("flow_case")))
-    return [
-        Answered(pile, rows[name], curves[name], thresholds[name], stresses[pile.flow.name], cases)
-        for pile in piles
-        if not pile.bed.is_twin
-        for name in (pile.scene.id,)
-    ]
+    stresses: dict[Any, pd.DataFrame] = {}
+    if "wall_stress" in tables:
+        stresses = dict(iter(tables["wall_stress"].groupby("flow_case")))
+    found = []
+    for pile in piles:
+        if pile.bed.is_twin or pile.scene.protocol.method != "dem":
+            continue
+        name = pile.scene.id
+        stress = stresses[pile.flow.name] if pile.model.cases else nothing
+        found.append(Answered(pile, rows[name], curves[name], thresholds[name], stress, cases))
+    return found
 
 
 def flow(one: Answered) -> Problem:
@@ -135,7 +141,7 @@ def windward_mean(one: Answered) -> float:
 def pile(one: Answered) -> Problem:
     """Level 4: the grains of a pile under a given stress."""
     scene = one.pile.scene
-    told = parameters(scene, one.row) | {"count": one.pile.packing.count}
+    told = parameters(scene, one.row) | {"count": one.pile.packing.count} | _lift_off(one)
     tables = {"grains": _grains(one), "holds": holds(one)}
     return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
 
@@ -143,12 +149,19 @@ def pile(one: Answered) -> Problem:
 def line(one: Answered) -> Problem:
     """Level 5: flow and grains."""
     scene = one.pile.scene
-    told = parameters(scene, one.row) | flow_parameters(one)
+    told = parameters(scene, one.row) | flow_parameters(one) | _lift_off(one)
     tables = {"bed": _bed(one.pile.flow), "holds": holds(one)}
     count = float(one.pile.packing.count)
     counted = exact("count", count, LINE, ours=count)
     asked = expectations([counted, *_pile_rows(one, LINE)])
     return Problem(5, scene.id, "line", told, tables, asked)
+
+
+def _lift_off(one: Answered) -> dict[str, float]:
+    """How much of the answer is lift-off, where grains were carried off."""
+    last = one.curve.iloc[-1]
+    carried = float(last["carried_off"])
+    return {"lift_off": carried / float(last["moved"])} if carried else {}
 
 
 def holds(one: Answered) -> pd.DataFrame:
@@ -191,14 +204,22 @@ def _pile_rows(one: Answered, tolerance: float) -> Iterator[Row]:
 
 
 def _count_rows(curve: pd.DataFrame) -> Iterator[Row]:
-    total = float(curve["count"].iloc[0])
-    n = curve["moved"].to_numpy(float)
-    last = len(n) - 1
+    total, last = float(curve["count"].iloc[0]), len(curve) - 1
     # hold 0 is the settling
     for hold in range(1, last + 1):
-        near = n[hold - 1 : hold + 2]
-        low = max(float(near.min()) - SCATTER * total, 0.0)
-        high = min(float(near.max()) + SCATTER * total, total)
-        yield expected("moved", place(hold), n[hold], (low, high), 0.0, n[hold])
-    rest = total - n[last]
-    yield expected("not_moved", place(last), rest, (total - high, total - low), 0.0, rest)
+        yield _counted("moved", curve, hold)
+    moved = _counted("moved", curve, last)
+    rest = total - moved["value"]
+    interval = total - moved["high"], total - moved["low"]
+    yield expected("not_moved", place(last), rest, interval, 0.0, rest)
+    if curve["carried_off"].iloc[-1]:
+        yield _counted("carried_off", curve, last)
+
+
+def _counted(quantity: str, curve: pd.DataFrame, hold: int) -> Row:
+    """Expectation of a number of grains: that of a hold earlier or later, and its scatter."""
+    total, n = float(curve["count"].iloc[0]), curve[quantity].to_numpy(float)
+    near = n[hold - 1 : hold + 2]
+    low = max(float(near.min()) - SCATTER * total, 0.0)
+    high = min(float(near.max()) + SCATTER * total, total)
+    return expected(quantity, place(hold), n[hold], (low, high), 0.0, n[hold])

@@ -53,7 +53,8 @@ class Pack:
         size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
         seed = f" {told['seed']}" if "seed" in told else ""
         packing = f", {told['packing']}{seed}" if "packing" in told else ""
-        return f"{told['alpha_deg']:g}°, {size}{packing}"
+        lift_off = ", lift-off" if "lift_off" in told else ""
+        return f"{told['alpha_deg']:g}°, {size}{packing}{lift_off}"
 
     def files(self) -> list[Path]:
         """Every file of the pack but the manifest."""

@@ -20,7 +20,7 @@ USED = "used.json"
 """What a solver took for a scene, beside its answer."""
 OURS = "ours"
 """Our own answers, in a directory beside the solver's."""
-COUNTS = ("moved", "not_moved")
+COUNTS = ("moved", "not_moved", "carried_off")
 """Whole numbers, which may be small: they are judged, but a relative error says little of them."""
 ROUND = 1e-8
 """Relative: the digits of a pack's tables."""

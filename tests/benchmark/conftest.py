@@ -52,3 +52,33 @@ def all_levels(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     root = tmp_path_factory.mktemp("packs") / "all"
     export(root, finished, ())
     return root
+
+
+LIFT_OFF = """
+[flow]
+closure = "low"
+model = "hill"
+[grain]
+diameter = 5e-4
+stiffness = 1e3
+[protocol]
+step = 0.05
+quiet = 6.0
+timestep = 0.3
+until = 0.8
+[[group]]
+name = "lift"
+bed = { kind = "pile", height = 0.005, slope_deg = 20.0, mobile_layers = 1, roughness = "d/30" }
+"""
+"""A pile whose grains lift carries off, up the hill and down it."""
+
+
+@pytest.fixture(scope="session")
+def lift_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A pack of one pile whose answer is lift-off."""
+    out = tmp_path_factory.mktemp("studies") / "lift"
+    ended = pipeline.run(study.parse(LIFT_OFF, name="lift", where="lift"), out, workers=1)
+    assert not ended.failures
+    root = tmp_path_factory.mktemp("packs") / "lift"
+    export(root, out, (4,))
+    return root

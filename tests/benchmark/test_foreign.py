@@ -35,6 +35,14 @@ def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, program: str)
 
 
 @pytest.mark.parametrize("program", COMMANDS)
+def test_a_foreign_solver_agrees_on_lift_off(lift_off: Path, tmp_path: Path, program: str) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+    found = runner.run(lift_off, COMMANDS[program], tmp_path / "results", Choice(), 300.0)
+    assert found.failures == []
+
+
+@pytest.mark.parametrize("program", COMMANDS)
 def test_a_foreign_solver_declines_what_it_is_not_for(
     formulas: Path, tmp_path: Path, program: str
 ) -> None:

@@ -70,6 +70,23 @@ def test_derived_parameters_agree(all_levels: Path) -> None:
         assert told["time_unit_s"] == pytest.approx(unit)
 
 
+def test_a_pile_that_lifts_off_says_so_and_asks_for_it(lift_off: Path, all_levels: Path) -> None:
+    found = pack.read(lift_off)
+    ((name, told),) = found.scenes.items()
+    assert told["lift_off"] > 0.9
+    assert found.about(name).endswith(", lift-off")
+    rows = found.expected.set_index("quantity")
+    last = rows.loc["moved"].iloc[-1]
+    assert rows.loc["carried_off", "at"] == last["at"]
+    assert rows.loc["carried_off", "value"] == round(told["lift_off"] * last["value"])
+    assert last["value"] > 0.5 * told["count"]
+    assert {"shields", "ustar0_m_s"} <= set(rows.index)
+    # where drag moves the grains nothing is said of lift
+    others = pack.read(all_levels)
+    assert not any("lift_off" in told for told in others.scenes.values())
+    assert "carried_off" not in set(others.expected["quantity"])
+
+
 @pytest.mark.parametrize("harm", ["changed", "removed", "added"])
 def test_a_pack_that_was_touched_is_refused(formulas: Path, tmp_path: Path, harm: str) -> None:
     root = tmp_path / "pack"

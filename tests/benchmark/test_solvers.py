@@ -1,6 +1,7 @@
 """Solvers as real processes: a right one passes, each wrong one is caught and told by name."""
 
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -10,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestrator.benchmark import runner
+from orchestrator.benchmark import pack, runner
 from orchestrator.benchmark.report import Found
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError
@@ -38,14 +39,12 @@ def _program(folder: Path, body: str) -> str:
     return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
 
 
-def _run(pack: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
-    table = pd.read_csv(pack / "scenes.csv").query("level == 1").sort_values("scene")
-    named = {
-        FORMULA: table["scene"].iloc[0],
-        SLOPED: table.query("alpha_deg > 0")["scene"].iloc[0],
-    }
-    choice = Choice(patterns=tuple(named.get(name, name) for name in scenes))
-    return runner.run(pack, _program(folder, body), folder / "results", choice, limit_s)
+def _run(root: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
+    level_1 = pd.read_csv(root / "scenes.csv").query("level == 1").sort_values("scene")
+    named = {FORMULA: level_1, SLOPED: level_1[level_1["alpha_deg"] > 0]}
+    chosen = (named[n]["scene"].iloc[0] if n in named else n for n in scenes)
+    choice = Choice(patterns=tuple(chosen))
+    return runner.run(root, _program(folder, body), folder / "results", choice, limit_s)
 
 
 CONTACT = """
@@ -215,12 +214,12 @@ def test_declined_scenes_are_one_line_and_have_no_time(formulas: Path, tmp_path:
 
 
 def test_each_program_is_listed_once(formulas: Path, tmp_path: Path) -> None:
-    pack = tmp_path / "pack"
-    shutil.copytree(formulas, pack)
-    manifest = json.loads((pack / "manifest.json").read_text())
+    root = tmp_path / "pack"
+    shutil.copytree(formulas, root)
+    manifest = json.loads((root / "manifest.json").read_text())
     manifest["programs"] = {"gmsh": "4.0.0", "liggghts": "3.8.0"}
-    (pack / "manifest.json").write_text(json.dumps(manifest))
-    found = _run(pack, tmp_path, TAIL, "2-collision-0.1")
+    (root / "manifest.json").write_text(json.dumps(manifest))
+    found = _run(root, tmp_path, TAIL, "2-collision-0.1")
     assert found.page.read_text().count("<td>gmsh</td>") == 1
     assert "<td>4.0.0</td>" in found.page.read_text()
 
@@ -233,6 +232,44 @@ def test_a_lost_grain_is_caught(all_levels: Path, tmp_path: Path) -> None:
     found = _run(all_levels, tmp_path, body, "4-*")
     assert len(found.failures) == 1
     assert "grains are lost" in found.failures[0]
+
+
+REPLAY = """
+class Replay:
+    def __init__(self, change):
+        self.numbers = change({expected!r})
+    def __call__(self, scene, case):
+        return lambda quantity, at: self.numbers[quantity, at]
+def never_carried(numbers):
+    none = {{key: 0.0 for key in numbers if key[0] in ("moved", "carried_off")}}
+    (rest,) = (key for key in numbers if key[0] == "not_moved")
+    return numbers | none | {{rest: {count}}}
+def forgets(numbers):
+    moved = [key for key in numbers if key[0] == "moved"]
+    return numbers | {{moved[-2]: numbers[moved[-1]] + 1}}
+def all_gone(numbers):
+    (carried,) = (key for key in numbers if key[0] == "carried_off")
+    return numbers | {{carried: {count} + 1}}
+"""
+"""A solver that knows the answers to a pile, and may count by another rule."""
+COUNTED = {
+    "dict": "",
+    "never_carried": "grains that were carried off are not counted as moved",
+    "forgets": r"moved falls from \d+ to \d+ at hold \d+: a grain that has moved has moved for",
+    "all_gone": r"\d+ grains are carried off at hold \d+, of \d+ that moved",
+}
+
+
+@pytest.mark.parametrize("rule", COUNTED)
+def test_another_counting_rule_is_named(lift_off: Path, tmp_path: Path, rule: str) -> None:
+    rows = pack.read(lift_off).expected
+    expected = rows.set_index(["quantity", "at"])["value"].to_dict()
+    count = sum(rows.groupby("quantity")["value"].last()[["moved", "not_moved"]])
+    replay = REPLAY.format(expected=expected, count=count)
+    body = f"{replay}\nsolver.KINDS['pile'] = Replay({rule})" + TAIL
+    found = _run(lift_off, tmp_path, body, "4-*")
+    assert bool(found.failures) == bool(COUNTED[rule])
+    assert re.search(COUNTED[rule], "\n".join(found.failures))
 
 
 def test_a_solver_that_changes_the_pack_stops_the_run(formulas: Path, tmp_path: Path) -> None:
