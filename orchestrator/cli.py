@@ -267,6 +267,7 @@ OPTION_OF = {
 
 
 def _threshold(options: argparse.Namespace) -> int:
+    from orchestrator.fidelity import limits
     from orchestrator.grains import answer
 
     try:
@@ -276,6 +277,7 @@ def _threshold(options: argparse.Namespace) -> int:
                 for field, name in OPTION_OF.items()
             }
         )
+        limits.check(scene, "threshold")
     except InputError as error:
         field = error.where.rpartition(": ")[2]
         raise InputError(

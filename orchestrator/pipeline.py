@@ -61,12 +61,13 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
     Raises
     ------
     InputError
-        If the directory cannot be used.
+        If the study cannot be answered, or the directory cannot be used.
     SolverError
         If a solver is missing or too old.
     Interrupted
         If the user stopped it; every child has ended.
     """
+    plan.make(study)  # what cannot be answered is refused before anything is written
     space = Workspace(out.absolute())
     with space.held():
         planned = plan.settled(study, space.cases)

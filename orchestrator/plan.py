@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import checks
+from orchestrator.fidelity import checks, limits
 from orchestrator.fidelity.decision import Bound, Decision, decide
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import Pile
@@ -70,8 +70,10 @@ def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
     Raises
     ------
     InputError
-        If a scene asks for a flow that cannot be solved; with the study and the field.
+        If a scene is beyond a limit of the methods, or asks for a flow that cannot be solved; with
+        the field.
     """
+    limits.check_study(study)
     bounds = above or {}
     decisions = {
         scene.id: decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes

@@ -85,7 +85,8 @@ class Ours:
         if kind in ("collision", "incline", "sliding", "passing"):
             return check(kind, told, self.root / "checks")
         scene = self._scene(name.partition("-")[2], kind)
-        asked = replace(self.study, groups=(Group("benchmark", (scene,)),))
+        group = Group("benchmark", (scene,), str(self.pack.root / STUDY))
+        asked = replace(self.study, groups=(group,))
         planned = plan.make(asked)
         row = next(scene_rows.rows(asked, planned))
         if kind == "closed-form":

@@ -7,6 +7,7 @@ import pandas as pd
 
 from orchestrator import pipeline
 from orchestrator.experiments import ladder, maps, naive, ranking, stability
+from orchestrator.fidelity import limits
 from orchestrator.pipeline import Finished
 from orchestrator.plan import of
 from orchestrator.report import settings
@@ -23,10 +24,12 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
     Raises
     ------
     InputError
-        If the study has no pile that is answered by DEM, or the directory cannot be used.
+        If the study has no pile that is answered by DEM or is beyond a limit of the methods, or the
+        directory cannot be used.
     SolverError
         If a solver is missing.
     """
+    limits.check_study(study)
     beside = naive.answers(naive.small(study))
     planned = of({**ladder.answers(study), **beside}, study.name)
     space = Workspace(out.absolute())

@@ -8,10 +8,12 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from orchestrator.errors import InputError
 from orchestrator.flow.case import LID_OVER_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.physics.constants import KARMAN
-from orchestrator.study.scene import PileBed, Scene, UnfitError
+from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.study import Study
 
 
 @dataclass(frozen=True)
@@ -42,21 +44,28 @@ class Limit:
     refused: bool = True
 
 
-def check(scene: Scene) -> None:
+def check_study(study: Study) -> None:
+    """Check every scene of a study as `check` does; messages name the file and the group."""
+    for group in study.groups:
+        for scene in group.scenes:
+            check(scene, group.where)
+
+
+def check(scene: Scene, where: str) -> None:
     """Refuse a scene outside of the regions in which its answer means something.
 
-    Where the answer is merely worse, a warning is given.
+    Where the answer is merely worse, a warning is given. `where` names the scene's file.
 
     Raises
     ------
-    UnfitError
+    InputError
         For the first limit that it is beyond: the field, the map and the remedy.
     """
     for limit in LIMITS:
         if what := limit.beyond(scene):
             remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
             if limit.refused:
-                raise UnfitError(limit.field, what, remedy)
+                raise InputError(what, where=f"{where}: {limit.field}", remedy=remedy)
             warnings.warn(f"{limit.field}: {what} ({remedy})", stacklevel=2)
 
 

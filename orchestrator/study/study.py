@@ -17,7 +17,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from orchestrator.errors import InputError, unknown_key
-from orchestrator.fidelity import limits
 from orchestrator.runs import assets
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.scene import (
@@ -36,10 +35,21 @@ MOST_SCENES = 100_000
 
 @dataclass(frozen=True)
 class Group:
-    """Scenes of a study that belong together: the points of one experiment."""
+    """Scenes of a study that belong together: the points of one experiment.
+
+    Attributes
+    ----------
+    name : str
+        As the file says.
+    scenes : tuple of Scene
+        In the file's order, each with its force law decided.
+    where : str
+        Its place in messages: the file, and which group of it.
+    """
 
     name: str
     scenes: tuple[Scene, ...]
+    where: str
 
 
 @dataclass(frozen=True)
@@ -83,8 +93,8 @@ def preset_names() -> list[str]:
     return sorted(path.stem for path in assets.presets().glob("*.toml"))
 
 
-def load(source: str, *, guarded: bool = True) -> Study:
-    """Read a study file, or a preset by its name; `guarded` as in `parse`.
+def load(source: str) -> Study:
+    """Read a study file, or a preset by its name.
 
     Raises
     ------
@@ -108,7 +118,7 @@ def load(source: str, *, guarded: bool = True) -> Study:
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":
         raise InputError("a file of dots names no study", where=source, remedy="rename it")
-    return parse(text, name=name, where=source, guarded=guarded)
+    return parse(text, name=name, where=source)
 
 
 def _is_file(path: Path) -> bool:
@@ -118,10 +128,10 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
+def parse(text: str, *, name: str, where: str) -> Study:
     """Make a study of a TOML file's text; `where` names the file in messages.
 
-    A guarded study refuses scenes beyond `limits`; an unguarded one what cannot be built.
+    Only scenes that cannot be built are refused; a plan refuses those beyond the methods' limits.
 
     Raises
     ------
@@ -143,7 +153,7 @@ def parse(text: str, *, name: str, where: str, guarded: bool = True) -> Study:
     title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    groups = tuple(_groups(data, where, guarded))
+    groups = tuple(_groups(data, where))
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
@@ -167,7 +177,7 @@ def check_tolerance(value: Any, where: str) -> None:
         )
 
 
-def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Group]:
+def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
     listed = data.get("group", [{}])
     if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
         raise InputError(
@@ -177,8 +187,8 @@ def _groups(data: Mapping[str, Any], where: str, guarded: bool) -> Iterator[Grou
         place = f"{where}: group {number}" if "group" in data else where
         _known(item, GROUP_KEYS, place, "")
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
-        scenes = tuple(_scenes(merged, place, guarded))
-        yield Group(str(item.get("name", f"group {number}")), scenes)
+        scenes = tuple(_scenes(merged, place))
+        yield Group(str(item.get("name", f"group {number}")), scenes, place)
 
 
 def _merged(
@@ -196,7 +206,7 @@ def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> Iterator[Scene]:
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
     axes = tables["axes"]
     for key, values in axes.items():
         part, dot, field = key.partition(".")
@@ -215,8 +225,7 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str, guarded: bool) -> 
     grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
-    scenes = [make_scene(parts, where, guarded=guarded) for parts in _points(tables, grid)]
-    yield from resolved(scenes)
+    yield from resolved([make_scene(parts, where) for parts in _points(tables, grid)])
 
 
 def _points(
@@ -230,10 +239,8 @@ def _points(
         yield parts
 
 
-def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool = True) -> Scene:
+def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
     """Validate the tables of one scene; `where` names the file in messages.
-
-    A guarded scene is within `limits` too.
 
     Raises
     ------
@@ -246,10 +253,7 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str, *, guarded: bool
         # of a number beyond all floats the model says itself that it is wrong
         if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
             bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
-        scene = Scene.model_validate({**parts, "bed": bed})
-        if guarded:
-            limits.check(scene)
-        return scene
+        return Scene.model_validate({**parts, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:

@@ -62,7 +62,7 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
         if (scene.grain.diameter, scene.bed.slope_deg) == (1e-3, 25.0)
         and regime_of(scene) != "transition"
     ]
-    asked = dataclasses.replace(paper, groups=(Group("fresh", tuple(chosen)),))
+    asked = dataclasses.replace(paper, groups=(Group("fresh", tuple(chosen), "fresh"),))
     planned = plan.make(asked)
     for one in planned.cases.values():
         engine.execute(one, tmp_path, 300.0, threading.Event())

@@ -89,9 +89,8 @@ def test_a_study_beyond_a_limit_is_refused_with_the_map(
     for part, fields in change.items():
         parts[part].update(fields)
     with pytest.raises(InputError, match="map") as caught:
-        study.make_scene(parts, "test")
-    assert caught.value.where.endswith(field)
-    assert study.make_scene(parts, "test", guarded=False)
+        limits.check(study.make_scene(parts, "test"), "test")
+    assert caught.value.where == f"test: {field}"
 
 
 @pytest.mark.parametrize(
@@ -109,7 +108,7 @@ def test_a_study_whose_answer_is_merely_worse_is_warned(
     parts = _tables_of_a_pile()
     parts[part][field] = value
     with pytest.warns(UserWarning, match="map"):
-        study.make_scene(parts, "test")
+        limits.check(study.make_scene(parts, "test"), "test")
 
 
 def _runs(name: str) -> pd.DataFrame:

@@ -1,11 +1,22 @@
-"""What a study refuses, and what an unguarded one lets through."""
+"""What a plan refuses, what it is warned of, and what a study file may still ask for."""
+
+from pathlib import Path
 
 import pytest
 
+from orchestrator import cli, plan
 from orchestrator.errors import InputError
+from orchestrator.fidelity.decision import as_asked
 from orchestrator.study import study
-from orchestrator.study.scene import PileBed
+from orchestrator.study.study import Study
 
+GRAIN = """
+[grain]
+diameter = 1e-3
+[bed]
+slope_deg = {slope}
+entrainment_angle_deg = {angle}
+"""
 PILE = """
 [grain]
 diameter = 1e-3
@@ -17,6 +28,8 @@ roughness = "d/30"
 model = "solve"
 """
 BEYOND = [
+    (GRAIN.format(slope=31.0, angle=60.0), "bed.slope_deg", "= 30 deg"),
+    (GRAIN.format(slope=36.0, angle=50.0), "bed.slope_deg", "= 35 deg"),
     (PILE.replace("15.0", "31.0"), "bed.slope_deg", "90 deg - entrainment angle"),
     (PILE.replace("15.0", "5.0"), "bed.slope_deg", "choose 10"),
     (PILE + "first_cell_height = 6e-5\n", "bed.roughness", "z_e"),
@@ -24,14 +37,37 @@ BEYOND = [
 ]
 
 
+def _parse(text: str) -> Study:
+    return study.parse(text, name="test", where="test.toml")
+
+
 @pytest.mark.parametrize(("text", "field", "word"), BEYOND, ids=[b[1] + b[2] for b in BEYOND])
-def test_beyond_the_limits_a_study_is_refused_and_a_map_is_not(
+def test_beyond_the_limits_a_plan_is_refused_and_a_map_is_not(
     text: str, field: str, word: str
 ) -> None:
+    asked = _parse(text)
     with pytest.raises(InputError, match=word) as caught:
-        study.parse(text, name="test", where="test.toml")
+        plan.make(asked)
     assert caught.value.where == f"test.toml: {field}"
-    assert study.parse(text, name="test", where="test.toml", guarded=False).scenes
+    assert plan.of({scene.id: as_asked(scene) for scene in asked.scenes}, "map").cases
+
+
+def test_the_group_of_a_scene_that_is_refused_is_named() -> None:
+    asked = _parse(PILE + "[[group]]\n[[group]]\nbed = { slope_deg = 31.0 }\n")
+    with pytest.raises(InputError) as caught:
+        plan.make(asked)
+    assert caught.value.where == "test.toml: group 2: bed.slope_deg"
+
+
+@pytest.mark.parametrize("command", ["study", "ladder"])
+def test_a_study_beyond_the_limits_writes_nothing(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "steep.toml"
+    source.write_text(PILE.replace("15.0", "31.0"))
+    assert cli.main([command, str(source), "--out", str(tmp_path / "out")]) == 2
+    assert f"{source}: bed.slope_deg: 31 deg is beyond" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [source]
 
 
 @pytest.mark.parametrize(
@@ -44,11 +80,10 @@ def test_beyond_the_limits_a_study_is_refused_and_a_map_is_not(
 )
 def test_what_cannot_be_built_is_refused_always(text: str, field: str) -> None:
     with pytest.raises(InputError) as caught:
-        study.parse(text, name="test", where="test.toml", guarded=False)
+        _parse(text)
     assert caught.value.where == f"test.toml: {field}"
 
 
 def test_a_theory_has_no_mesh_to_refuse() -> None:
-    text = PILE.replace("solve", "hill") + "first_cell_height = 6e-5\n"
-    (scene,) = study.parse(text, name="test", where="test.toml").scenes
-    assert isinstance(scene.bed, PileBed)
+    (pile,) = plan.make(_parse(PILE.replace("solve", "hill") + "first_cell_height = 6e-5\n")).piles
+    assert pile

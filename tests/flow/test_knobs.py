@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator import plan
+from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
 
@@ -21,11 +22,9 @@ roughness = "d/30"
 
 
 def piles(flow: str) -> list[Pile]:
-    return list(
-        plan.make(
-            study.parse(TEXT + flow, name="knobs", where="test", guarded=False)
-        ).piles.values()
-    )
+    asked = study.parse(TEXT + flow, name="knobs", where="test")
+    decisions = {scene.id: as_asked(scene) for scene in asked.scenes}
+    return list(plan.of(decisions, "knobs").piles.values())
 
 
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
