@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.benchmark.problem import EXPECTED, SCHEMA
 from orchestrator.errors import InputError
+from orchestrator.physics.laws import LAWS
 
 FILES = ("expected.csv", "scenes.csv", "times.csv", "study.toml", "README.md")
 """Beside the manifest and the directory of the scenes."""
@@ -27,14 +28,17 @@ _QUANTITY = r"[a-z][a-z0-9_]{0,79}"
 
 Between = tuple[float, float]
 RANGES: dict[str, Between] = {
-    **dict.fromkeys(("alpha_deg", "beta_deg"), (-90.0, 90.0)),
-    **dict.fromkeys(("phi_deg", "incline_deg"), (0.1, 89.9)),
+    "alpha_deg": (-90.0, 90.0),
+    **dict.fromkeys(("phi_deg", "incline_deg", "beta_deg"), (0.1, 89.9)),
     **dict.fromkeys(("damping", "timestep"), (1e-6, 0.999)),
     **dict.fromkeys(("d_m", "z0_m", "h_m", "lid_m"), (1e-9, 1e4)),
     **dict.fromkeys(("rho_sol_kg_m3", "rho_f_kg_m3"), (1e-6, 1e6)),
     **dict.fromkeys(("g_m_s2", "reduced_gravity_m_s2", "nu_m2_s"), (1e-12, 1e6)),
     **dict.fromkeys(("speed_m_s", "u_e_m_s", "ustar0_m_s"), (1e-9, 1e6)),
+    **dict.fromkeys(("force_n", "weight_n"), (1e-30, 1e9)),
     "alpha_s": (0.0, 1e3),
+    "marker": (1e-3, 10.0),
+    "lift_off": (0.0, 1.0),
     "count": (1, 1e6),
 }
 """Of the parameters that are used here, wherever they are given; SI units, angles in degrees."""
@@ -46,6 +50,7 @@ KINDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "collision": (2, (*_GRAIN, "speed_m_s")),
     "incline": (2, (*_GRAIN, "incline_deg")),
     "sliding": (2, (*_GRAIN, "speed_m_s")),
+    "passing": (2, (*_GRAIN, "beta_deg", "marker", "force_n", "weight_n")),
     "pivot": (2, _FLUID),
     "flow": (3, _FLOW),
     "pile": (4, (*_FLUID, "count")),
@@ -191,8 +196,8 @@ def scene(path: Path, name: str) -> dict[str, Any]:
     level, needed = KINDS.get(str(told.get("kind")), (None, ()))
     if level is None or (told.get("level"), name[0]) != (level, str(level)):
         refuse(f"it has no kind that is known of level {name[0]}", path)
-    if set(_FLUID) <= {*needed} and told.get("closure") not in ("low", "high"):
-        refuse("its closure is neither low nor high", path)
+    if set(_FLUID) <= {*needed} and told.get("closure") not in LAWS:
+        refuse("its closure is no force law that is known", path)
     _check_numbers(told, needed, path)
     return told
 
@@ -266,7 +271,7 @@ def _check_table(table: pd.DataFrame, path: Path) -> None:
         "has a tolerance that is none": tolerance.notna() & ~tolerance.between(0, 10),
         "has an infinite number of ours": table["ours"].abs() > 1e30,
         "has a negative count or Shields number": (table["value"] < 0)
-        & table["quantity"].isin(["moved", "not_moved", "shields"]),
+        & table["quantity"].isin(["moved", "not_moved", "carried_off", "shields"]),
         "asks the same again": table.duplicated(["scene", "quantity", "at"]),
     }
     for what, where in wrong.items():

@@ -199,6 +199,17 @@ HARMS: dict[str, Harm] = {
 }
 
 
+def test_a_pack_of_each_kind_is_read(copy: Path, formulas: Path, lift_off: Path) -> None:
+    kinds = {
+        told["kind"] for root in (copy, formulas, lift_off) for told in _scenes_of(root).values()
+    }
+    assert kinds == set(intake.KINDS)
+
+
+def _scenes_of(root: Path) -> dict[str, dict[str, Any]]:
+    return pack.read(root).scenes
+
+
 @pytest.mark.parametrize("name", HARMS)
 def test_a_hostile_pack_is_refused_by_one_line(
     copy: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
