@@ -12,7 +12,8 @@ from orchestrator.fidelity.decision import Bound, Decision, decide
 from orchestrator.grains.cells import CellsCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 

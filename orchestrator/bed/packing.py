@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.bed.disorder import rows as disorder_rows
 from orchestrator.bed.line import BedLine
-from orchestrator.study.scene import Packing as Pattern
+from orchestrator.study.parts import Packing as Pattern
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -1,7 +1,7 @@
 """Levels 1 and 2: scenes whose answers are formulas."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.study import closed_form as study_form
 from orchestrator.study.closed_form import forces, regime_of
-from orchestrator.study.scene import Grain, Scene
+from orchestrator.study.parts import Grain
+from orchestrator.study.scene import Scene
 
 FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
 """Relative tolerances."""
@@ -45,7 +46,7 @@ LEAST_QUIET = 5.0
 """Holds shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
 
 
-def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
+def closed_form(scene: Scene) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
     started = time.perf_counter()
     drag, lift = forces(scene)
@@ -62,10 +63,10 @@ def closed_form(scene: Scene, row: Mapping[str, Any]) -> Problem:
     rows += [exact(name, float(value), FORMULA) for name, value in thresholds.items()]
     seconds = time.perf_counter() - started
     asked = expectations(rows).assign(ours=lambda table: table["value"])
-    return Problem(1, scene.id, "closed-form", parameters(scene, row), {}, asked, seconds)
+    return Problem(1, scene.id, "closed-form", parameters(scene), {}, asked, seconds)
 
 
-def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> Problem:
+def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
     """Level 2: one grain on its two neighbours; `ours` is the DEM's threshold, m/s."""
     threshold = float(study_form.closed_form(scene).friction_velocity)
     # the mean of two holds is within half a step of what lies between them
@@ -73,7 +74,7 @@ def pivot(scene: Scene, row: Mapping[str, Any], ours: float = float("nan")) -> P
     interval = threshold / half, threshold * half
     asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
     tables = {"grains": _cell(scene), "holds": _holds(scene, threshold)}
-    return Problem(2, scene.id, "pivot", parameters(scene, row), tables, asked)
+    return Problem(2, scene.id, "pivot", parameters(scene), tables, asked)
 
 
 def has_pivot(scene: Scene) -> bool:

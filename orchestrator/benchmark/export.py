@@ -19,7 +19,6 @@ from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
 from orchestrator.study import study
 from orchestrator.study.study import Study
-from orchestrator.tables import scenes as scene_rows
 
 LEVELS = (1, 2, 3, 4, 5)
 FORMULAS = (1, 2)
@@ -75,14 +74,13 @@ def formulas(
     asked: Study, planned: Plan, levels: Sequence[int], found: Mapping[str, float]
 ) -> Iterator[Problem]:
     """Levels 1 and 2; `found` holds the DEM's thresholds by scene, m/s, as far as there are any."""
-    rows = {row["scene_id"]: row for row in scene_rows.rows(asked, planned)}
     grains = [scene for scene in asked.scenes if scene.id not in planned.piles]
     if 1 in levels:
-        yield from (exact.closed_form(scene, rows[scene.id]) for scene in grains)
+        yield from (exact.closed_form(scene) for scene in grains)
     if 2 in levels:
         yield from _answered(exact.checks())
         for scene in filter(exact.has_pivot, grains):
-            yield exact.pivot(scene, rows[scene.id], found.get(scene.id, float("nan")))
+            yield exact.pivot(scene, found.get(scene.id, float("nan")))
 
 
 def _has_decks() -> bool:
@@ -124,7 +122,6 @@ class Finished:
         self._check_cases(set(told["case"]) | set(told["flow_case"].dropna()), space.root)
         times = pd.read_csv(space.root / "timings" / "timings.csv")
         self.seconds: dict[str, float] = dict(zip(times["case"], times["solver_s"], strict=True))
-        self.rows = {row["scene_id"]: row for row in scene_rows.rows(asked, planned)}
 
     def _check_cases(self, told: set[str], root: Path) -> None:
         if told != set(self.planned.cases):
@@ -139,7 +136,7 @@ class Finished:
         thresholds: Any = self.tables.get("single_grain")
         found = {} if thresholds is None else thresholds.set_index("scene_id")["ustar_m_s"]
         yield from map(self._timed, formulas(self.asked, self.planned, levels, dict(found)))
-        piles = measured.answered(self.planned.piles.values(), self.rows, self.tables, self.cases)
+        piles = measured.answered(self.planned.piles.values(), self.tables, self.cases)
         # a theory's stress is no question at levels 3 and 5
         solved = [one for one in piles if one.pile.model.cases]
         if 3 in levels:

@@ -1,6 +1,6 @@
 """Levels 3 to 5: scenes whose answers are those of a finished study."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,8 +43,6 @@ class Answered:
     ----------
     pile : Pile
         The pile.
-    row : mapping
-        Its row in the study's table of scenes.
     curve, thresholds, stress : DataFrame
         Its rows in the tables ``pile_curve``, ``pile_threshold`` and, where its flow is solved,
         ``wall_stress``.
@@ -53,7 +51,6 @@ class Answered:
     """
 
     pile: Pile
-    row: Mapping[str, Any]
     curve: pd.DataFrame
     thresholds: pd.DataFrame
     stress: pd.DataFrame
@@ -62,11 +59,10 @@ class Answered:
 
 def answered(
     piles: Iterable[Pile],
-    rows: Mapping[str, Mapping[str, Any]],
     tables: Tables,
     cases: Path,
 ) -> list[Answered]:
-    """The piles that DEM answered, with what the tables say of each; `rows` are its scenes by id.
+    """The piles that DEM answered, with what the tables say of each.
 
     Twins of lattices are left out: they are in the intervals of the others.
     """
@@ -84,7 +80,7 @@ def answered(
             continue
         name = pile.scene.id
         stress = stresses[pile.flow.name] if pile.model.cases else nothing
-        found.append(Answered(pile, rows[name], curves[name], thresholds[name], stress, cases))
+        found.append(Answered(pile, curves[name], thresholds[name], stress, cases))
     return found
 
 
@@ -141,7 +137,7 @@ def windward_mean(one: Answered) -> float:
 def pile(one: Answered) -> Problem:
     """Level 4: the grains of a pile under a given stress."""
     scene = one.pile.scene
-    told = parameters(scene, one.row) | {"count": one.pile.packing.count} | _lift_off(one)
+    told = parameters(scene) | {"count": one.pile.packing.count} | _lift_off(one)
     tables = {"grains": _grains(one), "holds": holds(one)}
     return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
 
@@ -149,7 +145,7 @@ def pile(one: Answered) -> Problem:
 def line(one: Answered) -> Problem:
     """Level 5: flow and grains."""
     scene = one.pile.scene
-    told = parameters(scene, one.row) | flow_parameters(one) | _lift_off(one)
+    told = parameters(scene) | flow_parameters(one) | _lift_off(one)
     tables = {"bed": _bed(one.pile.flow), "holds": holds(one)}
     count = float(one.pile.packing.count)
     counted = exact("count", count, LINE, ours=count)

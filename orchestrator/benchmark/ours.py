@@ -27,7 +27,6 @@ from orchestrator.solvers import liggghts
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Group
-from orchestrator.tables import scenes as scene_rows
 
 LIMIT_S = 3600.0
 SAID = {
@@ -88,15 +87,14 @@ class Ours:
         group = Group("benchmark", (scene,), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked)
-        row = next(scene_rows.rows(asked, planned))
         if kind == "closed-form":
-            return _given(exact.closed_form(scene, row)), NOTHING
+            return _given(exact.closed_form(scene)), NOTHING
         if kind == "pivot":
             took = self._run(*planned.cases.values())
             made = tables.make(asked, planned, self.root, planned.cases)
             ours = float(made["single_grain"]["ustar_m_s"].iloc[0])
-            return _given(exact.pivot(scene, row, ours)), took
-        return self._bed(kind, asked, planned, row)
+            return _given(exact.pivot(scene, ours)), took
+        return self._bed(kind, asked, planned)
 
     def _scene(self, name: str, kind: str) -> Scene:
         found = (self.of_flow if kind == "flow" else self.scenes).get(name)
@@ -108,7 +106,7 @@ class Ours:
             )
         return found
 
-    def _bed(self, kind: str, asked: study.Study, planned: Plan, row: Mapping[str, Any]) -> Given:
+    def _bed(self, kind: str, asked: study.Study, planned: Plan) -> Given:
         pile = next(iter(planned.piles.values()))
         flow_took = NOTHING
         for flow in pile.model.cases:
@@ -121,7 +119,6 @@ class Ours:
         nothing = pd.DataFrame()
         one = Answered(
             pile,
-            row,
             made.get("pile_curve", nothing),
             made.get("pile_threshold", nothing),
             made.get("wall_stress", nothing),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.study import fields
 from orchestrator.study.scene import Scene
 
 SCHEMA = 1
@@ -109,18 +110,9 @@ def expectations(rows: Iterable[Row]) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=list(EXPECTED))
 
 
-def parameters(scene: Scene, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What a pack says of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        Of a study, with its closure decided.
-    row : mapping
-        Its row in the study's table of scenes: whatever that table says goes into the pack.
-    """
-    hidden = ("scene_id", "group", "case", "flow_case", "bed", "why")
-    told = {k: v for k, v in row.items() if k not in hidden and v is not None and v == v}
+def parameters(scene: Scene) -> dict[str, Any]:
+    """What a pack says of a scene, whose closure is decided: every field that has an effect."""
+    told = {k: v for k, v in fields.used(scene).items() if k != "bed" and v is not None}
     grain = scene.grain
     return told | mechanics(
         grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness

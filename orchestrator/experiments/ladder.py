@@ -21,7 +21,8 @@ from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import LEVELS, Level, Part
 from orchestrator.grains.threshold import of_pile
 from orchestrator.plan import Plan
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
 

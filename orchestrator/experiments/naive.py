@@ -18,7 +18,8 @@ from orchestrator.fidelity import levels
 from orchestrator.fidelity.decision import Decision, as_asked
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 FEW = {"protocol.step": 0.2, "protocol.quiet": 10.0, "protocol.timestep": 0.2}

@@ -14,7 +14,8 @@ from orchestrator.fidelity.decision import Bound, Decision, decide
 from orchestrator.fidelity.levels import changed
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold, of_pile
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 CHEAP = Bound({"flow": "coarse", "grains": "peeling"}, "it checks answers without DEM")
 """The dearest levels that need a check; it is made on dearer ones."""

@@ -10,7 +10,8 @@ from orchestrator.fidelity import calibration, levels
 from orchestrator.fidelity.calibration import UNKNOWN, Known
 from orchestrator.fidelity.levels import LEVELS, Levels, Part, changed
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 QUIET_ENOUGH = 6.0
 """A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and

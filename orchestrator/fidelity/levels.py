@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 Part = Literal["flow", "grains"]
 Levels = Mapping[Part, str]

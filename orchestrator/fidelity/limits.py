@@ -12,7 +12,8 @@ from orchestrator.errors import InputError
 from orchestrator.flow.case import LID_OVER_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.physics.constants import KARMAN
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 

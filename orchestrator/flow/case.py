@@ -16,7 +16,8 @@ from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
 from orchestrator.runs.case import Case
 from orchestrator.solvers import openfoam
-from orchestrator.study.scene import BUILDABLE_DEG, Convection, Turbulence
+from orchestrator.study.parts import Convection, Turbulence
+from orchestrator.study.scene import BUILDABLE_DEG
 
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"

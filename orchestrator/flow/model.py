@@ -12,7 +12,8 @@ from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import LID_OVER_HEIGHT, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, undisturbed_ustar
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 FIELD_OF = {
     "height_m": "bed.height",

@@ -16,7 +16,8 @@ from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.loading import Loading
 from orchestrator.study.closed_form import closed_form, forces
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
 

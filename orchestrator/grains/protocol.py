@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.study.scene import Grain, Protocol
+from orchestrator.study.parts import Grain, Protocol
 
 FloatArray = NDArray[np.float64]
 

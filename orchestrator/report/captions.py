@@ -12,6 +12,7 @@ from orchestrator.physics import curves
 from orchestrator.report import labels, reference, theory
 from orchestrator.report.results import Results, valid
 from orchestrator.report.snapshot import Snapshot
+from orchestrator.study import fields
 
 DRAG_LAW = (
     "Right of the line “drag law ends” V_f d/ν exceeds 1000, up to which the drag law of Eq. 4 "
@@ -63,12 +64,23 @@ def _references(scenes: pd.DataFrame, by: str) -> str:
     return water + (brown if air else "")
 
 
+def _values(column: str, piles: Iterable[Pile]) -> str:
+    """What some piles were run with, as a text."""
+    used = dict.fromkeys(fields.COLUMNS[column].used(pile.scene) for pile in piles)
+    return ", ".join(labels.value(column, value) for value in used)
+
+
 def hold_protocol(rows: pd.DataFrame) -> str:
-    """How thresholds were measured."""
+    """How thresholds were found: by the hold protocol where DEM ran, else by what was run."""
+    held = rows[rows["answered_method"] == "dem"]
+    rest = rows[rows["answered_method"] != "dem"]
+    other = f"Without dynamics or holds: {labels.methods(rest)}." if len(rest) else ""
+    if held.empty:
+        return other
     return (
-        f"Hold protocol: u* is raised in steps of {listed(rows['step'], 100)} %, each flow is kept "
-        f"until for {listed(rows['quiet'])} √(d/g′) no grain has passed {listed(rows['marker'])} d "
-        "along the bed; such a grain has moved."
+        f"Hold protocol: u* is raised in steps of {listed(held['answered_step'], 100)} %, each "
+        f"flow is kept until for {listed(held['answered_quiet'])} √(d/g′) no grain has passed "
+        f"{listed(held['answered_marker'])} d along the bed; such a grain has moved. {other}"
     )
 
 
@@ -109,9 +121,14 @@ def stress(results: Results, piles: list[Pile]) -> str:
         f"{mean:+.0%} from the wall stress’s u* on the mean of the windward face and {crest:+.0%} "
         "at the crest: a model uncertainty of every threshold of a pile. The crest is a spike of "
         "one cell that does not converge with the mesh; therefore a grain feels the stress "
-        "averaged over max(d, h/40) of bed (orange). Shaded: flow that runs back. Below: the bed, "
-        "heights exaggerated."
+        f"averaged over {averaged(piles)} of bed (orange). Shaded: flow that runs back. Below: the "
+        "bed, heights exaggerated."
     )
+
+
+def averaged(piles: Iterable[Pile]) -> str:
+    """The length of bed that the stress on a grain is averaged over."""
+    return f"max(d, {_values('average', piles)})"
 
 
 def eq10_over_wall(results: Results, flow_cases: Iterable[str]) -> tuple[float, float]:
@@ -136,8 +153,7 @@ def fractions(rows: pd.DataFrame) -> str:
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
         "had moved by the end of each hold (one marker), against Re* (left) and τ (right) of the "
         "mean signed wall stress over the grains that had moved, as in the paper: the mean falls "
-        "where the next grains to move feel less. Circles, dashed: forces of Eq. 2; squares: of "
-        "Eq. 4. "
+        "where the next grains to move feel less. Dashed: forces of Eq. 2. "
         f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
     )
 
@@ -168,11 +184,11 @@ def low_regime(rows: pd.DataFrame) -> str:
 
 def flow(piles: list[Pile]) -> str:
     """Of the picture of the flow."""
-    speeds = listed(pile.scene.flow.speed for pile in piles)
     return (
-        "Steady turbulent flow by OpenFOAM (k-ε, rough wall), at the last iteration, for U_e = "
-        f"{speeds} m/s; the fields of other speeds are taken to be similar. White: streamlines, "
-        "the closed ones around the flow that runs back, at arbitrary spacing. Only the part near "
+        f"Steady turbulent flow by OpenFOAM ({_values('turbulence', piles)}, rough wall), at the "
+        f"last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other speeds "
+        "are taken to be similar. White: streamlines, the closed ones "
+        "around the flow that runs back, at arbitrary spacing. Only the part near "
         "the pile is shown: the lid is at 10 h. To scale."
     )
 
@@ -218,9 +234,9 @@ def crest(pile: Pile, looks: int) -> str:
 
 
 def _forces(pile: Pile) -> str:
-    ratio = labels.ratio_of_d(pile.bed.roughness / pile.scene.grain.diameter)
-    equation = "Eq. 2" if pile.scene.flow.closure == "low" else "Eq. 4"
-    return f"z₀ = {ratio}, {pile.bed.packing} packing, forces of {equation}."
+    ratio = labels.ratio_of(pile.bed.roughness / pile.scene.grain.diameter, "d")
+    rows, forces = (_values(column, [pile]) for column in ("packing", "closure"))
+    return f"z₀ = {ratio}, {rows}, forces: {forces}."
 
 
 def _modes() -> str:

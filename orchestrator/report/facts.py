@@ -10,10 +10,11 @@ import pandas as pd
 from orchestrator import __version__
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.report import labels
-from orchestrator.report.results import Results, by_dem, held, split, valid, varying
+from orchestrator.report.apart import varying
+from orchestrator.report.results import Results, by_dem, held, split, valid
 from orchestrator.runs.case import IDENTITY
 from orchestrator.runs.files import read_json
-from orchestrator.tables import COLUMNS
+from orchestrator.study import fields
 
 PACKAGES = (
     "gmsh",
@@ -27,32 +28,8 @@ PACKAGES = (
     "pyvista",
     "vtk",
 )
-PARAMETERS = (
-    "alpha_deg",
-    "beta_deg",
-    "phi_deg",
-    "d_m",
-    "rho_sol_kg_m3",
-    "rho_f_kg_m3",
-    "nu_m2_s",
-    "g_m_s2",
-    "z0_over_d",
-    "h_m",
-    "packing",
-    "disorder",
-    "seed",
-    "mobile_layers",
-    "closure",
-    "stress",
-    "alpha_s",
-    "stiffness",
-    "damping",
-    "step",
-    "quiet",
-    "marker",
-    "timestep",
-)
-"""Columns of the table of scenes that the page lists."""
+SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "closure")
+"""What each row of the table of piles says of its pile."""
 MANY = 12
 """Values of a parameter beyond which only their range is listed."""
 
@@ -70,10 +47,10 @@ def piles(results: Results) -> Sheet | None:
     found = results.joined("pile_threshold")
     if found.empty:
         return None
-    extra = varying(found)
+    extra = varying(found, *SHOWN, "fraction")
     fractions = sorted(set(found["fraction"]))
     heads = (f"τ_c at n/N = {fraction:.0%}" for fraction in fractions)
-    choices = ("choices",) if extra else ()
+    choices = ("and",) if extra else ()
     head = ("pile: α, d, z₀", "forces, ν in m²/s", *choices, "N", *heads, "case")
     rows = []
     for _, own in split(found, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
@@ -84,15 +61,15 @@ def piles(results: Results) -> Sheet | None:
     return Sheet(head, tuple(rows))
 
 
-def _pile(row: pd.Series, extra: tuple[str, ...]) -> tuple[str, ...]:
-    forces = "Eq. 2" if row["closure"] == "low" else "Eq. 4"
+def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
+    forces = labels.value("closure", row["closure"])
     holds = row["closure"] == row["regime"]
     cells = (
         f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
-        f"{labels.ratio_of_d(row['z0_over_d'])}",
+        f"{labels.ratio_of(row['z0_over_d'], 'd')}",
         f"{forces}, {row['nu_m2_s']:g}" + ("" if holds else "\n(does not hold)"),
     )
-    chosen = "\n".join(f"{column} {row[column]}" for column in extra)
+    chosen = "\n".join(labels.plain(c, row[c]) for c in extra if pd.notna(row[c]))
     return (*cells, chosen) if extra else cells
 
 
@@ -118,7 +95,7 @@ def single_grains(results: Results) -> Sheet | None:
     table = found.assign(holds=valid(found), held=held(found), ratio=ratio, width=width)
     rows = []
     for (closure, holds, quiet), own in split(table, "closure", "holds", "held"):
-        equation = "Eqs. 2, 3" if closure == "low" else "Eqs. 4, 5"
+        equation = labels.value("closure", closure)
         far = (own["ratio"] - 1).abs()
         rows.append(
             (
@@ -148,20 +125,25 @@ def single_grains(results: Results) -> Sheet | None:
 def parameters(results: Results) -> Sheet:
     """The values that each parameter of the scenes takes."""
     rows = []
-    for column in PARAMETERS:
-        values = list(results.scenes[column].dropna().unique())
-        if values:
-            rows.append((column, COLUMNS[column], _values(values)))
-    return Sheet(("column", "meaning", "values"), tuple(rows))
+    for column, one in fields.COLUMNS.items():
+        asked = _values(results.scenes[column])
+        run = fields.ANSWERED + column
+        answered = _values(results.scenes[run]) if run in fields.ANSWERS else asked
+        if asked or answered:
+            symbol = ", ".join(text for text in (one.info.label, one.info.symbol) if text)
+            rows.append((symbol, one.info.unit, one.name or column, asked or "default", answered))
+    head = ("parameter", "unit", "in a study file", "asked for", "answered with")
+    return Sheet(head, tuple(rows))
 
 
-def _values(values: list[object]) -> str:
+def _values(column: pd.Series) -> str:
+    values = list(column.dropna().unique())
     if all(isinstance(value, str) for value in values):
         return ", ".join(sorted(map(str, values)))
-    numbers = sorted(float(str(value)) for value in values)
+    numbers = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
     if len(numbers) > MANY:
-        return f"{len(numbers)} from {numbers[0]:.6g} to {numbers[-1]:.6g}"
-    return ", ".join(f"{number:.6g}" for number in numbers)
+        return f"{len(numbers)} from {numbers[0]} to {numbers[-1]}"
+    return ", ".join(numbers)
 
 
 def programs(results: Results) -> Sheet:

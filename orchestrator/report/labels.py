@@ -1,40 +1,75 @@
 """How values are written in figures and on the page."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import pandas as pd
 
+from orchestrator.study import fields
+from orchestrator.study.info import Info
+
 RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
-
-NAMES: Mapping[str, str] = {
-    "alpha_deg": r"$\alpha$ = {:g}°",
-    "beta_deg": r"$\beta$ = {:g}°",
-    "phi_deg": r"$\varphi$ = {:g}°",
-    "alpha_s": r"$\alpha_s$ = {:g}",
-    "fraction": "$n/N$ = {:.0%}",
-    "packing": "{} packing",
-    "stress": "stress: {}",
-}
+FRACTION = Info("fraction", "n/N", "%")
+"""Of the fraction of grains at which a threshold is read; it is no field of its own."""
 
 
-def written(column: str, value: object) -> str:
+def words(column: str) -> Info:
+    """The words of a column."""
+    return FRACTION if column == "fraction" else fields.COLUMNS[column].info
+
+
+def written(column: str, value: Any) -> str:
     """A value with its symbol, as panels and legends say it."""
-    if column == "z0_over_d":
-        return f"$z_0$ = {ratio_of_d(float(str(value)))}"
-    if column in ("d_m", "h_m"):
-        return f"${column[0]}$ = {millimetres(float(str(value)))}"
-    if column == "nu_m2_s":
-        return rf"$\nu$ = {power_of_ten(float(str(value)))} m²/s"
-    return NAMES[column].format(value)
+    info = words(column)
+    return _said(info, value, f"${math_of(info.symbol)}$" if info.symbol else "", power_of_ten)
 
 
-def ratio_of_d(ratio: float) -> str:
-    """A length over d, such as ``d/30``."""
+def plain(column: str, value: Any) -> str:
+    """A value with its symbol where there is no mathematics."""
+    info = words(column)
+    return _said(info, value, info.symbol.replace("_0", "₀"), "{:g}".format)
+
+
+def _said(info: Info, value: Any, symbol: str, number: Callable[[float], str]) -> str:
+    if isinstance(value, str):
+        return info.choices.get(value, f"{info.label} {value}")
+    return f"{symbol or info.label} = {amount(float(value), info.unit, number)}"
+
+
+def value(column: str, value: Any) -> str:
+    """A value alone."""
+    info = words(column)
+    return info.choices.get(value, value) if isinstance(value, str) else amount(value, info.unit)
+
+
+def math_of(symbol: str) -> str:
+    """A symbol for mathematics: its index in braces."""
+    return re.sub(r"_(\w+)", r"_{\1}", symbol)
+
+
+def amount(value: float, unit: str, number: Callable[[float], str] = "{:g}".format) -> str:
+    """A value with its unit; one in metres is written in millimetres."""
+    match unit:
+        case "m":
+            return millimetres(value)
+        case "d" | "h":
+            return ratio_of(value, unit)
+        case "%":
+            return f"{100 * value:.3g} %"
+        case "°":
+            return f"{value:g}°"
+    wide = value and not 1e-3 < abs(value) < 1e5
+    return f"{number(value) if wide else f'{value:g}'} {unit}".rstrip()
+
+
+def ratio_of(ratio: float, length: str) -> str:
+    """A length over another, such as ``d/30``."""
     part = 1 / ratio
     whole = round(part)
-    return f"d/{whole}" if abs(part - whole) < 1e-3 * part else f"{ratio:.3g} d"
+    return f"{length}/{whole}" if abs(part - whole) < 1e-3 * part else f"{ratio:.3g} {length}"
 
 
 def millimetres(metres: float) -> str:
@@ -50,11 +85,12 @@ def power_of_ten(value: float) -> str:
     return f"${head}10^{{{exponent}}}$"
 
 
-def panel(row: pd.Series, columns: tuple[str, ...]) -> str:
-    """A panel's title: what all that it shows agrees in."""
-    return ", ".join(written(column, row[column]) for column in columns)
+def methods(rows: pd.DataFrame) -> str:
+    """The methods that answered some rows."""
+    known = fields.ANSWERS["answered_method"].info.choices
+    return ", ".join(name for key, name in known.items() if (rows["answered_method"] == key).any())
 
 
-def plain(column: str, value: float) -> str:
-    """A value with its symbol where there is no mathematics."""
-    return {"alpha_deg": "α = {:g}°", "beta_deg": "β = {:g}°"}[column].format(value)
+def panel(row: pd.Series, columns: Sequence[str]) -> str:
+    """What all that a panel or a marker shows agrees in; what has no effect on it is left out."""
+    return ", ".join(written(column, row[column]) for column in columns if pd.notna(row[column]))

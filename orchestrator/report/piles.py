@@ -8,12 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator.report import captions, labels, shields, style, theory
+from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, split, valid, varying
+from orchestrator.report.results import Results, split, valid
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
-LOOKS = {"low": "--", "high": "-"}
-"""By closure, in the figure of fractions."""
+SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "closure")
+"""What figures, panels, axes, colours and markers tell apart."""
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -35,7 +36,7 @@ def extended(results: Results) -> Iterator[Figure]:
     found = results.joined("pile_threshold")
     reached = found[found["shields"].notna()] if len(found) else found
     for (ratio,), rows in split(reached, "z0_over_d"):
-        written = labels.ratio_of_d(float(str(ratio)))
+        written = labels.ratio_of(float(str(ratio)), "d")
         yield Figure(
             f"extended-shields-{written.replace('/', '').replace(' ', '')}",
             f"Extended Shields diagram, z₀ = {written}",
@@ -47,7 +48,8 @@ def extended(results: Results) -> Iterator[Figure]:
 
 def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
     """n/N against Re* and against tau, a row of panels for each z0/d."""
-    keys = ("z0_over_d", *varying(rows))
+    choices, rows, variants = parted(rows, *SHOWN)
+    keys = ["z0_over_d", *choices]
     panels = [part for _, part in split(rows, *keys)][::-1]
     figure = style.canvas(2.3 * len(panels) + 0.9)
     axes = figure.subplots(len(panels), 2, sharex="col", sharey=True, squeeze=False)
@@ -66,7 +68,9 @@ def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
         shields.shade_transition(ax)
     shields.label_lowest(list(axes[:, 0]), labels.RE_AXIS)
     shields.label_lowest(list(axes[:, 1]), labels.TAU_AXIS)
-    _legends(figure, rows, colours)
+    used = set(rows["d_m"])
+    entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
+    style.legends(figure, entries, [*shields.point_entries(rows), *variants])
     return figure
 
 
@@ -76,27 +80,21 @@ def _curve(ax: Axes, curve: pd.DataFrame, column: str, colour: str) -> None:
     ax.plot(
         curve[column],
         curve["fraction_moved"],
-        LOOKS[closure],
+        "--" if closure == "low" else "-",
         color=colour,
         lw=0.8,
         ms=3,
-        marker=style.MARKERS[closure],
+        marker=str(curve[SHAPE].iloc[0]),
         mfc=face,
         mew=0.7,
         gid=str(curve["scene_id"].iloc[0]),
     )
 
 
-def _legends(figure: Canvas, rows: pd.DataFrame, colours: dict[float, str]) -> None:
-    used = set(rows["d_m"])
-    entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
-    looks = shields.point_entries(rows)
-    style.legends(figure, entries, looks)
-
-
 def _extended(results: Results, rows: pd.DataFrame) -> Canvas:
     """tau_c against Re* by fraction, a panel for each slope, the single grain's line beside it."""
-    keys = ("alpha_deg", *varying(rows))
+    choices, rows, variants = parted(rows, *SHOWN, "fraction")
+    keys = ["alpha_deg", *choices]
     panels = [part for _, part in split(rows, *keys)]
     columns = min(len(panels), 2)
     lines = -(-len(panels) // columns)
@@ -108,13 +106,12 @@ def _extended(results: Results, rows: pd.DataFrame) -> Canvas:
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
     for ax, part in zip(axes, panels, strict=True):
         references = _panel(ax, results, part, colours)
-        ax.set_title(labels.panel(part.iloc[0], (*keys, "z0_over_d")), loc="left")
+        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
     ratios = [float(part["z0_over_d"].iloc[0]) for part in panels]
     shields.prepare(axes, ratios, shields.RESULT[1:], margin=5)
     entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
-    style.legends(
-        figure, entries, shields.line_entries() + shields.point_entries(rows) + references
-    )
+    looks = [*shields.line_entries(), *shields.point_entries(rows), *variants, *references]
+    style.legends(figure, entries, looks)
     return figure
 
 
@@ -126,7 +123,7 @@ def _panel(
         shields.draw_branches(ax, theory.branches(scenes), "0.2")
     for (fraction,), points in split(rows, "fraction"):
         colour = colours[float(str(fraction))]
-        for _, series in split(points, "nu_m2_s", "closure", "regime"):
+        for _, series in split(points, "nu_m2_s", "closure", "regime", SHAPE):
             # piles that differ in more than d are a scatter, not a line
             if series["d_m"].is_unique:
                 ordered = series.sort_values("reynolds")

@@ -16,8 +16,6 @@ from orchestrator.tables import Tables
 
 RAMP_BELOW = 3.0
 """Quiet time, sqrt(d/g'), below which a sequence of holds is a ramp."""
-PHYSICS = ("phi_deg", "alpha_s", "h_m", "packing", "stress")
-"""Columns that part the panels of a figure wherever a study varies them."""
 
 
 @dataclass(frozen=True)
@@ -83,22 +81,17 @@ def split(
         yield from table.groupby(list(columns), sort=True, dropna=False)
 
 
-def varying(table: pd.DataFrame) -> tuple[str, ...]:
-    """Which of the columns that part panels differ within a table."""
-    return tuple(c for c in PHYSICS if c in table and table[c].nunique(dropna=False) > 1)
-
-
 def held(table: pd.DataFrame) -> pd.Series:
     """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp.
 
     A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the marker.
     """
-    return table["quiet"] >= RAMP_BELOW
+    return ~(table["quiet"] < RAMP_BELOW)
 
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:
     """The rows that DEM found; those of a formula hold nothing that was measured."""
-    return table[table["method"] == "dem"] if "method" in table else table
+    return table[table["answered_method"] == "dem"] if len(table) else table
 
 
 def valid(table: pd.DataFrame) -> pd.Series:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from orchestrator.physics import curves
 from orchestrator.physics.closures import HIGH_FROM, LOW_BELOW
+from orchestrator.physics.laws import LAWS
 from orchestrator.report import labels, reference, style
+from orchestrator.report.apart import SHAPE
 from orchestrator.report.results import valid
 from orchestrator.report.theory import Branch, drag_law_limit
 
@@ -95,17 +97,17 @@ def draw_branches(ax: Axes, branches: Sequence[Branch], colour: str) -> None:
 def draw_points(
     ax: Axes, rows: pd.DataFrame, colour: str, columns: tuple[str, str, str, str]
 ) -> None:
-    """Markers with their intervals, by the columns of x, y and its ends.
+    """Intervals and the rows' own markers, by the columns of x, y and its ends.
 
     Hollow where the closure does not hold.
     """
     rows = rows[rows[columns[1]].notna()]
     x, y, low, high = (rows[column].to_numpy(float) for column in columns)
     draw_intervals(ax, x, low, high, colour)
-    solid, closure = valid(rows).to_numpy(), rows["closure"].to_numpy(str)
-    for name, marker in style.MARKERS.items():
+    solid, shapes = valid(rows).to_numpy(), rows[SHAPE].to_numpy(str)
+    for marker in sorted(set(shapes.tolist())):
         for filled, gid in ((True, RESULT[1]), (False, RESULT[2])):
-            some = (solid == filled) & (closure == name)
+            some = (solid == filled) & (shapes == marker)
             if some.any():
                 face = colour if filled else "white"
                 ax.plot(x[some], y[some], marker, mfc=face, mec=colour, mew=0.8, zorder=3, gid=gid)
@@ -160,12 +162,14 @@ def line_entries() -> list[Artist]:
 
 
 def point_entries(rows: pd.DataFrame) -> list[Artist]:
-    """Legend of the markers that some rows need."""
-    names = {"low": "DEM, forces of Eq. 2", "high": "DEM, forces of Eq. 4"}
-    used = [c for c in style.MARKERS if (rows["closure"] == c).any()]
-    markers = [(names[c], style.MARKERS[c], "0.2") for c in used]
+    """Legend of the markers that some rows need: by which methods, with which forces."""
+    markers = []
+    for closure in [name for name in LAWS if (rows["closure"] == name).any()]:
+        own = rows[rows["closure"] == closure]
+        name = f"{labels.methods(own)}, {labels.value('closure', closure)}"
+        markers.append((name, own[SHAPE].mode()[0], "0.2"))
     if not valid(rows).all():
-        markers += [("hollow: closure does not hold", style.MARKERS[used[-1]], "white")]
+        markers.append(("hollow: closure does not hold", markers[-1][1], "white"))
     return [
         Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
         for label, m, face in markers

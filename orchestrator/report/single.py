@@ -10,10 +10,13 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.report import captions, labels, shields, style, theory
+from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, by_dem, held, split, valid, varying
+from orchestrator.report.results import Results, by_dem, held, split, valid
 
 CROSS = "beyond the paper"
+SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "closure")
+"""What the axes, colours and markers of these figures tell apart, or are meant to lump."""
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 
 
@@ -59,7 +62,10 @@ def _pair(
 
 def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: str) -> Canvas:
     """A panel for each z0/d; lines and points coloured by entrainment angle or slope."""
-    keys = ("z0_over_d", *varying(scenes))
+    choices, scenes, variants = parted(scenes, *SHOWN, "z0_over_d")
+    if len(points):
+        points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id", validate="one_to_one")
+    keys = ["z0_over_d", *choices]
     panels = [part for _, part in split(scenes, *keys)][::-1]
     figure = style.canvas(2.4 * len(panels) + 1.1)
     axes = list(figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
@@ -68,12 +74,10 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
         references = _panel(ax, part, points, by, colours)
         ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
     shields.prepare(axes, [float(part["z0_over_d"].iloc[0]) for part in panels])
-    looks = references + shields.line_entries()
-    style.legends(
-        figure,
-        _colour_entries(scenes, by, colours),
-        looks + _point_entries(points) if len(points) else looks,
-    )
+    looks: list[style.Sample] = [*references, *shields.line_entries()]
+    if len(points):
+        looks += [*_point_entries(points), *variants]
+    style.legends(figure, _colour_entries(scenes, by, colours), looks)
     return figure
 
 
@@ -130,20 +134,22 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
         low=dem["ustar_low_m_s"] / ratio,
         high=dem["ustar_high_m_s"] / ratio,
     )
-    panels = list(split(rows, "step"))
+    choices, rows, variants = parted(rows, *SHOWN, "z0_over_d", "step")
+    keys = ["step", *choices]
+    panels = [part for _, part in split(rows, *keys)]
     figure = style.canvas(2.1 * len(panels) + 1.0)
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     colours = style.palette("alpha_deg", results.values("alpha_deg"))
     axes[0].set_xscale("log")
-    for ax, ((step,), part) in zip(axes, panels, strict=True):
+    for ax, part in zip(axes, panels, strict=True):
         _ratios(ax, part, colours)
-        ax.set_title(f"flow raised by {100 * float(str(step)):.3g}% from hold to hold", loc="left")
+        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
     for ax in axes:
         style.plain_ticks(ax.xaxis)
         shields.shade_transition(ax)
     axes[-1].set_xlabel(labels.RE_AXIS)
     entries = _colour_entries(rows, "alpha_deg", colours)
-    style.legends(figure, entries, shields.point_entries(rows))
+    style.legends(figure, entries, [*shields.point_entries(rows), *variants])
     cases = tuple(sorted(set(dem["case"])))
     return Figure("accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure)
 

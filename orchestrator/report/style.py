@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
@@ -29,11 +30,11 @@ AIR = "#8c6d46"
 BED = "#d9c9a3"
 Look = dict[str, Any]
 """Properties of an artist."""
+Sample = Artist | tuple[Artist, ...]
+"""What a legend shows: one mark, or some beside each other."""
 
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 MINOR_TICK: Look = {"color": "black", "ms": 2, "mew": 0.6}
-MARKERS = {"low": "o", "high": "s"}
-"""By closure."""
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
@@ -51,12 +52,15 @@ def canvas(height: float) -> Canvas:
     return Canvas(figsize=(WIDTH, height), layout="compressed")
 
 
-def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
+def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
     """What the colours mean above the panels, all else below them: no data are there."""
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
-        figure.legend(handles=looks, loc="outside lower center", ncols=3)
+        handles: list[Any] = list(looks)  # its stubs know no samples of two marks
+        names = [str((one[0] if isinstance(one, tuple) else one).get_label()) for one in looks]
+        beside = {tuple: HandlerTuple(ndivide=None)}
+        figure.legend(handles, names, loc="outside lower center", ncols=3, handler_map=beside)
 
 
 def entry(label: str, colour: str) -> Line2D:

@@ -19,12 +19,8 @@ from pydantic import ValidationError
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
 from orchestrator.study.closed_form import resolved
-from orchestrator.study.scene import (
-    PileBed,
-    Scene,
-    UnfitError,
-    roughness_length,
-)
+from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.scene import Scene, roughness_length
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")

@@ -2,6 +2,8 @@
 
 import pandas as pd
 
+from orchestrator.study import fields
+
 SIMILAR = ["level", "alpha_deg", "closure", "fraction"]
 """Piles that agree in these are taken to scatter alike; rows are level, or lie along the slope."""
 
@@ -31,8 +33,7 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
 
 def _twins(scenes: pd.DataFrame) -> pd.Series:
     """A number that scenes share which differ in the seed alone."""
-    same = [name for name in scenes if name not in ("group", "seed", "why", "case")]
-    return scenes.groupby(same, dropna=False).ngroup()
+    return scenes.groupby(fields.others(scenes, "seed"), dropna=False).ngroup()
 
 
 def _scatter(table: pd.DataFrame) -> pd.DataFrame:

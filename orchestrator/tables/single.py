@@ -37,7 +37,7 @@ def _row(scene: Scene, bracket: tuple[float, float, float]) -> Row:
     value, low, high = bracket
     return {
         **point(scene),
-        "method": scene.protocol.method,
+        "answered_method": scene.protocol.method,
         "reynolds": float(exact.reynolds) * value,
         "reynolds_closed_form": float(exact.reynolds),
         "shields_closed_form": shields,

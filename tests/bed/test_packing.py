@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from orchestrator.bed import packing
 from orchestrator.bed.shapes import triangle
-from orchestrator.study.scene import Packing as Pattern
+from orchestrator.study.parts import Packing as Pattern
 
 PATTERNS: tuple[Pattern, Pattern] = ("aligned", "horizontal")
 slopes = st.floats(10, 30)

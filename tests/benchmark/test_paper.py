@@ -12,9 +12,8 @@ from orchestrator.benchmark import measured
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.scene import PileBed
+from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Group, Study
-from orchestrator.tables import scenes as scene_rows
 from tests.benchmark.conftest import ROOT
 from tests.conftest import Command
 
@@ -68,8 +67,7 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
         engine.execute(one, tmp_path, 300.0, threading.Event())
         assert case.is_done(one, tmp_path)
     found = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
-    rows = {row["scene_id"]: row for row in scene_rows.rows(asked, planned)}
-    piles = measured.answered(planned.piles.values(), rows, found, tmp_path)
+    piles = measured.answered(planned.piles.values(), found, tmp_path)
     assert len(piles) >= 2
     for answered in piles:
         for problem in (measured.flow(answered), measured.pile(answered)):

@@ -100,7 +100,7 @@ def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     assert not list((out / "cases").glob("cells-*"))
     assert cli.main(["report", str(out)]) == 0
     table = pd.read_csv(out / "tables" / "single_grain.csv")
-    assert set(table["method"]) == {"pivot"}
+    assert set(table["answered_method"]) == {"pivot"}
     assert table["shields_closed_form"].notna().all()
 
 

@@ -19,7 +19,8 @@ from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, read_openfoam
 from orchestrator.runs import case, process
 from orchestrator.solvers import openfoam
-from orchestrator.study.scene import Turbulence, default_first_cell_height
+from orchestrator.study.parts import Turbulence
+from orchestrator.study.scene import default_first_cell_height
 from tests.flow.conftest import PILE, SLOW, Solve, allrun
 from tests.flow.test_mesh import edit
 

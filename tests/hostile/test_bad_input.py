@@ -17,7 +17,8 @@ from pydantic import BaseModel
 from orchestrator import cli
 from orchestrator.grains.cells import CellsCase
 from orchestrator.runs import case
-from orchestrator.study.scene import Flow, Fluid, Grain, GrainBed, PileBed, Protocol, Scene
+from orchestrator.study.parts import Flow, Fluid, Grain, GrainBed, PileBed, Protocol
+from orchestrator.study.scene import Scene
 
 Words = tuple[int, str]
 

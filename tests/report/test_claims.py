@@ -13,10 +13,10 @@ from orchestrator.report import claims, page
 from orchestrator.report.claims import base, counting
 from orchestrator.report.claims.base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
-from orchestrator.study import study
+from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene
-from orchestrator.tables import Tables, scenes
+from orchestrator.tables import Tables
 
 
 def by_name(found: list[Claim]) -> dict[str, Claim]:
@@ -71,6 +71,19 @@ def test_pairs_agree_in_all_else() -> None:
     assert base.up(found) == "reproduced"
 
 
+@pytest.mark.parametrize(
+    "column",
+    [
+        *("flow_model", "turbulence", "convection", "forced", "average", "growth", "method"),
+        *("first_cell_m", "timestep", "until", "answered_method", "answered_growth", "flow_level"),
+    ],
+)
+def test_rows_that_differ_in_anything_else_are_no_pair(column: str) -> None:
+    table = pd.DataFrame({"closure": "high", "alpha_deg": [15.0, 20.0], "value": [1.0, 2.0]})
+    assert len(base.pairs(table.assign(**{column: "same"}), "alpha_deg", "value")) == 1
+    assert base.pairs(table.assign(**{column: ["one", "other"]}), "alpha_deg", "value").empty
+
+
 def test_what_a_small_study_shows(judged: dict[str, Claim]) -> None:
     verdicts = {name: claim.verdict for name, claim in judged.items()}
     assert verdicts["single.constant"] == "partly"
@@ -113,26 +126,13 @@ def exact() -> Tables:
     asked, grains = [], []
     for scene in study.load("paper").scenes:
         if scene.bed.kind == "grain":
-            asked.append({"scene_id": scene.id, "bed": "grain", **_parameters(scene)})
+            asked.append({"scene_id": scene.id, **_parameters(scene)})
             grains.append({"scene_id": scene.id, **_closed_form(scene)})
     return {"scenes": pd.DataFrame(asked), "single_grain": pd.DataFrame(grains)}
 
 
 def _parameters(scene: Scene) -> dict[str, object]:
-    protocol = scene.protocol.model_dump(include={"step", "quiet", "marker"})
-    contact = scene.grain.model_dump(include={"stiffness", "damping"})
-    return {
-        **scenes.point(scene),
-        "phi_deg": scene.grain.friction_angle_deg,
-        "rho_sol_kg_m3": scene.grain.density,
-        "rho_f_kg_m3": scene.fluid.density,
-        "g_m_s2": scene.fluid.gravity,
-        "alpha_s": scene.flow.lift_coefficient,
-        "packing": None,
-        "stress": None,
-        **contact,
-        **protocol,
-    }
+    return {**fields.asked(scene), **fields.answered(scene)}
 
 
 def _closed_form(scene: Scene) -> dict[str, float]:

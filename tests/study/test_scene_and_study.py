@@ -10,7 +10,8 @@ from orchestrator.errors import InputError
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.scene import Grain, GrainBed, PileBed, Scene
+from orchestrator.study.parts import Grain, GrainBed, PileBed
+from orchestrator.study.scene import Scene
 
 PILE = """
 [grain]

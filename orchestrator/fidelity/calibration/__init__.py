@@ -13,7 +13,8 @@ from operator import add
 from pathlib import Path
 
 from orchestrator.fidelity.levels import Levels, Part
-from orchestrator.study.scene import PileBed, Scene
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 FOLDER = Path(__file__).parent
 DISORDERS = (0.02, 0.05, 0.2)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from orchestrator.physics.closures import Closure
 from orchestrator.report.results import by_dem, split, valid
+from orchestrator.study import fields
 from orchestrator.tables import Tables
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
@@ -25,39 +26,11 @@ QUIET = 5.0
 NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that are answers by whatever method; the others show what DEM alone measures."""
-SCENE = (
-    "alpha_deg",
-    "beta_deg",
-    "d_m",
-    "z0_over_d",
-    "nu_m2_s",
-    "closure",
-    "phi_deg",
-    "rho_sol_kg_m3",
-    "rho_f_kg_m3",
-    "g_m_s2",
-    "h_m",
-    "packing",
-    "disorder",
-    "seed",
-    "mobile_layers",
-    "stress",
-    "alpha_s",
-    "stiffness",
-    "damping",
-    "step",
-    "quiet",
-    "marker",
-    "timestep",
-    "until",
-    "solve_u_e_m_s",
-    "solve_nu_m2_s",
-    "cells_per_face",
-    "fraction",
-)
-"""Columns in which two rows must agree, but for the one along which they are compared."""
-CHOICES = ("alpha_s", "stiffness", "damping", "step", "quiet", "marker")
-"""Columns of which single grains are judged at one combination: the one with most scenes."""
+BESIDE = ("fraction", "flow_level", "grain_level")
+"""Columns in which two answers must agree beside those of their scenes."""
+GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "closure")
+"""Columns by which single grains are told apart. Of all others they are judged at one combination:
+the one with most scenes."""
 PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg": 35.0}
 """The grains and the gas of the paper: no others are judged."""
 
@@ -107,7 +80,7 @@ class Evidence:
         """A table with its scenes' columns; it has all columns even where it has no rows."""
         table = self.tables.get(name, pd.DataFrame())
         if table.empty:
-            columns = [*self.scenes, *SCENE, *EMPTY]
+            columns = [*self.scenes, *fields.COLUMNS, *fields.ANSWERS, *BESIDE, *EMPTY]
             return pd.DataFrame(columns=list(dict.fromkeys(columns))).astype(object)
         extra = [column for column in self.scenes if column not in table or column == "scene_id"]
         table = table.merge(self.scenes[extra], on="scene_id", how="inner", validate="many_to_one")
@@ -123,11 +96,11 @@ class Evidence:
     def held(self) -> pd.DataFrame:
         """Those of them under held flows, at the study's commonest contact and protocol."""
         held = self.grains[self.grains["quiet"] >= QUIET]
-        counts = held.groupby(list(CHOICES), sort=True).size()
-        if counts.empty:
+        choices = others(held, *GRAIN)
+        if held.empty:
             return held
-        commonest = counts.reset_index(name="n").nlargest(1, "n")
-        return held.merge(commonest[list(CHOICES)], on=list(CHOICES), how="inner")
+        combination = held.groupby(choices, sort=True, dropna=False).ngroup()
+        return held[combination == combination.mode()[0]]
 
     def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
         """A table of piles whose closure holds, of one packing and one stress."""
@@ -175,8 +148,9 @@ def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = (
 
 
 def others(table: pd.DataFrame, *along: str) -> list[str]:
-    """The parameters that a table has, but for some."""
-    return [column for column in SCENE if column in table and column not in along]
+    """The columns in which rows of a table agree that are equal in all else than some."""
+    beside = [column for column in BESIDE if column in table and column not in along]
+    return [*fields.others(table, *along), *beside]
 
 
 def rising(found: pd.DataFrame, each: str, names: tuple[str, str] = ("rises", "ratio")) -> str:

@@ -35,8 +35,8 @@ def wiggles(evidence: Evidence) -> Claim:
         _judged(*(own for _, own in parts)),
         "Counting: N falls as 1/d, and a pile of 1 mm has a tenth of the grains of one of 0.1 mm. "
         "With a smooth stress that is all, as the paper says. Here small grains have as rough a "
-        "curve for another reason: many share the stress of one cell of the flow’s mesh and go "
-        "together.",
+        "curve for another reason: the stress is linear along each face of the flow’s mesh and "
+        "jumps at its ends, so that many small grains on one face go together.",
         ("fractions",),
     )
 

@@ -147,7 +147,7 @@ def _said(family: str, closure: Closure, own: pd.DataFrame) -> str:
 def _fit(row: pd.Series) -> str:
     worst = f"{row['worst']:.2f} at Re* = {_round(row['worst_at'])}"
     return (
-        f"β = {row['beta_deg']:g}°, {labels.ratio_of_d(row['z0_over_d'])}: off by "
+        f"β = {row['beta_deg']:g}°, {labels.ratio_of(row['z0_over_d'], 'd')}: off by "
         f"{row['factor']:.2f} ({row['bias']:.2f}; {worst})"
     )
 

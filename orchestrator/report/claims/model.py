@@ -108,7 +108,7 @@ def regimes(evidence: Evidence) -> Claim:
     piles = scenes[(scenes["bed"] == "pile") & (scenes["nu_m2_s"] == scenes["nu_m2_s"].min())]
     own = piles.drop_duplicates(["alpha_deg", "d_m", "z0_over_d"])
     measured = [
-        f"z₀ = {labels.ratio_of_d(float(str(ratio)))}: "
+        f"z₀ = {labels.ratio_of(float(str(ratio)), 'd')}: "
         f"{int((part['regime'] == 'transition').sum())} of {len(part)} piles at the lowest ν of "
         "the study are in the transition"
         for (ratio,), part in split(own, "z0_over_d")

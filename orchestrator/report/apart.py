@@ -1,0 +1,78 @@
+"""What tells the rows of a figure apart beyond its axes and colours: panels and markers."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+from matplotlib.lines import Line2D
+
+from orchestrator.report import labels
+from orchestrator.report.style import Sample
+from orchestrator.study import fields
+
+SHAPES = "os^DvP<X>p8hd*"
+"""Markers that are told from each other."""
+PAPER = ("low", "high")
+"""Force laws whose first markers are the same in every figure."""
+SHAPE = "shape"
+"""The column that holds a row's marker."""
+
+
+def varying(table: pd.DataFrame, *shown: str) -> list[str]:
+    """The fields in which rows differ that agree in all columns that are shown.
+
+    Of fields that vary together one is enough: what is asked comes before how it is answered.
+    Which of many alike a row is does not count.
+    """
+    found: list[str] = []
+    for about in ("question", "answer"):
+        for column in fields.others(table, *shown):
+            if column in fields.COLUMNS and fields.COLUMNS[column].info.about == about:
+                told = [*shown, *found]
+                if _count(table, [*told, column]) > _count(table, told):
+                    found.append(column)
+    return found
+
+
+def _count(table: pd.DataFrame, columns: Sequence[str]) -> int:
+    return len(table[list(columns)].drop_duplicates())
+
+
+def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame, list[Sample]]:
+    """How rows are told apart that agree in all columns that are shown.
+
+    Returns
+    -------
+    panels : list of str
+        The columns that part panels: those of what is asked.
+    rows : DataFrame
+        The table with a marker for each force law and each variant; a variant is one combination
+        of how scenes are answered.
+    entries : list of samples
+        What the markers of variants mean, for a legend; none where there is one variant.
+    """
+    found = varying(table, *shown)
+    panels = [column for column in found if fields.COLUMNS[column].info.about == "question"]
+    looks = [column for column in found if column not in panels]
+    laws = list(dict.fromkeys([*PAPER, *table["closure"]]))
+    while looks and _count(table, looks) * len(laws) > len(SHAPES):
+        panels.append(looks.pop(0))
+    variant = _variant(table, looks)
+    shape = variant * len(laws) + table["closure"].map(laws.index)
+    rows = table.assign(**{SHAPE: shape.map(lambda at: SHAPES[at % len(SHAPES)])})
+    entries = [_entry(own, looks) for _, own in rows.groupby(variant)] if looks else []
+    return panels, rows, entries
+
+
+def _variant(table: pd.DataFrame, looks: Sequence[str]) -> "pd.Series[int]":
+    """The number of each row's variant; the most frequent is the first."""
+    if not looks:
+        return pd.Series(0, index=table.index)
+    number = table.groupby(list(looks), dropna=False).ngroup()
+    order = number.groupby(number).size().sort_values(ascending=False, kind="stable").index
+    return number.map({old: new for new, old in enumerate(order)})
+
+
+def _entry(rows: pd.DataFrame, looks: Sequence[str]) -> Sample:
+    label = labels.panel(rows.iloc[0], looks)
+    markers = dict.fromkeys(rows.sort_values("closure", ascending=False)[SHAPE])
+    return tuple(Line2D([], [], ls="", marker=m, color="0.2", label=label) for m in markers)

@@ -1,0 +1,327 @@
+"""The parts of a scene: fluid, grain, bed, flow and protocol; frozen, validated, SI.
+
+Each field is declared here once: its name and default are the study file's, its `Info` and the
+text under it are what tables, figures and the reference of study files say of it. Angles are in
+degrees and say so in their names; all else is in SI units or in the unit that is declared.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.physics.laws import LAWS
+from orchestrator.study.info import Info
+
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(gt=0, le=1)]
+Packing = Literal["aligned", "horizontal", "disordered"]
+Stress = Literal["wall", "eq10"]
+Method = Literal["dem", "peeling", "pivot"]
+Model = Literal["solve", "hill", "flat"]
+Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
+Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
+Forced = Literal["exposed", "all but crest", "all but toe"]
+BEDS = {
+    "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
+    "pile": "a triangular pile of grains across the flow",
+}
+
+
+class UnfitError(ValueError):
+    """Two fields of a scene that do not go together: which, why and what would."""
+
+    def __init__(self, field: str, what: str, remedy: str) -> None:
+        self.field, self.what, self.remedy = field, what, remedy
+        super().__init__(f"{field}: {what} ({remedy})")
+
+
+class Part(BaseModel):
+    """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
+
+
+class Fluid(Part):
+    """The fluid; the default is the paper's air."""
+
+    density: Annotated[Positive, Info("fluid density", "ρ_f", "kg/m³", "rho_f_kg_m3")] = 1.0
+    """density of the fluid"""
+    viscosity: Annotated[Positive, Info("viscosity", "ν", "m²/s", "nu_m2_s")] = 1e-5
+    """kinematic viscosity that the grains feel"""
+    gravity: Annotated[Positive, Info("gravity", "g", "m/s²", "g_m_s2")] = GRAVITY
+    """acceleration of gravity"""
+
+
+class Grain(Part):
+    """Equal spheres and their contact law."""
+
+    diameter: Annotated[Positive, Info("diameter", "d", "m", "d_m")]
+    """grain diameter"""
+    density: Annotated[Positive, Info("grain density", "ρ_sol", "kg/m³", "rho_sol_kg_m3")] = 2500.0
+    """density of the grains"""
+    friction_angle_deg: Annotated[
+        float, Field(gt=0, lt=90), Info("friction angle", "φ", "°", "phi_deg")
+    ] = 35.0
+    """angle of Coulomb's friction between grains"""
+    stiffness: Annotated[
+        float, Field(ge=1e2, le=1e9), Info("stiffness", "K d/W", scope="DEM", about="answer")
+    ] = 1e4
+    """spring constant of a contact, normal and tangential, times the diameter over the weight"""
+    damping: Annotated[float, Field(ge=0, le=1), Info("damping", scope="DEM", about="answer")] = 0.1
+    """damping ratio of a collision"""
+
+
+class Bed(Part):
+    """What every bed has. Subclasses say which grains it is made of."""
+
+    slope_deg: Annotated[float, Field(ge=0, lt=90), Info("slope", "α", "°", "alpha_deg")] = 0.0
+    """slope of the bed; the flow goes up it"""
+    entrainment_angle_deg: Annotated[
+        float, Field(gt=0, le=60), Info("entrainment angle", "β", "°", "beta_deg")
+    ] = 60.0
+    """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
+    roughness: Annotated[Positive, Info("roughness length", "z_0", "m", "z0_m")]
+    """roughness length of the bed"""
+
+
+class GrainBed(Bed):
+    """One grain on its two fixed neighbours, in an undisturbed boundary layer (paper, 3.1)."""
+
+    kind: Annotated[Literal["grain"], Info("bed", column="bed", choices=BEDS)] = "grain"
+    """what the bed is made of"""
+
+
+class PileBed(Bed):
+    """A triangular pile of grains across the flow (paper, 3.2)."""
+
+    kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
+    """what the bed is made of"""
+    height: Annotated[Positive, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
+    """height of the bed line that the flow goes over"""
+    packing: Annotated[
+        Packing,
+        Info(
+            "packing",
+            scope="piles",
+            choices={
+                "aligned": "rows along the slope",
+                "horizontal": "level rows",
+                "disordered": "random gaps",
+            },
+        ),
+    ] = "aligned"
+    """pattern of the pile's grains; random gaps are between grains of rows along the slope"""
+    disorder: Annotated[
+        float, Field(gt=0, le=0.2), Info("disorder", unit="d", scope="disordered piles")
+    ] = 0.02
+    """largest gap between two grains of the row under the four uppermost"""
+    seed: Annotated[
+        int, Field(ge=0), Info("seed", scope="disordered piles and twins", about="replica")
+    ] = 0
+    """which of the many disordered packings; of a lattice 0 is itself, any other a replica with
+    grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
+    mobile_layers: Annotated[
+        int, Field(ge=1, le=1000), Info("mobile layers", scope="piles", about="answer")
+    ] = 2
+    """layers of the windward face that may move; below them the grains are fixed"""
+
+    @property
+    def is_twin(self) -> bool:
+        """Whether it is a lattice but for shifts that matter to nothing but round-off."""
+        return self.packing != "disordered" and self.seed > 0
+
+
+class Flow(Part):
+    """The flow over the bed, and how a grain feels it."""
+
+    model: Annotated[
+        Model,
+        Info(
+            "flow model",
+            column="flow_model",
+            scope="piles",
+            about="answer",
+            choices={
+                "solve": "OpenFOAM",
+                "hill": "linear theory of the flow over a low hill",
+                "flat": "log law of a flat bed, u* = u*₀",
+            },
+        ),
+    ] = "solve"
+    """where the stress on a pile comes from"""
+    speed: Annotated[
+        Positive,
+        Info("speed of the solve", "U_e", "m/s", "solve_u_e_m_s", "solved flows", "answer"),
+    ] = 10.0
+    """speed at the lid at which the flow over a pile is solved; the stress is scaled from it"""
+    viscosity: Annotated[
+        Positive,
+        Info("viscosity of the solve", "ν", "m²/s", "solve_nu_m2_s", "solved flows", "answer"),
+    ] = 1e-5
+    """kinematic viscosity of that solve: the wall is rough, the fluid's own moves only the grain's
+    Re*"""
+    first_cell_height: Annotated[
+        Positive | None,
+        Info(
+            "first cell",
+            unit="m",
+            column="first_cell_m",
+            scope="solved flows",
+            about="answer",
+            read="first_cell_height",
+        ),
+    ] = None
+    """height of the mesh's cells on the bed; by default h/40 or more, so that their centres are
+    15 z₀ from the bed, 10 z₀ on a low pile"""
+    cells_per_face: Annotated[
+        int, Field(ge=10, le=400), Info("cells per face", scope="solved flows", about="answer")
+    ] = 40
+    """cells of the mesh along each face of the pile"""
+    growth: Annotated[
+        float, Field(gt=1, le=2), Info("expansion ratio", scope="solved flows", about="answer")
+    ] = 1.1
+    """ratio of neighbouring cells up from the bed and away from the pile, with 40 cells along a
+    face; it follows their number"""
+    roughness: Annotated[
+        Positive | None,
+        Info(
+            "roughness length of the solve",
+            "z_0",
+            "m",
+            "solve_z0_m",
+            scope="piles",
+            about="answer",
+            read="solve_roughness",
+        ),
+    ] = None
+    """roughness length at which the flow is found, for beds of nearly the same one to share it; by
+    default the bed's"""
+    turbulence: Annotated[
+        Turbulence,
+        Info(
+            "turbulence model",
+            scope="solved flows",
+            about="answer",
+            choices={
+                "kEpsilon": "k-ε",
+                "RNGkEpsilon": "RNG k-ε",
+                "realizableKE": "realizable k-ε",
+                "kOmegaSST": "k-ω SST",
+            },
+        ),
+    ] = "kEpsilon"
+    """OpenFOAM's turbulence model"""
+    convection: Annotated[
+        Convection, Info("convection scheme", scope="solved flows", about="answer")
+    ] = "linearUpwind"
+    """OpenFOAM's scheme for the convection of U"""
+    correctors: Annotated[
+        int,
+        Field(ge=0, le=5),
+        Info("non-orthogonal correctors", scope="solved flows", about="answer"),
+    ] = 1
+    """repeated solves of the pressure for cells that are not orthogonal, in each iteration"""
+    closure: Annotated[
+        str,
+        Info(
+            "force law",
+            column="closure",
+            choices={
+                "auto": "Eq. 2 or Eq. 4 where each holds, both in the transition",
+                **{name: law.label for name, law in LAWS.items()},
+            },
+        ),
+    ] = "auto"
+    """drag and lift on an exposed grain"""
+    lift_coefficient: Annotated[
+        float, Field(ge=0), Info("lift coefficient", "α_s", column="alpha_s")
+    ] = LIFT_COEFFICIENT
+    """lift coefficient"""
+    stress: Annotated[
+        Stress,
+        Info(
+            "stress",
+            scope="piles",
+            choices={"wall": "wall stress", "eq10": "stress of Eq. 10"},
+        ),
+    ] = "wall"
+    """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
+    average: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = 1 / 40
+    """least length of bed that a grain's stress is averaged on: the crest's own value never
+    converges with the mesh"""
+    forced: Annotated[
+        Forced,
+        Info(
+            "forced grains",
+            scope="piles",
+            choices={
+                "exposed": "all exposed grains",
+                "all but crest": "exposed grains but for the topmost one",
+                "all but toe": "exposed grains but for those on the lowest 5 % of the face",
+            },
+        ),
+    ] = "exposed"
+    """grains of a pile that feel the flow's force"""
+
+    @field_validator("closure")
+    @classmethod
+    def _is_known(cls, value: str) -> str:
+        if value not in ("auto", *LAWS):
+            known = ", ".join(("auto", *LAWS))
+            raise UnfitError("flow.closure", f"unknown force law {value!r}", f"known: {known}")
+        return value
+
+
+class Protocol(Part):
+    """How the threshold is found; by DEM the flow rises in load steps."""
+
+    method: Annotated[
+        Method,
+        Info(
+            "threshold method",
+            about="answer",
+            choices={
+                "dem": "DEM",
+                "peeling": "peeling",
+                "pivot": "pivots",
+            },
+        ),
+    ] = "dem"
+    """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
+    another), or DEM"""
+    step: Annotated[
+        float, Field(gt=0, le=0.2), Info("load increment", "Δu*/u*", scope="DEM", about="answer")
+    ] = 0.02
+    """relative rise of u* from one load step to the next"""
+    quiet: Annotated[
+        float, Field(ge=1), Info("waiting time", unit="√(d/g′)", scope="DEM", about="answer")
+    ] = 10.0
+    """time without a passage of the displacement criterion that ends a load step"""
+    marker: Annotated[
+        float,
+        Field(gt=0, le=0.5),
+        Info("displacement criterion", unit="d", scope="DEM and peeling", about="answer"),
+    ] = 0.3
+    """displacement along the bed from which a grain counts as moved"""
+    until: Annotated[Fraction, Info("last fraction", scope="DEM of piles", about="answer")] = 0.9
+    """fraction of the exposed grains that should have moved by the last load step"""
+    fractions: Annotated[
+        tuple[Fraction, ...], Info("fractions", "n/N", column="-", scope="piles")
+    ] = (0.1, 0.3, 0.5, 0.7)
+    """fractions of the exposed grains at which the thresholds of a pile are reported"""
+    timestep: Annotated[
+        float, Field(gt=0, le=2), Info("time step", unit="√(m/K)", scope="DEM", about="answer")
+    ] = 0.2
+    """time step of the grains' integration"""
+
+    @field_validator("fractions", mode="before")
+    @classmethod
+    def _tuple_of_a_list(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value

@@ -1,0 +1,151 @@
+"""Rows that differ in a study's own axes are told apart, in figures and on the page."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.report import apart, captions, facts, labels, piles, shields
+from orchestrator.report.apart import SHAPE
+from orchestrator.report.results import Results
+from orchestrator.study import fields
+from tests.report.conftest import only
+
+SHOWN = ("alpha_deg", "d_m")
+
+
+@pytest.fixture
+def table() -> pd.DataFrame:
+    """Piles of two slopes, by two numbers of layers and two stiffnesses."""
+    return pd.DataFrame(
+        {
+            "alpha_deg": [15.0, 15.0, 15.0, 25.0],
+            "d_m": 1e-3,
+            "closure": "high",
+            "mobile_layers": [1, 2, 1, 1],
+            "stiffness": [1e3, 1e3, 1e4, 1e3],
+            "step": [0.02, 0.03, 0.02, 0.02],
+            "seed": [1, 2, 3, 4],
+        }
+    )
+
+
+def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
+    assert apart.varying(table, *SHOWN) == ["stiffness", "mobile_layers"]
+    assert apart.varying(table, *SHOWN, "mobile_layers") == ["stiffness"]
+    assert apart.varying(table.iloc[[0, 3]], *SHOWN) == []
+
+
+def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
+    asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
+    panels, rows, entries = apart.parted(asked, *SHOWN)
+    assert panels == ["packing"]
+    assert rows[SHAPE].tolist() == ["s", "D", "s", "s"]
+    names = [one[0].get_label() for one in entries if isinstance(one, tuple)]
+    assert names == ["mobile layers = 1", "mobile layers = 2"]
+
+
+def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
+    many = pd.concat([table.iloc[[0]]] * 20).assign(
+        stiffness=np.repeat([1e3, 1e4, 1e5, 1e6], 5), mobile_layers=[1, 2, 3, 4, 5] * 4
+    )
+    panels, rows, _ = apart.parted(many, *SHOWN)
+    assert panels == ["stiffness"]
+    assert rows[SHAPE].nunique() == 5
+
+
+def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
+    laws = table.assign(closure=["high", "bridged", "zeng", "low"])
+    _, rows, _ = apart.parted(laws, *SHOWN, "closure", "mobile_layers", "stiffness")
+    assert rows[SHAPE].tolist() == ["s", "^", "D", "o"]
+
+
+@pytest.fixture(scope="module")
+def two(results: Results) -> Results:
+    """The study's pile, and the same on one layer more."""
+    heap = only(results, "pile")
+    tables = {}
+    for name, own in heap.tables.items():
+        if "scene_id" in own:
+            other = own.assign(scene_id="another")
+            if name == "scenes":
+                other = other.assign(mobile_layers=2, answered_mobile_layers=2)
+            own = pd.concat([own, other], ignore_index=True)
+        tables[name] = own
+    return replace(heap, tables=tables)
+
+
+def test_curves_and_points_of_two_layers_are_told_apart(two: Results) -> None:
+    for figure in (*piles.fractions(two), *piles.extended(two)):
+        assert figure.canvas is not None
+        ax = figure.canvas.axes[0]
+        ids = (*two.scenes["scene_id"], *shields.RESULT[1:])
+        drawn = {line.get_marker() for line in ax.lines if line.get_gid() in ids}
+        assert drawn == {"s", "D"}
+        said = [text.get_text() for legend in figure.canvas.legends for text in legend.texts]
+        assert {"mobile layers = 1", "mobile layers = 2"} <= set(said)
+
+
+def test_rows_of_two_layers_are_told_apart(two: Results) -> None:
+    sheet = facts.piles(two)
+    assert sheet is not None
+    at = sheet.head.index("and")
+    assert {row[at] for row in sheet.rows} == {"mobile layers = 1", "mobile layers = 2"}
+
+
+def test_page_lists_every_parameter(results: Results) -> None:
+    sheet = facts.parameters(results)
+    listed = [row[2] for row in sheet.rows]
+    unused = {"bed.disorder", "bed.seed", "protocol.fractions"}
+    assert set(listed) >= {one.name for one in fields.FIELDS} - unused
+    asked = dict(zip(listed, sheet.rows, strict=True))
+    assert asked["flow.turbulence"][3:] == ("kEpsilon", "kEpsilon")
+    assert asked["flow.first_cell_height"][3] == "default"
+    assert float(asked["flow.first_cell_height"][4]) > 0
+
+
+def test_captions_say_what_the_scene_has(results: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    flow = pile.scene.flow.model_copy(
+        update={"turbulence": "RNGkEpsilon", "average": 1 / 20, "speed": 7.0}
+    )
+    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    assert "(k-ε, rough wall)" in captions.flow([pile])
+    assert "(RNG k-ε, rough wall), at the last iteration, for U_e = 7 m/s" in captions.flow([other])
+    assert f"{captions.averaged([pile])}" == "max(d, h/40)"
+    assert f"{captions.averaged([pile, other])}" == "max(d, h/40, h/20)"
+
+
+def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
+    rows = results.joined("pile_threshold")
+    assert "steps of 5 %" in captions.hold_protocol(rows)
+    without = rows.assign(answered_method="pivot", answered_step=None, shape="s")
+    said = captions.hold_protocol(without)
+    assert "Hold protocol" not in said
+    assert "pivots" in said
+    entries = [line.get_label() for line in shields.point_entries(without)]
+    assert entries == ["pivots, Eq. 4 (high Re*)"]
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("alpha_deg", 15.0, "α = 15°"),
+        ("z0_over_d", 0.033333333, "z₀ = d/30"),
+        ("d_m", 7e-4, "d = 0.7 mm"),
+        ("turbulence", "RNGkEpsilon", "RNG k-ε"),
+        ("convection", "upwind", "convection scheme upwind"),
+        ("mobile_layers", 3, "mobile layers = 3"),
+        ("quiet", 6.0, "waiting time = 6 √(d/g′)"),
+        ("average", 0.05, "averaging length = h/20"),
+        ("fraction", 0.3, "n/N = 30 %"),
+    ],
+)
+def test_values_with_their_symbols(column: str, value: object, said: str) -> None:
+    assert labels.plain(column, value) == said
+
+
+def test_values_in_mathematics() -> None:
+    assert labels.written("nu_m2_s", 1e-5) == "$ν$ = $10^{-5}$ m²/s"
+    assert labels.written("alpha_s", 1.6) == "$α_{s}$ = 1.6"

@@ -1,0 +1,113 @@
+"""The registry: every field has its words, and tells scenes apart."""
+
+from typing import Any, get_args
+
+import pytest
+
+from orchestrator import plan
+from orchestrator.fidelity.levels import LEVELS, Level, changed
+from orchestrator.study import fields, study
+from orchestrator.study.fields import Quantity
+from orchestrator.study.scene import Scene
+from orchestrator.tables import COLUMNS, scenes
+
+PILE = """
+[grain]
+diameter = 1e-3
+[bed]
+kind = "pile"
+slope_deg = 15.0
+packing = "disordered"
+[flow]
+closure = "high"
+"""
+CHANGEABLE = [one for one in fields.FIELDS if one.name not in ("bed.kind", "protocol.fractions")]
+
+
+def declared(one: Quantity) -> Any:
+    part, _, name = one.name.partition(".")
+    return fields.PARTS[part].model_fields[name]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """A scene on which every field has an effect."""
+    return study.parse(PILE, name="test", where="test").scenes[0]
+
+
+def other_value(one: Quantity, scene: Scene) -> Any:
+    value = one.used(scene)
+    if isinstance(value, str):
+        words = one.info.choices or get_args(declared(one).annotation)
+        return next(word for word in words if word not in (value, "auto"))
+    return value + 1 if isinstance(value, int) else 0.9 * value
+
+
+@pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)
+def test_each_field_has_its_words(one: Quantity) -> None:
+    assert one.info.label
+    assert one.meaning
+    assert not one.meaning.endswith(".")
+    words = [word for word in get_args(declared(one).annotation) if isinstance(word, str)]
+    if one.name != "bed.kind" and words and one.info.choices:
+        assert list(one.info.choices) == words
+
+
+def test_columns_are_distinct_and_explained() -> None:
+    columns = [one.column for one in (*fields.FIELDS, *fields.DERIVED)]
+    assert len(set(columns)) == len(columns)
+    assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
+
+
+@pytest.mark.parametrize("one", CHANGEABLE, ids=lambda one: one.name)
+def test_scenes_that_differ_in_a_field_are_not_equal_in_all_else(
+    one: Quantity, scene: Scene
+) -> None:
+    other = changed(scene, {one.name: other_value(one, scene)})
+    rows = [{**fields.asked(each), **fields.answered(each)} for each in (scene, other)]
+    columns = fields.others(rows[0])
+    assert [rows[0][c] for c in columns] != [rows[1][c] for c in columns]
+
+
+def test_beds_alike_but_for_the_size_of_their_grains_are_equal(scene: Scene) -> None:
+    sizes = (5e-4, 1e-3)
+    beds = [changed(scene, {"grain.diameter": d, "bed.roughness": d / 30}) for d in sizes]
+    rows = [{**fields.asked(each), **fields.answered(each)} for each in beds]
+    columns = fields.others(rows[0], "d_m")
+    assert [rows[0][c] for c in columns] == [rows[1][c] for c in columns]
+
+
+@pytest.mark.parametrize(
+    "one", [one for part in LEVELS.values() for one in part], ids=lambda one: one.name
+)
+def test_a_level_changes_fields_of_the_answer_alone(one: Level, scene: Scene) -> None:
+    about = {field.name: field.info.about for field in fields.FIELDS}
+    assert {about[name] for name in one.fields(scene)} == {"answer"}
+
+
+def test_what_has_no_effect_is_empty(scene: Scene) -> None:
+    flat = changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
+    row = fields.asked(flat)
+    empty = ("turbulence", "cells_per_face", "solve_u_e_m_s", "stiffness", "quiet", "marker")
+    assert [row[column] for column in empty] == [None] * len(empty)
+    assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
+
+
+def test_a_row_says_what_was_asked_and_what_answered_it() -> None:
+    asked = study.parse("tolerance = 0.05\n" + PILE, name="test", where="test")
+    planned = plan.make(asked)
+    (row,) = scenes.rows(asked, planned)
+    (one,) = asked.scenes
+    assert row["scene_id"] == one.id
+    assert fields.asked(one).items() <= row.items()
+    assert fields.answered(planned.decisions[one.id].scene).items() <= row.items()
+    assert row["method"] == "dem"
+    assert row["answered_method"] != "dem"
+    assert row["step"] == 0.02
+    assert row["answered_step"] is None
+
+
+def test_what_is_left_open_is_worked_out_in_the_answer(scene: Scene) -> None:
+    assert fields.asked(scene)["first_cell_m"] is None
+    assert fields.answered(scene)["answered_first_cell_m"] == scene.first_cell_height
+    assert fields.used(scene)["solve_z0_m"] == scene.bed.roughness
