@@ -1,7 +1,6 @@
 """The command line: parse, call, print."""
 
 import argparse
-import json
 import os
 import sys
 import warnings
@@ -12,20 +11,11 @@ from typing import Any
 
 from orchestrator import __version__, signals, streams
 from orchestrator.benchmark import cli as benchmark
-from orchestrator.errors import InputError, OrchestratorError, of_system
+from orchestrator.calculator import cli as calculator
+from orchestrator.errors import OrchestratorError, of_system
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
 INTERRUPTED = 130
-NUMBERS: dict[str, tuple[float | None, str]] = {
-    "--diameter": (None, "d, m"),
-    "--density": (2500.0, "rho_sol, kg/m3"),
-    "--fluid-density": (1.0, "rho_f, kg/m3"),
-    "--viscosity": (1e-5, "nu, m2/s"),
-    "--slope": (0.0, "alpha, degrees; the flow goes up it"),
-    "--entrainment-angle": (60.0, "beta, degrees"),
-    "--lift-coefficient": (1.615, "alpha_s"),
-}
-"""Options of one grain, with the paper's values as defaults."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -64,10 +54,9 @@ VALUED = (
     "--solver",
     "--from",
     "--scene",
-    "--roughness",
-    *NUMBERS,
+    *calculator.VALUED,
 )
-FLAGS = ("-h", "--help", "--version", "--json", "--")
+FLAGS = ("-h", "--help", "--version", "--json", *calculator.FLAGS, "--")
 
 
 def _plain(arguments: Sequence[str]) -> list[str]:
@@ -95,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
     _add_study(commands)
-    _add_threshold(commands)
+    calculator.add(commands)
     _add_directory_commands(commands)
     _add_experiments(commands)
     benchmark.add(commands)
@@ -150,20 +139,6 @@ def _add_experiments(commands: Any) -> None:
     command = commands.add_parser("stability", help="maps of where each method fails")
     _add_run_options(command)
     command.set_defaults(run=_stability)
-
-
-def _add_threshold(commands: Any) -> None:
-    command = commands.add_parser("threshold", help="one grain, closed form: an answer at once")
-    for name, (default, meaning) in NUMBERS.items():
-        text = meaning if default is None else f"{meaning}; default {default:g}"
-        command.add_argument(
-            name, type=float, default=default, required=default is None, metavar="X", help=text
-        )
-    command.add_argument(
-        "--roughness", default="d/30", metavar="Z0", help='z0, m or "d/30"; default %(default)s'
-    )
-    command.add_argument("--json", action="store_true", help="for programs")
-    command.set_defaults(run=_threshold)
 
 
 def _add_directory_commands(commands: Any) -> None:
@@ -252,37 +227,3 @@ def _doctor(options: argparse.Namespace) -> int:
     findings = doctor.examine()
     print(doctor.text(findings))
     return 0 if all(finding.good for finding in findings) else 1
-
-
-OPTION_OF = {
-    "grain.diameter": "--diameter",
-    "grain.density": "--density",
-    "fluid.density": "--fluid-density",
-    "fluid.viscosity": "--viscosity",
-    "bed.slope_deg": "--slope",
-    "bed.entrainment_angle_deg": "--entrainment-angle",
-    "bed.roughness": "--roughness",
-    "flow.lift_coefficient": "--lift-coefficient",
-}
-
-
-def _threshold(options: argparse.Namespace) -> int:
-    from orchestrator.fidelity import limits
-    from orchestrator.grains import answer
-
-    try:
-        scene = answer.scene(
-            {
-                field: getattr(options, name[2:].replace("-", "_"))
-                for field, name in OPTION_OF.items()
-            }
-        )
-        limits.check(scene, "threshold")
-    except InputError as error:
-        field = error.where.rpartition(": ")[2]
-        raise InputError(
-            error.what, where=OPTION_OF.get(field, field), remedy=error.remedy
-        ) from None
-    found = answer.of(scene)
-    print(json.dumps(found, indent=2) if options.json else answer.text(found))
-    return 0

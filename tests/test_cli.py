@@ -52,7 +52,7 @@ def test_threshold_for_people_and_with_a_roughness_in_metres(orchestrator: Comma
     one = orchestrator("threshold", "--diameter", "1e-3", "--roughness", "1e-4")
     other = orchestrator("threshold", "--diameter", "1e-3", "--roughness", "d/10")
     assert one.stdout == other.stdout
-    assert "regime: high" in one.stdout
+    assert "paper's rule: Eq. 4 (high)" in one.stdout
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_threshold_for_people_and_with_a_roughness_in_metres(orchestrator: Comma
         (["--diameter", "-1e-3"], ["--diameter", "greater than 0"]),
         (["--diameter", "0"], ["--diameter", "greater than 0"]),
         (["--diameter", "nan"], ["--diameter", "finite"]),
-        (["--diameter", "1e-3", "--density", "1"], ["--density", "float"]),
+        (["--diameter", "1e-3", "--density", "1"], ["--density", "not above"]),
         (["--diameter", "1e-3", "--slope", "31"], ["--slope", "30"]),
         (["--diameter", "1e-3", "--entrainment-angle", "61"], ["--entrainment-angle", "60"]),
         (["--diameter", "1e-3", "--roughness", "rough"], ["--roughness", "d/30"]),

@@ -1,0 +1,1 @@
+"""The command `threshold`: closed-form thresholds of single grains, for one or for ranges."""

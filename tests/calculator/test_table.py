@@ -1,0 +1,59 @@
+"""The table of thresholds, as Python sees it."""
+
+from typing import get_args, get_type_hints
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.calculator.parameters import OPTION_OF, SCENE
+from orchestrator.calculator.table import thresholds
+from orchestrator.errors import InputError
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import threshold
+from orchestrator.study.scene import Scene
+
+
+def test_every_point_and_law_is_the_closed_form_of_it() -> None:
+    d = np.geomspace(5e-5, 5e-3, 40)
+    slopes = np.linspace(0, 30, 40)
+    table = thresholds(pd.DataFrame({"diameter": d, "slope_deg": slopes}))
+    assert len(table) == 40 * len(LAWS)
+    for name, law in LAWS.items():
+        here = Exposure(d, d / 30, 1.0, 1e-5)
+        one = threshold(law, here, density=2500.0, slope_deg=slopes, entrainment_angle_deg=60.0)
+        rows = table[table["law"] == name]
+        np.testing.assert_allclose(rows["ustar_m_s"], one.friction_velocity, rtol=1e-9)
+        np.testing.assert_array_equal(rows["valid"], one.valid)
+        for ustar, z, diameter, why in zip(
+            rows["ustar_m_s"], rows["z0_m"], d, rows["why_not"], strict=True
+        ):
+            assert why == law.why_not(ustar, Exposure(diameter, z, 1.0, 1e-5))
+
+
+def test_gases_and_liquids_in_one_table() -> None:
+    points = pd.DataFrame(
+        {"diameter": 1e-3, "fluid_density": [1.0, 1000.0], "viscosity": [1e-5, 1e-6], "depth": 1.0}
+    )
+    air, water = (one for _, one in thresholds(points, "profile").query("answer").iterrows())
+    assert air["law"] == water["law"] == "profile"
+    assert np.isnan(air["mean_velocity_m_s"])
+    assert np.isnan(water["wind_10m_m_s"])
+    assert water["mean_velocity_m_s"] > 10 * water["ustar_m_s"]
+    assert air["wind_10m_m_s"] > air["wind_1m_m_s"] > 10 * air["ustar_m_s"]
+
+
+def test_a_point_that_is_no_scene_is_named() -> None:
+    with pytest.raises(InputError, match=r"grain.diameter: -1.0"):
+        thresholds(pd.DataFrame({"diameter": [1e-3, -1.0]}))
+
+
+def test_parameters_are_fields_of_a_scene() -> None:
+    for parameter in SCENE:
+        part, field = parameter.field.split(".")
+        # a bed is one of several kinds
+        annotation = Scene.model_fields[part].annotation
+        kinds = get_args(annotation) or [annotation]
+        assert all(field in get_type_hints(kind) for kind in kinds)
+    assert len(set(OPTION_OF.values())) == len(OPTION_OF)
