@@ -15,7 +15,7 @@ RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
     "several ranges give every combination. Values of diameter, viscosity, roughness and depth "
     "are spaced geometrically, all others evenly. Winds are those of the logarithmic law over z0; "
-    "a fluid below 100 kg/m3 is a gas. A law that does not hold is marked and told why."
+    "a fluid below 100 kg/m3 is a gas. A law that does not hold is marked, with the reason."
 )
 
 

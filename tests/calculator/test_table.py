@@ -1,18 +1,16 @@
 """The table of thresholds, as Python sees it."""
 
-from typing import get_args, get_type_hints
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.calculator.parameters import OPTION_OF, SCENE
+from orchestrator.calculator.parameters import OPTION_OF, ROUGHNESS, SCENE
 from orchestrator.calculator.table import thresholds
 from orchestrator.errors import InputError
 from orchestrator.physics.exposure import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import threshold
-from orchestrator.study.scene import Scene
+from orchestrator.study.fields import FIELDS, PARTS
 
 
 def test_every_point_and_law_is_the_closed_form_of_it() -> None:
@@ -49,11 +47,12 @@ def test_a_point_that_is_no_scene_is_named() -> None:
         thresholds(pd.DataFrame({"diameter": [1e-3, -1.0]}))
 
 
-def test_parameters_are_fields_of_a_scene() -> None:
+def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> None:
+    fields = {one.name: one for one in FIELDS}
     for parameter in SCENE:
-        part, field = parameter.field.split(".")
-        # a bed is one of several kinds
-        annotation = Scene.model_fields[part].annotation
-        kinds = get_args(annotation) or [annotation]
-        assert all(field in get_type_hints(kind) for kind in kinds)
-    assert len(set(OPTION_OF.values())) == len(OPTION_OF)
+        assert parameter.column == fields[parameter.field].column
+        part, _, name = parameter.field.partition(".")
+        declared = PARTS[part].model_fields[name]
+        if parameter is not ROUGHNESS:  # its default is a part of the diameter
+            assert parameter.default == (None if declared.is_required() else declared.default)
+    assert len(set(OPTION_OF.values())) == len(SCENE) + 1
