@@ -215,9 +215,10 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _prune(options: argparse.Namespace) -> int:
-    from orchestrator import prune
+    from orchestrator import pipeline
+    from orchestrator.runs import prune
 
-    print(prune.text(prune.prune(options.directory)))
+    print(prune.text(pipeline.prune(options.directory)))
     return 0
 
 

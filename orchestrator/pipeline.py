@@ -9,6 +9,7 @@ from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.runs import case, cluster, engine
+from orchestrator.runs import prune as pruning
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import (
@@ -131,6 +132,25 @@ def redraw(out: Path) -> Finished:
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, planned.done(space.cases), failures)
     return Finished(space.page, 0, failures)
+
+
+def prune(directory: Path) -> pruning.Pruned:
+    """Drop the bulky files of a study's finished cases, but for those that its page shows.
+
+    Raises
+    ------
+    InputError
+        If the directory holds no study.
+    OrchestratorError
+        If it is being run.
+    """
+    space = Workspace(directory.absolute())
+    study, planned = reopen(space)
+    with space.held():
+        done = planned.done(space.cases)
+        made = tables.make(study, planned, space.cases, done)
+        shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}
+        return pruning.prune(space, {name: planned.cases[name] for name in done}, shown)
 
 
 def reopen(space: Workspace) -> tuple[Study, Plan]:

@@ -91,7 +91,7 @@ def test_no_matplotlibrc_of_the_working_directory_does(
 SEALED = """
 import sys
 from pathlib import Path
-import orchestrator.benchmark.runner, orchestrator.experiments.run, orchestrator.prune
+import orchestrator.benchmark.runner, orchestrator.experiments.run, orchestrator.pipeline
 assert "matplotlib" not in sys.modules
 from orchestrator.report import settings
 with settings.own():

@@ -1,11 +1,10 @@
-"""Make a finished study small: what fills the disk and what no table is made of goes."""
+"""Make a finished study small: drop the files that fill the disk and that no table is made of."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
-from orchestrator import pipeline, report, tables
 from orchestrator.runs import case
+from orchestrator.runs.case import Case
 from orchestrator.runs.status import size_text, sizes
 from orchestrator.runs.workspace import Workspace
 
@@ -30,29 +29,27 @@ class Pruned:
     kept: tuple[str, ...]
 
 
-def prune(directory: Path) -> Pruned:
-    """Drop the bulky files of a study's finished cases, but for those that its page shows.
+def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> Pruned:
+    """Drop the bulky files of finished cases, but for those that a page shows.
 
     What tables and page are made of stays, and so do the inputs: ``./Allrun`` in a case makes
     what was dropped anew, and compares it with the digests of the first run.
 
-    Raises
-    ------
-    InputError
-        If the directory holds no study.
-    OrchestratorError
-        If it is being run.
+    Parameters
+    ----------
+    space : Workspace
+        Of the study; held.
+    done : mapping of str to Case
+        The finished cases by name.
+    shown : container of str
+        Names of those that the page's pictures are drawn from.
     """
-    space = Workspace(directory.absolute())
-    study, planned = pipeline.reopen(space)
-    with space.held():
-        done, before = planned.done(space.cases), sizes(space)
-        made = tables.make(study, planned, space.cases, done)
-        shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}
-        for name in done.keys() - shown:
-            case.prune(planned.cases[name], space.cases)
-        kept = tuple(name for name in done if name in shown)
-        return Pruned(before, sizes(space), len(done) - len(kept), kept)
+    before = sizes(space)
+    kept = tuple(name for name in done if name in shown)
+    for name, one in done.items():
+        if name not in shown:
+            case.prune(one, space.cases)
+    return Pruned(before, sizes(space), len(done) - len(kept), kept)
 
 
 def text(pruned: Pruned) -> str:
