@@ -80,7 +80,7 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "piles": lambda scene: isinstance(scene.bed, PileBed),
     "disordered piles": _is_disordered,
-    "disordered piles and twins": lambda scene: (
+    "disordered piles and replicas": lambda scene: (
         isinstance(scene.bed, PileBed) and (_is_disordered(scene) or scene.bed.is_twin)
     ),
     "solved flows": _is_solved,
@@ -93,6 +93,12 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
 def info(declared: FieldInfo) -> Info:
     """The words that a field is declared with."""
     return next(one for one in declared.metadata if isinstance(one, Info))
+
+
+def declared(one: Quantity) -> FieldInfo:
+    """The declaration of a field: its range and its default."""
+    part, _, name = one.name.partition(".")
+    return PARTS[part].model_fields[name]
 
 
 def _fields() -> Iterator[Quantity]:

@@ -8,7 +8,7 @@ Scope = Literal[
     "every scene",
     "piles",
     "disordered piles",
-    "disordered piles and twins",
+    "disordered piles and replicas",
     "solved flows",
     "DEM",
     "DEM of piles",

@@ -88,7 +88,7 @@ class Bed(Part):
     ] = 60.0
     """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
     roughness: Annotated[Positive, Info("roughness length", "z_0", "m", "z0_m")]
-    """roughness length of the bed"""
+    """roughness length of the bed; a study file may write a part of the diameter: "d/30" """
 
 
 class GrainBed(Bed):
@@ -123,7 +123,7 @@ class PileBed(Bed):
     ] = 0.02
     """largest gap between two grains of the row under the four uppermost"""
     seed: Annotated[
-        int, Field(ge=0), Info("seed", scope="disordered piles and twins", about="replica")
+        int, Field(ge=0), Info("seed", scope="disordered piles and replicas", about="replica")
     ] = 0
     """which of the many disordered packings; of a lattice 0 is itself, any other a replica with
     grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
@@ -290,7 +290,7 @@ class Protocol(Part):
             choices={
                 "dem": "DEM",
                 "peeling": "peeling",
-                "pivot": "pivots",
+                "pivot": "pivot",
             },
         ),
     ] = "dem"

@@ -26,6 +26,8 @@ PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
 TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
 TIME_LIMIT_S = 3600.0
+BED = {"kind": "grain", "roughness": "d/30"}
+"""Fields of a bed that a file may leave out."""
 MOST_SCENES = 100_000
 
 
@@ -243,12 +245,12 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
     InputError
         For the first thing wrong: the file, the field and the remedy.
     """
-    bed = {"kind": "grain", **parts["bed"]}
+    bed = {**BED, **parts["bed"]}
     diameter = parts["grain"].get("diameter")
     try:
         # of a number beyond all floats the model says itself that it is wrong
         if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
-            bed["roughness"] = roughness_length(bed.get("roughness", "d/30"), diameter)
+            bed["roughness"] = roughness_length(bed["roughness"], diameter)
         return Scene.model_validate({**parts, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None

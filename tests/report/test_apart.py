@@ -123,9 +123,9 @@ def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     without = rows.assign(answered_method="pivot", answered_step=None, shape="s")
     said = captions.hold_protocol(without)
     assert "Hold protocol" not in said
-    assert "pivots" in said
+    assert "pivot" in said
     entries = [line.get_label() for line in shields.point_entries(without)]
-    assert entries == ["pivots, Eq. 4 (high Re*)"]
+    assert entries == ["pivot, Eq. 4 (high Re*)"]
 
 
 @pytest.mark.parametrize(

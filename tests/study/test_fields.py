@@ -1,12 +1,13 @@
 """The registry: every field has its words, and tells scenes apart."""
 
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
 
 from orchestrator import plan
 from orchestrator.fidelity.levels import LEVELS, Level, changed
-from orchestrator.study import fields, study
+from orchestrator.study import fields, reference, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.scene import Scene
 from orchestrator.tables import COLUMNS, scenes
@@ -24,11 +25,6 @@ closure = "high"
 CHANGEABLE = [one for one in fields.FIELDS if one.name not in ("bed.kind", "protocol.fractions")]
 
 
-def declared(one: Quantity) -> Any:
-    part, _, name = one.name.partition(".")
-    return fields.PARTS[part].model_fields[name]
-
-
 @pytest.fixture(scope="module")
 def scene() -> Scene:
     """A scene on which every field has an effect."""
@@ -38,7 +34,7 @@ def scene() -> Scene:
 def other_value(one: Quantity, scene: Scene) -> Any:
     value = one.used(scene)
     if isinstance(value, str):
-        words = one.info.choices or get_args(declared(one).annotation)
+        words = one.info.choices or get_args(fields.declared(one).annotation)
         return next(word for word in words if word not in (value, "auto"))
     return value + 1 if isinstance(value, int) else 0.9 * value
 
@@ -48,7 +44,7 @@ def test_each_field_has_its_words(one: Quantity) -> None:
     assert one.info.label
     assert one.meaning
     assert not one.meaning.endswith(".")
-    words = [word for word in get_args(declared(one).annotation) if isinstance(word, str)]
+    words = [word for word in get_args(fields.declared(one).annotation) if isinstance(word, str)]
     if one.name != "bed.kind" and words and one.info.choices:
         assert list(one.info.choices) == words
 
@@ -111,3 +107,30 @@ def test_what_is_left_open_is_worked_out_in_the_answer(scene: Scene) -> None:
     assert fields.asked(scene)["first_cell_m"] is None
     assert fields.answered(scene)["answered_first_cell_m"] == scene.first_cell_height
     assert fields.used(scene)["solve_z0_m"] == scene.bed.roughness
+
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_reference_of_study_files_is_written_from_the_registry() -> None:
+    assert (DOCS / "study-file.md").read_text(encoding="utf-8") == reference.text()
+
+
+@pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)
+def test_reference_has_every_field(one: Quantity) -> None:
+    part, _, name = one.name.partition(".")
+    section = reference.text().split(f"## `[{part}]`")[1].split("\n## ")[0]
+    (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
+    assert one.meaning.replace("*", r"\*") in row
+    assert row.count(" | ") == 8
+
+
+def test_reference_says_ranges_and_defaults() -> None:
+    rows = {line.split(" | ")[0]: line for line in reference.text().splitlines()}
+    assert "| ≥ 0, < 90 | `0.0` |" in rows["| `slope_deg`"]
+    assert "| > 0 | worked out |" in rows["| `first_cell_height`"]
+    assert "| > 0 | none: required |" in rows["| `diameter`"]
+    assert "| > 0, ≤ 1 | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
+    assert '| `"d/30"` | roughness length of the bed' in reference.text()
+    assert '<br>`"RNGkEpsilon"`: RNG k-ε<br>' in rows["| `turbulence`"]
+    assert '<br>`"upwind"`<br>' in rows["| `convection`"]
