@@ -43,7 +43,8 @@ class Scene(Part):
         check_density(self.grain.density, self.fluid.density)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
-            check_mesh(self.bed.height, self.first_cell_height)
+            if self.flow.model == "solve":
+                check_mesh(self.bed.height, self.first_cell_height)
         elif self.bed.roughness >= self.grain.diameter:
             raise UnfitError(
                 "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator import plan
+from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
@@ -35,6 +36,13 @@ def test_a_theory_needs_no_case(tmp_path: Path) -> None:
     assert rising[0] < 0.7
     assert rising[-1] > 1.5
     assert (np.diff(rising) >= 0).all()
+
+
+def test_a_theory_is_not_refused_for_a_mesh_that_it_has_not(tmp_path: Path) -> None:
+    (pile,) = piles('model = "hill"\nfirst_cell_height = 0.01\n')
+    assert pile.face(tmp_path).speed[-1] > 1.5
+    with pytest.raises(InputError, match="a quarter of the pile"):
+        piles("first_cell_height = 0.01\n")
 
 
 @pytest.mark.parametrize(
