@@ -51,6 +51,8 @@ class ForceLaw(ABC):
         Range of Re* in which the law holds: low <= Re* < high.
     drag_law, drag_end : str, float
         Whose drag it is and the particle Reynolds number at which that ends.
+    turns : bool
+        Whether the flow also turns the grain about its centre.
     """
 
     name: ClassVar[str]
@@ -59,6 +61,7 @@ class ForceLaw(ABC):
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
+    turns: ClassVar[bool] = False
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import weight
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.parts import (
@@ -41,6 +42,7 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
+        check_method(self.flow.closure, self.protocol.method)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
@@ -99,6 +101,16 @@ def check_density(density: float, fluid_density: float) -> None:
             "grain.density",
             f"{density:g} kg/m3 is not above the fluid's {fluid_density:g} kg/m3",
             "the grain would float; raise it, or lower fluid.density",
+        )
+
+
+def check_method(law: str, method: str) -> None:
+    """A grain feels forces in DEM and in peeling, no torque."""
+    if law in LAWS and LAWS[law].turns and method != "pivot":
+        raise UnfitError(
+            "flow.closure",
+            f"{law} turns the grain about its centre, which the method {method} leaves out",
+            'choose the method "pivot", or a force law without torque',
         )
 
 

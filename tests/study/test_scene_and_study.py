@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,7 @@ from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.parts import Grain, GrainBed, PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import make_scene
 
 PILE = """
 [grain]
@@ -55,6 +57,26 @@ def test_a_group_overrides_the_tables_at_the_top() -> None:
     )
     assert [group.name for group in found.groups] == ["one", "group 2"]
     assert [s.grain.density for s in found.scenes] == [3000.0, 2650.0]
+
+
+def test_a_law_that_turns_the_grain_is_for_pivots_alone() -> None:
+    fields = {"diameter": 1e-3}
+    for method in ("dem", "peeling"):
+        parts = {"grain": fields, "protocol": {"method": method}}
+        with pytest.raises(InputError, match="zeng-torque turns the grain"):
+            make_scene(_with_law("zeng-torque", parts), "test")
+    make_scene(_with_law("zeng-torque", {"grain": fields, "protocol": {"method": "pivot"}}), "test")
+    make_scene(_with_law("zeng", {"grain": fields}), "test")
+
+
+def test_an_unknown_law_is_named_with_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"unknown force law 'bridge'.*bridged.*profile.*zeng"):
+        make_scene(_with_law("bridge", {"grain": {"diameter": 1e-3}}), "test")
+
+
+def _with_law(law: str, parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    empty: dict[str, dict[str, Any]] = {"fluid": {}, "bed": {}, "protocol": {}}
+    return {**empty, "flow": {"closure": law}, **parts}
 
 
 def test_the_transition_is_run_with_both_closures() -> None:
@@ -147,6 +169,7 @@ def test_bad_files_are_refused_with_place_and_reason(text: str, where: str, word
 SOLVERS = """
 import sys
 from orchestrator.study import study
+from orchestrator.study.study import make_scene
 for name in study.preset_names():
     assert study.load(name).scenes
 loaded = set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"}

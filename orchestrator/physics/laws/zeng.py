@@ -72,6 +72,7 @@ class ZengTorque(Zeng):
 
     name: ClassVar[str] = "zeng-torque"
     label: ClassVar[str] = "Zeng et al. 2009, with torque"
+    turns: ClassVar[bool] = True
 
     def torque(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Torque about the centre, N m."""
