@@ -62,7 +62,7 @@ def test_a_group_overrides_the_tables_at_the_top() -> None:
 def test_a_law_that_turns_the_grain_is_for_pivots_alone() -> None:
     fields = {"diameter": 1e-3}
     for method in ("dem", "peeling"):
-        parts = {"grain": fields, "protocol": {"method": method}}
+        parts: dict[str, dict[str, Any]] = {"grain": fields, "protocol": {"method": method}}
         with pytest.raises(InputError, match="zeng-torque turns the grain"):
             make_scene(_with_law("zeng-torque", parts), "test")
     make_scene(_with_law("zeng-torque", {"grain": fields, "protocol": {"method": "pivot"}}), "test")
