@@ -172,6 +172,12 @@ def _study(options: argparse.Namespace) -> int:
     finished = pipeline.run(asked, out, workers=options.workers, queue=queue)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
+    if finished.left:
+        print(
+            f"the study file has changed: {len(finished.left)} cases are not asked for any more; "
+            f"`orchestrator status {out}` names them",
+            file=sys.stderr,
+        )
     return _end(finished.page, finished.failures)
 
 

@@ -11,18 +11,11 @@ from orchestrator.plan import Plan
 from orchestrator.runs import case, cluster, engine
 from orchestrator.runs import prune as pruning
 from orchestrator.runs.case import Case
+from orchestrator.runs.claim import STUDY, told
 from orchestrator.runs.cluster import Queue
-from orchestrator.runs.files import (
-    canonical_json,
-    digest_file,
-    digest_files,
-    digest_text,
-    discard,
-    read_json,
-    write_json,
-)
+from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
 from orchestrator.runs.progress import Display
-from orchestrator.runs.workspace import Workspace
+from orchestrator.runs.workspace import DRAWN, STATE, Workspace
 from orchestrator.study.study import Study, parse
 
 
@@ -38,11 +31,14 @@ class Finished:
         How many cases were run.
     failures : dict of str to OrchestratorError
         The cases that failed, with why.
+    left : tuple of str
+        If the study has changed since the last time, the cases that it does not ask for now.
     """
 
     page: Path
     started: int
     failures: dict[str, OrchestratorError]
+    left: tuple[str, ...] = ()
 
 
 def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
@@ -70,9 +66,9 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
     """
     plan.make(study)  # what cannot be answered is refused before anything is written
     space = Workspace(out.absolute())
-    with space.held():
+    with space.held(STUDY, study.name):
         planned = plan.settled(study, space.cases)
-        _claim(space, study, planned)
+        changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
         failures: dict[str, OrchestratorError] = {}
         while todo := _without(planned.cases, {*states, *failures}):
@@ -82,17 +78,21 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
             )
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
-            _claim(space, study, planned)
+            _describe(space, study, planned)
             states |= planned.done(space.cases, _without(planned.cases, states))
         failures = {name: error for name, error in failures.items() if name in planned.cases}
         if started or not _is_drawn(study, planned, space):
             draw(study, planned, space, states, failures)
-        return Finished(space.page, started, failures)
+        left = space.left(planned.cases) if changed else ()
+        return Finished(space.page, started, failures, left)
 
 
-def _claim(space: Workspace, study: Study, planned: Plan) -> None:
+def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
+    """Say in the directory what is asked for; whether it is something else than before."""
     about = {"study": study.text, "tolerance": study.tolerance}
-    space.claim(study.name, list(planned.cases), **about)
+    before = told(space.root, STUDY) or {}
+    space.describe(STUDY, study.name, list(planned.cases), **about)
+    return any(before.get(key, value) != value for key, value in about.items())
 
 
 def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
@@ -127,7 +127,7 @@ def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
-    with space.held():
+    with space.held(STUDY, study.name):
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, planned.done(space.cases), failures)
@@ -146,7 +146,7 @@ def prune(directory: Path) -> pruning.Pruned:
     """
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
-    with space.held():
+    with space.held(STUDY, study.name):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}
@@ -184,18 +184,18 @@ def draw(
 
     The states are those of the cases that are done, by name, as `Plan.done` gives them.
     """
-    discard(space.drawn)
+    space.folder.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
-    tables.write(results, space.tables)
-    tables.write({"timings": times}, space.root / "timings")
     causes = {name: str(error) for name, error in failures.items()}
-    report.write(study, planned, results, times, causes, space.root)
+    with space.folder.renewed(*DRAWN):
+        tables.write(results, space.folder, "tables")
+        tables.write({"timings": times}, space.folder, "timings")
+        report.write(study, planned, results, times, causes, space.folder)
     if not failures:
-        written = [path for path in space.tables.iterdir() if path.is_file()]
-        files = digest_files([*written, space.page], root=space.root)
-        write_json(space.drawn, {"of": _origin(study, planned), "sha256": files})
+        drawn = {"of": _origin(study, planned), "sha256": space.folder.written()}
+        space.folder.note(STATE, text_of(drawn))
 
 
 def _origin(study: Study, planned: Plan) -> str:
@@ -205,12 +205,5 @@ def _origin(study: Study, planned: Plan) -> str:
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:
-    state = read_json(space.drawn)
-    try:
-        return (
-            isinstance(state, dict)
-            and state["of"] == _origin(study, planned)
-            and all(digest_file(space.root / name) == sha for name, sha in state["sha256"].items())
-        )
-    except (KeyError, AttributeError, OSError):
-        return False
+    drawn = {"of": _origin(study, planned), "sha256": space.folder.written()}
+    return read_json(space.drawn) == drawn and space.folder.is_whole()

@@ -12,6 +12,7 @@ from orchestrator.benchmark.verdict import Contender, failures
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.facts import Sheet
+from orchestrator.runs.folder import Folder
 
 WIDE = 100
 """Characters of a message before it is broken."""
@@ -24,12 +25,13 @@ LIMITS = (
 )
 
 
-def write(pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame, file: Path) -> Path:
+def write(pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame, file: Path) -> None:
     """Write the page and its figures; `levels` is the summary."""
     names = ", ".join(one.name for one in contenders)
     title = f"Against the pack “{pack.root.name}”: {names}"
     sections = list(_sections(pack, contenders, levels))
-    return experiment.write(title, sections, file, pack.manifest.get("programs", {}))
+    programs = pack.manifest.get("programs", {})
+    experiment.write(title, sections, Folder(file.parent), file.name, programs)
 
 
 def _sections(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 import pandas as pd
 
@@ -14,17 +13,18 @@ from orchestrator.fidelity import levels, limits
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
+from orchestrator.runs.workspace import Workspace
 
 CHART = "speed-against-accuracy"
 ERROR_COLUMNS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
 
 
 def write_ladder(
-    tables: Mapping[str, pd.DataFrame], file: Path, programs: Mapping[str, str]
+    tables: Mapping[str, pd.DataFrame], space: Workspace, programs: Mapping[str, str]
 ) -> None:
     """Write the page of the ladder: points, levels and naive routes."""
     sections = list(_ladder(tables["points"], tables["levels"], tables["naive"]))
-    experiment.write("Speed against accuracy", sections, file, programs)
+    experiment.write("Speed against accuracy", sections, space.folder, space.page.name, programs)
 
 
 def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> Iterator[Section]:
@@ -132,11 +132,12 @@ def _wide(known: pd.DataFrame) -> pd.DataFrame:
 def write_stability(
     drawn: Sequence[Map],
     judged: Mapping[str, pd.DataFrame],
-    file: Path,
+    space: Workspace,
     programs: Mapping[str, str],
 ) -> None:
     """Write the page of the maps: the sheet of all, then each by itself."""
-    experiment.write("Where each method fails", list(_stability(drawn, judged)), file, programs)
+    sections = list(_stability(drawn, judged))
+    experiment.write("Where each method fails", sections, space.folder, space.page.name, programs)
 
 
 def _stability(drawn: Sequence[Map], judged: Mapping[str, pd.DataFrame]) -> Iterator[Section]:

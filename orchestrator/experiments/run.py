@@ -13,8 +13,9 @@ from orchestrator.plan import of
 from orchestrator.report import settings
 from orchestrator.runs import case as case_states
 from orchestrator.runs.case import Case
-from orchestrator.runs.files import write_durably
-from orchestrator.runs.workspace import Workspace
+from orchestrator.runs.claim import EXPERIMENT
+from orchestrator.runs.folder import Folder
+from orchestrator.runs.workspace import DRAWN, Workspace
 from orchestrator.study.study import TIME_LIMIT_S, Study
 
 
@@ -33,8 +34,8 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
     beside = naive.answers(naive.small(study))
     planned = of({**ladder.answers(study), **beside}, study.name)
     space = Workspace(out.absolute())
-    with space.held():
-        space.claim("ladder", list(planned.cases))
+    with space.held(EXPERIMENT, "ladder") as folder:
+        space.describe(EXPERIMENT, "ladder", list(planned.cases))
         todo = pipeline.missing(planned, space)
         failures = (
             pipeline.complete(todo, space, workers=workers, limit_s=study.time_limit_s)
@@ -53,11 +54,11 @@ def run_ladder(study: Study, out: Path, *, workers: int) -> Finished:
                 {name: state["cpu_s"] for name, state in states.items()},
             ),
         }
-        _write(tables, space)
-        with settings.own():
+        with settings.own(), folder.renewed(*DRAWN):
             from orchestrator.experiments import pages
 
-            pages.write_ladder(tables, space.page, case_states.programs(space.cases))
+            _write(tables, folder)
+            pages.write_ladder(tables, space, case_states.programs(space.cases))
     return Finished(space.page, len(todo), failures)
 
 
@@ -74,8 +75,8 @@ def run_stability(out: Path, *, workers: int) -> Finished:
     drawn = maps.load_all()
     planned = stability.plan(drawn)
     space = Workspace(out.absolute())
-    with space.held():
-        space.claim("stability", list(planned.cases))
+    with space.held(EXPERIMENT, "stability") as folder:
+        space.describe(EXPERIMENT, "stability", list(planned.cases))
         todo = {
             name: one
             for name, one in pipeline.missing(planned, space).items()
@@ -86,11 +87,11 @@ def run_stability(out: Path, *, workers: int) -> Finished:
         answers = stability.Answers(planned, space.cases, planned.done(space.cases))
         judged = {one.name: stability.judge(one, answers) for one in drawn}
         table = pd.concat(judged.values(), ignore_index=True)
-        _write({"maps": table}, space)
-        with settings.own():
+        with settings.own(), folder.renewed(*DRAWN):
             from orchestrator.experiments import pages
 
-            pages.write_stability(drawn, judged, space.page, case_states.programs(space.cases))
+            _write({"maps": table}, folder)
+            pages.write_stability(drawn, judged, space, case_states.programs(space.cases))
     return Finished(space.page, len(todo), {})
 
 
@@ -99,7 +100,6 @@ def _is_verdict(one: Case, space: Workspace) -> bool:
     return case_states.ended(space.cases / one.name)[0] in stability.VERDICTS
 
 
-def _write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
-    space.tables.mkdir(exist_ok=True)
+def _write(tables: Mapping[str, pd.DataFrame], folder: Folder) -> None:
     for name, table in tables.items():
-        write_durably(space.tables / f"{name}.csv", table.to_csv(index=False))
+        folder.put(f"tables/{name}.csv", table.to_csv(index=False))

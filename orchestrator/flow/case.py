@@ -22,6 +22,11 @@ from orchestrator.study.scene import BUILDABLE_DEG
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"
 LID_OVER_HEIGHT = 10.0
+MESH = (
+    *("boundary", "faces", "neighbour", "owner", "points", "sets/air"),
+    *("cellZones", "faceZones", "pointZones"),
+)
+"""Files of a mesh that gmshToFoam makes."""
 FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
 """Of the last iteration; epsilon or omega, as the turbulence model has it."""
 
@@ -83,9 +88,16 @@ class FlowCase(Case):
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
-        "[1-9]*/**/*",
-        "constant/polyMesh/**/*",
-        "postProcessing/**/*",
+        *results,
+        *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
+        "[1-9]*/uniform/functionObjects/functionObjectProperties",
+        *(f"constant/polyMesh/{name}" for name in MESH),
+        "postProcessing/wallShearStress/*/wallShearStress.dat",
+    )
+    made: ClassVar[tuple[str, ...]] = (
+        "log.gmshToFoam",
+        "log.simpleFoam",
+        "constant/polyMesh/sed??????",  # a killed sed's
     )
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ class GrainCase(Case):
     template: ClassVar[str] = "liggghts/bed"
     results: ClassVar[tuple[str, ...]] = ("settling.csv", "levels.csv", "passage.dump", "bed.dump")
     derived: ClassVar[tuple[str, ...]] = ("holds.csv", "motion.csv")
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 
     def versions(self) -> dict[str, str]:

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.report import settings
-from orchestrator.runs.files import write_durably
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from orchestrator.plan import Plan
     from orchestrator.runs.case import Case
+    from orchestrator.runs.folder import Folder
     from orchestrator.study.study import Study
     from orchestrator.tables import Tables
 
@@ -26,8 +26,8 @@ def write(
     tables: "Tables",
     timings: "pd.DataFrame",
     failures: Mapping[str, str],
-    out: Path,
-) -> Path:
+    folder: "Folder",
+) -> None:
     """Draw the figures of a study and write its page.
 
     Parameters
@@ -38,27 +38,19 @@ def write(
         Wall times of the finished cases.
     failures : mapping of str to str
         The cases that failed, with why.
-    out : Path
+    folder : Folder
         The study's directory: it holds ``cases`` and gets ``figures`` and the page.
-
-    Returns
-    -------
-    Path
-        The page.
     """
     with settings.own():
         # the drawing libraries take half a second to import: only who draws waits for them
         from orchestrator.report import claims, gallery, page
         from orchestrator.report.results import Results
 
-        results = Results(study, plan, tables, out / "cases")
-        folder = out / FIGURES
-        folder.mkdir(exist_ok=True)
+        results = Results(study, plan, tables, folder.root / "cases")
         figures = gallery.draw(results, folder)
     judged = claims.judge(tables)
-    write_durably(out / CLAIMS, claims.frame(judged).to_csv(index=False))
-    write_durably(out / PAGE, page.render(results, figures, timings, failures, judged))
-    return out / PAGE
+    folder.put(CLAIMS, claims.frame(judged).to_csv(index=False))
+    folder.put(PAGE, page.render(results, figures, timings, failures, judged))
 
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from io import BytesIO
 from itertools import combinations
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,13 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 from PIL import Image
 
-from orchestrator.report import captions, grain_picture, labels, snapshot, style
+from orchestrator.report import FIGURES, captions, grain_picture, labels, snapshot, style
 from orchestrator.report import grain_marks as marks
 from orchestrator.report.figure import Figure
 from orchestrator.report.grain_marks import Window
 from orchestrator.report.results import Results
 from orchestrator.report.snapshot import Passage, Snapshot
+from orchestrator.runs.folder import Folder
 
 NAME = "crest"
 STIR, NEAR = 0.05, 2.0
@@ -33,8 +33,8 @@ FRAME_MS, LAST_MS = 50, 2500
 PIXELS_PER_INCH = 140
 
 
-def draw(results: Results, folder: Path) -> Iterator[tuple[Figure, bytes]]:
-    """Write the animation into a folder; give it with its bytes. None of a study without piles.
+def draw(results: Results, folder: Folder) -> Iterator[tuple[Figure, bytes]]:
+    """Put the animation into a directory; give it with its bytes. None of a study without piles.
 
     It is of the pile of the picture of the grains, at the least slope.
     """
@@ -44,7 +44,7 @@ def draw(results: Results, folder: Path) -> Iterator[tuple[Figure, bytes]]:
         looks = choose(passage, window)
         if len(looks):
             data = _gif(passage, window, looks)
-            (folder / f"{NAME}.gif").write_bytes(data)
+            folder.put(f"{FIGURES}/{NAME}.gif", data)
             d = labels.millimetres(pile.scene.grain.diameter)
             alpha = labels.plain("alpha_deg", pile.bed.slope_deg)
             title = f"The crest empties, {alpha}, d = {d} (animation)"

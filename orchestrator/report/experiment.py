@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from orchestrator.report import FIGURES, facts, page, style
+from orchestrator.report import facts, page, style
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
-from orchestrator.runs.files import write_durably
+from orchestrator.runs.folder import Folder
 
 LONG = 60
 """Rows of a table that is folded away."""
@@ -39,8 +38,10 @@ class Section:
     limits: Sequence[str] = field(default_factory=tuple)
 
 
-def write(title: str, sections: Sequence[Section], file: Path, solvers: Mapping[str, str]) -> Path:
-    """Write the page of an experiment, and its figures beside it.
+def write(
+    title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
+) -> None:
+    """Put the page of an experiment into a directory, and its figures.
 
     Parameters
     ----------
@@ -48,18 +49,13 @@ def write(title: str, sections: Sequence[Section], file: Path, solvers: Mapping[
         Of the page.
     sections : sequence of Section
         Its parts, in their order.
-    file : Path
-        The page; its directory gets ``figures``.
+    folder : Folder
+        The directory; the figures go into its ``figures``.
+    name : str
+        Name of the page's file.
     solvers : mapping of str to str
         The programs that ran, with their versions.
-
-    Returns
-    -------
-    Path
-        The page.
     """
-    folder = file.parent / FIGURES
-    folder.mkdir(parents=True, exist_ok=True)
     html = page.fill(
         "experiment.html.j2",
         title=title,
@@ -68,11 +64,10 @@ def write(title: str, sections: Sequence[Section], file: Path, solvers: Mapping[
         programs=facts.versions(solvers),
         links={},
     )
-    write_durably(file, html)
-    return file
+    folder.put(name, html)
 
 
-def _drawn(section: Section, folder: Path) -> dict[str, Any]:
+def _drawn(section: Section, folder: Folder) -> dict[str, Any]:
     """A section as the template needs it, its figures as entries with images."""
     images = [
         page.entry(figure, style.save(figure.canvas, folder, figure.name))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from pathlib import Path
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
@@ -23,13 +22,14 @@ from orchestrator.report import (
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.runs import process, retry
+from orchestrator.runs.folder import Folder
 
 Drawn = tuple[Figure, bytes]
 """A figure without its canvas, and its image: PNG, of an animation GIF."""
 
 
-def draw(results: Results, folder: Path) -> list[Drawn]:
-    """Write each figure's files into a folder; give it with its image.
+def draw(results: Results, folder: Folder) -> list[Drawn]:
+    """Put each figure's files into a directory; give it with its image.
 
     The sections are drawn side by side: matplotlib holds one core for seconds a figure.
 
@@ -48,7 +48,7 @@ def draw(results: Results, folder: Path) -> list[Drawn]:
     return [drawn for part in order for drawn in part]
 
 
-def _parts(folder: Path) -> list[list[Drawn]]:
+def _parts(folder: Folder) -> list[list[Drawn]]:
     # forked, the workers have the results and the imported libraries already
     context = multiprocessing.get_context("fork")
     workers = min(os.cpu_count() or 1, len(SECTIONS))
@@ -60,7 +60,7 @@ def _parts(folder: Path) -> list[list[Drawn]]:
             return list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
     raise OrchestratorError(
         "a process that draws figures was killed",
-        where=str(folder),
+        where=str(folder.root),
         remedy="out of memory? `orchestrator report` draws them again",
     )
 
@@ -69,41 +69,41 @@ _shared: list[Results] = []
 """What the workers inherit: results are too large to be sent to each."""
 
 
-def _section(number: int, folder: Path) -> list[Drawn]:
+def _section(number: int, folder: Folder) -> list[Drawn]:
     return list(SECTIONS[number](_shared[0], folder))
 
 
-def _saved(figures: Iterable[Figure], folder: Path) -> Iterator[Drawn]:
+def _saved(figures: Iterable[Figure], folder: Folder) -> Iterator[Drawn]:
     for figure in figures:
         if figure.canvas:
             image = style.save(figure.canvas, folder, figure.name)
             yield replace(figure, canvas=None), image
 
 
-def _pictures(results: Results, folder: Path) -> Iterator[Drawn]:
+def _pictures(results: Results, folder: Folder) -> Iterator[Drawn]:
     yield from _saved(mesh_picture.draw(results), folder)
     yield from _saved(flow_picture.draw(results), folder)
     yield from _saved(grain_picture.draw(results), folder)
     yield from animation.draw(results, folder)
 
 
-def _single(results: Results, folder: Path) -> Iterator[Drawn]:
+def _single(results: Results, folder: Folder) -> Iterator[Drawn]:
     yield from _saved(single.draw(results), folder)
 
 
-def _stress(results: Results, folder: Path) -> Iterator[Drawn]:
+def _stress(results: Results, folder: Folder) -> Iterator[Drawn]:
     yield from _saved(stress.draw(results), folder)
 
 
-def _fractions(results: Results, folder: Path) -> Iterator[Drawn]:
+def _fractions(results: Results, folder: Folder) -> Iterator[Drawn]:
     yield from _saved(piles.fractions(results), folder)
 
 
-def _extended(results: Results, folder: Path) -> Iterator[Drawn]:
+def _extended(results: Results, folder: Folder) -> Iterator[Drawn]:
     yield from _saved(piles.extended(results), folder)
 
 
-SECTIONS: tuple[Callable[[Results, Path], Iterator[Drawn]], ...]
+SECTIONS: tuple[Callable[[Results, Folder], Iterator[Drawn]], ...]
 SECTIONS = (_pictures, _fractions, _extended, _single, _stress)
 """The dearest first."""
 PLACES = (1, 3, 4, 0, 2)

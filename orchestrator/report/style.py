@@ -1,7 +1,7 @@
 """How all figures look: sizes, colours by meaning, markers, files."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from io import BytesIO
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,9 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
+
+from orchestrator.report import FIGURES
+from orchestrator.runs.folder import Folder
 
 WIDTH = 7.0
 """Of a figure across two columns of a paper, inches."""
@@ -112,9 +115,12 @@ def _leading(x: float, digits: str) -> str:
     return text if text.strip("0.")[0] in digits else ""
 
 
-def save(figure: Canvas, folder: Path, name: str) -> bytes:
-    """Write a figure as PNG and SVG, without dates in them, and return the PNG."""
-    figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+def save(figure: Canvas, folder: Folder, name: str) -> bytes:
+    """Put a figure as PNG and SVG, without dates in them, and return the PNG."""
+    png, svg = BytesIO(), BytesIO()
+    figure.savefig(png, format="png", metadata={"Software": None})
     figure.set_layout_engine("none")  # it is laid out now
-    figure.savefig(folder / f"{name}.svg", metadata={"Date": None})
-    return (folder / f"{name}.png").read_bytes()
+    figure.savefig(svg, format="svg", metadata={"Date": None})
+    folder.put(f"{FIGURES}/{name}.png", png.getvalue())
+    folder.put(f"{FIGURES}/{name}.svg", svg.getvalue())
+    return png.getvalue()

@@ -39,6 +39,12 @@ def copy_template(name: str, folder: Path) -> None:
 
 
 @cache
+def template_names(name: str) -> frozenset[str]:
+    """The files of a template, by their paths in it."""
+    return frozenset(path for path, _, _ in _files(name))
+
+
+@cache
 def template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
     digests = {path: sha256(content).hexdigest() for path, _, content in _files(name)}

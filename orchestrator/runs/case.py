@@ -1,10 +1,11 @@
 """A case directory: who it is, what it holds, how far it came. It knows nothing of any solver."""
 
-import shutil
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, ClassVar
 
 from orchestrator.errors import SolverError
@@ -20,11 +21,14 @@ from orchestrator.runs.files import (
     write_durably,
     write_json,
 )
+from orchestrator.runs.folder import TEMPORARY, Folder
 
 IDENTITY = "case.json"
 DONE = "done.json"
 FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
+LOG = "log.Allrun"
+STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
 
 
 class Case(ABC):
@@ -46,6 +50,8 @@ class Case(ABC):
     """Tables that `collect` makes of the results; not the solver's own."""
     bulky: ClassVar[tuple[str, ...]] = ()
     """Large files that the run leaves and no table is made of: `prune` drops them."""
+    made: ClassVar[tuple[str, ...]] = ()
+    """What else is written or left there: no file that fits none of these patterns is the run's."""
 
     @property
     @abstractmethod
@@ -104,10 +110,11 @@ class Case(ABC):
 def prepare(case: Case, cases: Path) -> Path:
     """Make the case's directory afresh, inputs and identity, and return it.
 
-    What an interrupted run left there is thrown away: it is never trusted half-written.
+    What an interrupted run left there is thrown away: it is never trusted half-written. What else
+    lies there, an input that someone has changed too, is kept aside: a solver might read it.
     """
-    directory = cases / case.name
-    shutil.rmtree(directory, ignore_errors=True)
+    is_ours = _made_by(case, cases / case.name)
+    directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
     assets.copy_template(case.template, directory)
     case.write(directory, cases)
     inputs = [path for path in directory.rglob("*") if path.is_file()]
@@ -130,7 +137,8 @@ def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s
     """Mark a case as done: the last file written, with digests of all that it vouches for."""
     results = digest_files(_matching(directory, case.results), root=directory)
     derived = digest_files(_matching(directory, case.derived), root=directory)
-    stamps = {name: list(_stamp(directory / name)) for name in (*results, *derived)}
+    bulky = (path.relative_to(directory).as_posix() for path in _matching(directory, case.bulky))
+    stamps = {name: list(_stamp(directory / name)) for name in {*results, *derived, *bulky}}
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     write_durably(directory / CHECKSUMS, sums)
     (directory / FAILED).unlink(missing_ok=True)
@@ -193,17 +201,23 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
 
 
 def prune(case: Case, cases: Path) -> None:
-    """Drop the bulky files of a case that is done.
+    """Drop the bulky files of a case that is done: those that its run left, no others.
 
     Their digests stay in the marker, beside a list of what was dropped, and in `CHECKSUMS`: a
     rerun by hand is still compared with the run that the tables were made of.
+
+    Raises
+    ------
+    InputError
+        If a link stands in the place of a file or directory of the run.
     """
     directory, state = cases / case.name, done_state(case, cases)
     if state is None:
         return
-    files = _matching(directory, case.bulky)
-    names = {path.relative_to(directory).as_posix() for path in files}
-    pruned = sorted(names.union(state.get("pruned", [])))
+    names = [name for name in state.get("stamps", {}) if _fits(name, case.bulky)]
+    found = (Folder(directory).path(name) for name in names)
+    files = [path for path in found if path.is_file()]
+    pruned = sorted({*names, *state.get("pruned", [])})
     marker = directory / DONE
     left = size_of(directory) - sum(path.stat().st_size for path in (*files, marker))
     # first what makes up for the files: killed in between, the case is still done
@@ -272,5 +286,38 @@ def _untouched(path: Path, stamp: Any, marked: int) -> bool:
 
 
 def _matching(directory: Path, patterns: tuple[str, ...]) -> list[Path]:
-    found = {path for pattern in patterns for path in directory.glob(pattern) if path.is_file()}
-    return sorted(found)
+    """The files in a directory that fit a pattern; no link is followed."""
+    walked = (Path(path) / file for path, _, files in os.walk(directory) for file in files)
+    found = (path for path in walked if path.is_file() and not path.is_symlink())
+    return sorted(path for path in found if _fits(path.relative_to(directory).as_posix(), patterns))
+
+
+def _fits(name: str, patterns: Iterable[str]) -> bool:
+    """Whether each part of a path fits that of a pattern."""
+    parts = name.split("/")
+    split = (pattern.split("/") for pattern in patterns)
+    return any(len(one) == len(parts) and all(map(fnmatchcase, parts, one)) for one in split)
+
+
+def _made_by(case: Case, directory: Path) -> Callable[[str], bool]:
+    """Tell the files of a case's run, and its inputs as they were written, from all others."""
+    told = read_json(directory / IDENTITY)
+    inputs = told.get("inputs_sha256") if isinstance(told, dict) else None
+    known = inputs if isinstance(inputs, dict) else {}
+    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
+
+    def is_ours(name: str) -> bool:
+        if name in known:
+            return bool(known[name] == _digest(directory / name))
+        path = PurePosixPath(name)
+        meant = path.with_name(TEMPORARY.sub(r"\1", path.name)).as_posix()
+        return meant in assets.template_names(case.template) or _fits(meant, patterns)
+
+    return is_ours
+
+
+def _digest(path: Path) -> str | None:
+    try:
+        return digest_file(path)
+    except OSError:
+        return None

@@ -2,8 +2,8 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ class Kind:
         What it holds: "study".
     marker : str
         The JSON file that says so, with "kind" and "name".
-    names : tuple of str
-        What else this program writes into it by fixed names: none of them may be a link.
+    names, many : tuple of str
+        What else this program writes into it, by names and by patterns: none may be a link.
     traces : tuple of str
         Patterns of what only such a directory holds: it is known by them if its marker is lost.
     """
@@ -34,13 +34,14 @@ class Kind:
     word: str
     marker: str
     names: tuple[str, ...] = ()
+    many: tuple[str, ...] = ()
     traces: tuple[str, ...] = ()
 
 
 _CASE = f"cases/*-{'[0-9a-f]' * 12}"
 _OF_A_STUDY = ("cases", "tables", "timings", "figures", "report.html", "report.json", "claims.csv")
-STUDY = Kind("study", "study.json", _OF_A_STUDY, (f"{_CASE}/case.json",))
-EXPERIMENT = Kind("experiment", "study.json", _OF_A_STUDY, STUDY.traces)
+STUDY = Kind("study", "study.json", _OF_A_STUDY, (_CASE,), (f"{_CASE}/case.json",))
+EXPERIMENT = replace(STUDY, word="experiment")
 RESULTS = Kind("benchmark of the solver", "benchmark.json")
 PACK = Kind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, PACK)
@@ -102,16 +103,15 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
                 where=str(folder.root),
                 remedy="choose another with --out",
             )
-    if told(folder.root, kind) is None and not _has_traces(folder.root, kind):
+    if told(folder.root, kind) is None and not any(_matches(folder.root, kind.traces)):
         _check_empty(folder.root, kind)
     folder.refuse_links((LOCK, RECORD, kind.marker, *kind.names, *folder.written()))
-    folder.refuse_links(
-        path.relative_to(folder.root).as_posix() for path in folder.root.glob(_CASE)
-    )
+    linked = (path for path in _matches(folder.root, kind.many) if path.is_symlink())
+    folder.refuse_links(path.relative_to(folder.root).as_posix() for path in linked)
 
 
-def _has_traces(root: Path, kind: Kind) -> bool:
-    return any(path for pattern in kind.traces for path in root.glob(pattern))
+def _matches(root: Path, patterns: Sequence[str]) -> Iterator[Path]:
+    return (path for pattern in patterns for path in root.glob(pattern))
 
 
 def _check_empty(root: Path, kind: Kind) -> None:

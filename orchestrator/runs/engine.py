@@ -17,7 +17,6 @@ from orchestrator.runs import process, retry
 from orchestrator.runs.agenda import Agenda
 from orchestrator.runs.case import Case
 
-LOG = "log.Allrun"
 POLL_S = 0.2
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """As many cases run as there are cores: a solver that took more would take them from others."""
@@ -133,7 +132,7 @@ def execute(
             ended = retry.run(
                 ["./Allrun"],
                 cwd=directory,
-                log=directory / LOG,
+                log=directory / case_states.LOG,
                 limit_s=limit_s,
                 stop=stop,
                 env=ONE_THREAD,
@@ -161,7 +160,9 @@ def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) ->
     case.collect(directory)
     if ended.returncode != 0:
         raise SolverError(
-            f"./Allrun ended with {ended.returncode}", where=str(directory / LOG), remedy="see it"
+            f"./Allrun ended with {ended.returncode}",
+            where=str(directory / case_states.LOG),
+            remedy="see it",
         )
 
 

@@ -55,12 +55,6 @@ def remove_empty_directory(path: Path) -> None:
         path.rmdir()
 
 
-def discard(path: Path) -> None:
-    """Remove a file, if there is one, or an empty directory that something has put in its place."""
-    remove_empty_directory(path)
-    path.unlink(missing_ok=True)
-
-
 def remove_empty_folders(root: Path, folders: Iterable[Path]) -> None:
     """Remove those of some folders below `root` that are empty, and their parents if they are."""
     for folder in sorted({*folders}, reverse=True):

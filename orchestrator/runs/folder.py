@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path, PurePosixPath
 
 from orchestrator.errors import InputError, of_system
-from orchestrator.runs.files import digest_file, discard, write_durably
+from orchestrator.runs.files import digest_file, write_durably
 
 RECORD = "written.sha256"
 """Digests of the files that were put, as `sha256sum` reads them. A line is added before its file
 is written: a killed process leaves no file that nobody knows."""
 KEPT = "kept"
 """Where things are moved that stand in the way and that this program did not write."""
-TEMPORARY = re.compile(r"\.(.+)\.\d+\.tmp")
+TEMPORARY = re.compile(r"^\.(.+)\.\d+\.tmp$")
 """What a killed process was about to write, and the name that it was for."""
 
 Ours = Callable[[str], bool]
@@ -57,9 +57,11 @@ class Folder:
         self._write(name, content, lambda _: True)
 
     def drop(self, name: str) -> None:
-        """Remove a file, if it is there; a directory of its name stays unless it is empty."""
+        """Remove a file whose name is ours, if it is there."""
         with self._told(name):
-            discard(self.path(name))
+            path = self.path(name)
+            self._make_way(name, lambda _: True)
+            path.unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Ours | None = None) -> Path:
         """Remove a sub-directory; what is not ours in it is kept aside as it lies.
@@ -97,6 +99,7 @@ class Folder:
         A file that has changed since it was put stays. If the block ends with an exception,
         nothing is removed.
         """
+        self.note(RECORD, _text(self._lines()))
         before = self._lines()
         yield
         new = self._lines()[len(before) :]
@@ -172,7 +175,7 @@ class Folder:
         """Move something that is not ours to a place where nothing is."""
         place = next(place for place in _places(name) if self._is_free(place))
         (self.root / name).rename(self.root / place)
-        what = f"{self.root / name} was not written by this program: it is {place} now"
+        what = f"{self.root / name} is not what this program wrote: it is kept as {place}"
         warnings.warn(what, stacklevel=2)
 
     def _is_free(self, place: str) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
-from orchestrator.runs import case
+from orchestrator.runs import case, status
 from orchestrator.runs.case import Case
 from orchestrator.runs.status import size_text, sizes
 from orchestrator.runs.workspace import Workspace
@@ -21,12 +21,15 @@ class Pruned:
         How many cases are pruned now.
     kept : tuple of str
         Finished cases left whole: the page's pictures are drawn from them.
+    left : mapping of str to int
+        Cases that the study does not ask for, which are not touched, and their bytes.
     """
 
     before: Mapping[str, int]
     after: Mapping[str, int]
     cases: int
     kept: tuple[str, ...]
+    left: Mapping[str, int]
 
 
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> Pruned:
@@ -49,7 +52,8 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
     for name, one in done.items():
         if name not in shown:
             case.prune(one, space.cases)
-    return Pruned(before, sizes(space), len(done) - len(kept), kept)
+    left = status.read(space.root).left
+    return Pruned(before, sizes(space), len(done) - len(kept), kept, left)
 
 
 def text(pruned: Pruned) -> str:
@@ -61,4 +65,6 @@ def text(pruned: Pruned) -> str:
     ]
     if pruned.kept:
         lines.append(f"whole, for the pictures of the page: {', '.join(pruned.kept)}")
+    if pruned.left:
+        lines.append(status.left_text(pruned.left))
     return "\n".join(lines)

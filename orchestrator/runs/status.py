@@ -1,6 +1,5 @@
 """How far a study came, read from its directory alone."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,9 @@ from typing import Any
 from orchestrator.runs.case import DONE, failure, size
 from orchestrator.runs.files import read_json, size_of
 from orchestrator.runs.workspace import Workspace
+
+NAMED = 5
+"""Most cases that are listed by name where an earlier study file asked for them."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class Status:
         The page, once it is drawn.
     sizes : dict of str to int
         Bytes on disk by what they belong to: a kind of case, or tables, figures and page.
+    left : dict of str to int
+        Cases that an earlier study file asked for and this one does not, and their bytes.
     """
 
     name: str
@@ -39,6 +43,7 @@ class Status:
     failed: dict[str, str]
     page: Path | None
     sizes: dict[str, int]
+    left: dict[str, int]
 
 
 def read(directory: Path) -> Status:
@@ -62,6 +67,7 @@ def read(directory: Path) -> Status:
         failed={name: failure(space.cases / name) or "" for name in _with(states, "failed")},
         page=space.page if space.drawn.is_file() and space.page.is_file() else None,
         sizes=_sizes(space, markers),
+        left={name: size(space.cases / name, markers[name]) for name in space.left(states)},
     )
 
 
@@ -78,8 +84,7 @@ Markers = dict[str, dict[str, Any]]
 
 
 def _markers(space: Workspace) -> Markers:
-    names = sorted(os.listdir(space.cases)) if space.cases.is_dir() else []
-    states = ((name, read_json(space.cases / name / DONE)) for name in names)
+    states = ((name, read_json(space.cases / name / DONE)) for name in space.case_names())
     return {name: state if isinstance(state, dict) else {} for name, state in states}
 
 
@@ -119,11 +124,20 @@ def text(status: Status) -> str:
     lines += [f"  {begun}: {name}" for name in status.unfinished]
     lines += [f"  failed: {name}: {cause}" for name, cause in status.failed.items()]
     lines.append(f"size: {size_text(status.sizes)}")
+    if status.left:
+        lines.append(left_text(status.left))
     if status.page:
         lines.append(f"page: {status.page}")
     elif not status.running:
         lines.append("the same study command continues it")
     return "\n".join(lines)
+
+
+def left_text(left: Mapping[str, int]) -> str:
+    """The cases that are not asked for, for people, with their size."""
+    named = ", ".join(list(left)[:NAMED]) + (", ..." if len(left) > NAMED else "")
+    what = f"{len(left)} cases of an earlier study file, {_human(sum(left.values()))}: {named}"
+    return f"not asked for: {what}; they stay until you remove them"
 
 
 def size_text(sizes: Mapping[str, int]) -> str:

@@ -1,7 +1,9 @@
-"""A study's directory on disk: whose it is, who holds it, what it is called inside."""
+"""A study's directory on disk: what it is called inside, which study it is."""
 
-import contextlib
-from collections.abc import Iterator
+import os
+import re
+from collections.abc import Container
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,11 +11,15 @@ from typing import Any
 from orchestrator import __version__
 from orchestrator.errors import InputError
 from orchestrator.runs import lock
-from orchestrator.runs.case import IDENTITY
-from orchestrator.runs.files import read_json, write_json
+from orchestrator.runs.claim import LOCK, STUDY, Kind, claimed
+from orchestrator.runs.files import read_json, text_of
+from orchestrator.runs.folder import Folder
 
-MARKER = "study.json"
-LOCK = ".lock"
+DRAWN = ("tables", "timings", "figures", "report.html", "claims.csv")
+"""What is drawn anew together."""
+STATE = "report.json"
+"""Marker that what is drawn was finished, and of which cases."""
+CASE_NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 
 
 @dataclass(frozen=True)
@@ -21,6 +27,11 @@ class Workspace:
     """The directory that holds one study's cases, tables, figures and page."""
 
     root: Path
+
+    @property
+    def folder(self) -> Folder:
+        """The way for files into it."""
+        return Folder(self.root)
 
     @property
     def cases(self) -> Path:
@@ -39,40 +50,30 @@ class Workspace:
 
     @property
     def drawn(self) -> Path:
-        """Marker that tables, figures and page were finished, and of which cases."""
-        return self.root / "report.json"
+        """Where `STATE` is."""
+        return self.root / STATE
 
-    def claim(self, name: str, cases: list[str], **about: Any) -> None:
+    def held(self, kind: Kind, name: str) -> AbstractContextManager[Folder]:
+        """Hold the directory, as `claim.claimed` does."""
+        return claimed(self.root, kind, name)
+
+    def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
         """Say which study this is, and of which cases; only who holds the directory may.
 
         `about` is kept with it.
         """
-        # what a killed process was about to write
-        for path in self.root.glob(".*.tmp"):
-            path.unlink(missing_ok=True)
-        write_json(
-            self.root / MARKER,
-            {"orchestrator": __version__, "name": name, **about, "cases": cases},
-        )
-
-    def is_study(self) -> bool:
-        """Whether the directory was made by `held`, whatever was lost of it since then."""
-        names = {path.name for path in self.root.iterdir() if not path.name.endswith(".tmp")}
-        return (
-            MARKER in names
-            or names <= {LOCK, "cases"}
-            or any(self.cases.glob(f"*-{'[0-9a-f]' * 12}/{IDENTITY}"))
-        )
+        told = {"orchestrator": __version__, "kind": kind.word, "name": name, **about}
+        self.folder.note(kind.marker, text_of({**told, "cases": cases}))
 
     def description(self) -> dict[str, Any]:
-        """What `claim` wrote.
+        """What `describe` wrote.
 
         Raises
         ------
         InputError
             If the directory holds no study.
         """
-        value: Any = read_json(self.root / MARKER)
+        value: Any = read_json(self.root / STUDY.marker)
         if not _describes(value):
             raise InputError(
                 "there is no study in this directory",
@@ -81,39 +82,17 @@ class Workspace:
             )
         return dict(value)
 
-    @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
-        """Make the directory, or take it up again, and hold it while its study runs.
+    def left(self, asked: Container[str]) -> tuple[str, ...]:
+        """The cases that are there without being asked for: an earlier study file did."""
+        return tuple(name for name in self.case_names() if name not in asked)
 
-        Raises
-        ------
-        InputError
-            If it holds something else or cannot be written.
-        OrchestratorError
-            If another process holds it.
-        """
-        self._enter()
-        with lock.held(self.root / LOCK):
-            yield
-
-    def _enter(self) -> None:
+    def case_names(self) -> list[str]:
+        """Names of the directories of cases that are there, whoever asked for them."""
         try:
-            self.root.mkdir(parents=True, exist_ok=True)
-            ours = self.is_study()
-            if ours:
-                self.cases.mkdir(exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"the output directory cannot be used: {error.strerror or error}",
-                where=str(self.root),
-                remedy="choose another with --out",
-            ) from None
-        if not ours:
-            raise InputError(
-                "the output directory holds something that is not a study",
-                where=str(self.root),
-                remedy="choose an empty or a new one with --out",
-            )
+            with os.scandir(self.cases) as entries:
+                return sorted(one.name for one in entries if CASE_NAME.fullmatch(one.name))
+        except OSError:
+            return []
 
     def is_held(self) -> bool:
         """Whether a running process holds the study."""

@@ -13,7 +13,7 @@ import pandas as pd
 from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import checks
 from orchestrator.plan import Plan
-from orchestrator.runs.files import discard, write_durably
+from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
 from orchestrator.tables import piles, scenes, single
 from orchestrator.tables.columns import COLUMNS
@@ -75,17 +75,14 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
     )
 
 
-def write(tables: Mapping[str, pd.DataFrame], folder: Path) -> None:
-    """Write each table as CSV and as Parquet, and what the columns mean; nothing else stays."""
-    folder.mkdir(exist_ok=True)
-    for old in folder.iterdir():
-        discard(old)
+def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
+    """Put each table as CSV and as Parquet into a sub-directory, and what the columns mean."""
     for name, table in tables.items():
-        write_durably(folder / f"{name}.csv", table.to_csv(index=False))
-        write_durably(folder / f"{name}.parquet", table.to_parquet(index=False))
+        folder.put(f"{place}/{name}.csv", table.to_csv(index=False))
+        folder.put(f"{place}/{name}.parquet", table.to_parquet(index=False))
     used = sorted({str(column) for table in tables.values() for column in table})
     rows = [{"column": column, "meaning": COLUMNS[column]} for column in used]
-    write_durably(folder / "columns.csv", pd.DataFrame(rows).to_csv(index=False))
+    folder.put(f"{place}/columns.csv", pd.DataFrame(rows).to_csv(index=False))
 
 
 def read(folder: Path) -> Tables:

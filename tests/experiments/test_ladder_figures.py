@@ -14,6 +14,7 @@ from matplotlib.text import Annotation, Text
 
 from orchestrator.experiments import ladder_figures as ladder
 from orchestrator.report import style
+from orchestrator.runs.folder import Folder
 
 FLOWS, GRAINS = ("fine", "medium", "coarse"), ("stiff", "soft", "pivot")
 
@@ -117,7 +118,7 @@ def test_a_ladder_without_pairs_says_so(pairs: pd.DataFrame, draw: type, tmp_pat
     for table in (pairs.iloc[:0], unknown):
         figure = draw(table)
         assert ladder.NOTHING in [text.get_text() for text in figure.axes[0].texts]
-        assert style.save(figure, tmp_path, "empty").startswith(b"\x89PNG")
+        assert style.save(figure, Folder(tmp_path), "empty").startswith(b"\x89PNG")
 
 
 def test_bars_are_the_factors_gained() -> None:

@@ -10,6 +10,7 @@ from orchestrator import pipeline
 from orchestrator.errors import InputError
 from orchestrator.experiments import maps, stability
 from orchestrator.fidelity import calibration, limits
+from orchestrator.runs.claim import EXPERIMENT
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
@@ -50,8 +51,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     one = maps.load(path)
     planned = stability.plan([one])
     space = Workspace(tmp_path / "out")
-    with space.held():
-        space.claim("stability", list(planned.cases))
+    with space.held(EXPERIMENT, "stability"):
         pipeline.complete(pipeline.missing(planned, space), space, workers=2, limit_s=120)
     answers = stability.Answers(planned, space.cases, planned.done(space.cases))
     good, bad = stability.judge(one, answers).sort_values("x").to_dict("records")

@@ -13,6 +13,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.runs import engine
+from orchestrator.runs.folder import Folder
 from orchestrator.study import study
 
 SMALL = """
@@ -100,11 +101,11 @@ def test_every_column_has_a_meaning_and_survives_its_files(
     asked = _study(step=0.01)
     planned = plan.make(asked)
     made = tables.make(asked, planned, cases, planned.done(cases))
-    tables.write(made, tmp_path)
-    listed = pd.read_csv(tmp_path / "columns.csv").set_index("column")
+    tables.write(made, Folder(tmp_path), "made")
+    listed = pd.read_csv(tmp_path / "made" / "columns.csv").set_index("column")
     assert {str(c) for table in made.values() for c in table} == set(listed.index)
     assert listed["meaning"].str.len().min() >= 3
-    for name, table in tables.read(tmp_path).items():
+    for name, table in tables.read(tmp_path / "made").items():
         pd.testing.assert_frame_equal(table, made[name], check_dtype=False)
 
 

@@ -94,13 +94,14 @@ from pathlib import Path
 import orchestrator.benchmark.runner, orchestrator.experiments.run, orchestrator.pipeline
 assert "matplotlib" not in sys.modules
 from orchestrator.report import settings
+from orchestrator.runs.folder import Folder
 with settings.own():
     from orchestrator.benchmark import page
     from orchestrator.experiments import pages
     from orchestrator.report import style
     figure = style.canvas(1.0)
     figure.subplots().plot([0, 1], label="grains")
-    style.save(figure, Path(), "one")
+    style.save(figure, Folder(Path()), "one")
 """
 """What the pages of experiments and benchmarks do: matplotlib is imported by nothing before."""
 
@@ -115,7 +116,7 @@ def test_pages_of_experiments_and_benchmarks_are_drawn_as_ours_too(tmp_path: Pat
             [sys.executable, "-c", SEALED], cwd=tmp_path / name, env=environment, check=True
         )
     for kind in ("png", "svg"):
-        one, other = (tmp_path / name / f"one.{kind}" for name in ("ours", "theirs"))
+        one, other = (tmp_path / name / "figures" / f"one.{kind}" for name in ("ours", "theirs"))
         assert one.read_bytes() == other.read_bytes()
 
 

@@ -11,6 +11,7 @@ from orchestrator import plan, report, tables
 from orchestrator.report import settings
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
+from orchestrator.runs.folder import Folder
 from orchestrator.study import study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
@@ -62,7 +63,8 @@ def page(results: Results) -> Path:
 
 def write(results: Results, out: Path, failures: dict[str, str]) -> Path:
     times = tables.timings(results.plan, results.plan.done(results.cases))
-    return report.write(results.study, results.plan, results.tables, times, failures, out)
+    report.write(results.study, results.plan, results.tables, times, failures, Folder(out))
+    return out / report.PAGE
 
 
 def only(results: Results, bed: str) -> Results:

@@ -14,6 +14,7 @@ from orchestrator.report import animation, snapshot
 from orchestrator.report import grain_marks as marks
 from orchestrator.report.results import Results
 from orchestrator.report.snapshot import Passage
+from orchestrator.runs.folder import Folder
 from tests.report.conftest import only
 
 
@@ -24,14 +25,14 @@ def passage(results: Results) -> Passage:
 
 
 def test_study_with_a_pile_has_one_animation(results: Results, tmp_path: Path) -> None:
-    ((figure, data),) = animation.draw(results, tmp_path)
-    assert (tmp_path / "crest.gif").read_bytes() == data
+    ((figure, data),) = animation.draw(results, Folder(tmp_path))
+    assert (tmp_path / "figures" / "crest.gif").read_bytes() == data
     assert len(data) <= 1.5e6
     image = Image.open(BytesIO(data))
     assert image.format == "GIF"
     assert 10 < getattr(image, "n_frames", 1) <= animation.MOST
     assert "d = 1 mm" in figure.title
-    assert list(animation.draw(only(results, "grain"), tmp_path)) == []
+    assert list(animation.draw(only(results, "grain"), Folder(tmp_path))) == []
 
 
 def test_quiet_looks_are_left_out(passage: Passage) -> None:

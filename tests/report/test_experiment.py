@@ -9,6 +9,7 @@ import pytest
 from orchestrator.report import experiment, style
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
+from orchestrator.runs.folder import Folder
 from tests.report.test_page import Page
 
 TITLE = "Speed & <accuracy>"
@@ -26,7 +27,8 @@ def written(tmp_path: Path) -> Path:
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
         Section("Found", "", figures[1:], [experiment.sheet(table)], ["No more than <this>."]),
     ]
-    return experiment.write(TITLE, sections, tmp_path / "new" / "page.html", {"liggghts": "3.8"})
+    experiment.write(TITLE, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
+    return tmp_path / "page.html"
 
 
 def test_page_holds_all_of_its_sections(written: Path) -> None:

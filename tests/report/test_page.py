@@ -1,6 +1,5 @@
 """The page: well formed, in need of nothing else, with links that lead somewhere."""
 
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,6 +11,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.report.results import Results
+from orchestrator.runs.folder import Folder
 from tests.report.conftest import TITLE, only, write
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -139,7 +139,7 @@ def test_page_without_results(results: Results, tmp_path: Path) -> None:
 
 
 def test_a_page_is_replaced_whole(results: Results, page: Path, tmp_path: Path) -> None:
-    shutil.copy(page, tmp_path / "report.html")
+    Folder(tmp_path).put("report.html", page.read_bytes())
     (tmp_path / "cases").mkdir()
     old = (tmp_path / "report.html").stat().st_ino
     write(only(results, "grain"), tmp_path, {})

@@ -27,6 +27,7 @@ class Tiny(Case):
     template: ClassVar[str] = "liggghts/checks"
     recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("result.txt",)
+    made: ClassVar[tuple[str, ...]] = ("input.txt",)
 
     @property
     def parameters(self) -> dict[str, Any]:

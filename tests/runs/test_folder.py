@@ -9,7 +9,7 @@ from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import claim
 from orchestrator.runs.folder import KEPT, RECORD, Folder
 
-MINE = pytest.mark.filterwarnings("ignore:.*not written by this program")
+MINE = pytest.mark.filterwarnings("ignore:.*not what this program wrote")
 
 
 @pytest.fixture
