@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark import exact
-from orchestrator.physics import closures
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import threshold
 
 CLOSE = 2e-3
 """Relative: a ratio this close to that of a known mistake is taken for it."""
@@ -126,10 +128,10 @@ def _formula(told: Told, wrong: pd.DataFrame) -> str:
 
 
 def _changes(told: Told) -> Iterator[tuple[str, Told]]:
-    low = told["closure"] == "low"
     yield "there is no lift", {"alpha_s": 0.0}
-    said = "Eq. 4 in place of Eq. 2" if low else "Eq. 2 in place of Eq. 4"
-    yield f"the other closure, {said}", {"closure": "high" if low else "low"}
+    own = LAWS[told["closure"]].label
+    for name, law in LAWS.items():
+        yield f"the forces are those of {law.label}, not of {own}", {"closure": name}
     yield "the sign of the slope is turned", {"alpha_deg": -told["alpha_deg"]}
     yield "the slope is left out", {"alpha_deg": 0.0}
     submerged = 1 - told["rho_f_kg_m3"] / told["rho_sol_kg_m3"]
@@ -143,31 +145,24 @@ def _changes(told: Told) -> Iterator[tuple[str, Told]]:
 
 def _answer(told: Told) -> Callable[[str, str], float]:
     """The formulas of level 1."""
-    flow = {
-        "diameter": told["d_m"],
-        "roughness": told["z0_m"],
-        "fluid_density": told["rho_f_kg_m3"],
-        "viscosity": told["nu_m2_s"],
-    }
-    lifted = {**flow, "lift_coefficient": told["alpha_s"]}
-    found = closures.threshold(
-        told["closure"],
-        **lifted,
+    law = LAWS[told["closure"]]
+    around = ("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s")
+    exposure = Exposure(*(told[name] for name in around))
+    found = threshold(
+        law,
+        exposure,
         density=told["rho_sol_kg_m3"],
         slope_deg=told["alpha_deg"],
         entrainment_angle_deg=told["beta_deg"],
         gravity=told["g_m_s2"],
     )
-    forces = {
-        "drag_n": closures.drag(told["closure"], **flow),
-        "lift_n": closures.lift(told["closure"], **lifted),
-    }
+    forces = {"drag_n": law.drag, "lift_n": law.lift}
     thresholds = {
         "ustar_m_s": found.friction_velocity,
         "reynolds": found.reynolds,
         "shields": found.shields,
     }
-    return lambda q, at: float(forces[q](float(at)) if q in forces else thresholds[q])
+    return lambda q, at: float(forces[q](float(at), exposure) if at else thresholds[q])
 
 
 def _counting(rows: pd.DataFrame, wrong: pd.DataFrame) -> str:

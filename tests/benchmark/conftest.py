@@ -54,12 +54,12 @@ def all_levels(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return root
 
 
-LIFT_OFF = """
+THEORY = """
 [flow]
-closure = "low"
+closure = "{closure}"
 model = "hill"
 [grain]
-diameter = 5e-4
+diameter = {diameter}
 stiffness = 1e3
 [protocol]
 step = 0.05
@@ -67,18 +67,30 @@ quiet = 6.0
 timestep = 0.3
 until = 0.8
 [[group]]
-name = "lift"
-bed = { kind = "pile", height = 0.005, slope_deg = 20.0, mobile_layers = 1, roughness = "d/30" }
+name = "pile"
+bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", {bed} }}
 """
-"""A pile whose grains lift carries off, up the hill and down it."""
+"""A pile under the stress of a theory, which needs no OpenFOAM."""
+
+
+def _theory(folder: Path, **fields: object) -> Path:
+    """A pack of level 4."""
+    asked = study.parse(THEORY.format(**fields), name="theory", where="theory")
+    ended = pipeline.run(asked, folder / "study", workers=1)
+    assert not ended.failures
+    export(folder / "pack", folder / "study", (4,))
+    return folder / "pack"
 
 
 @pytest.fixture(scope="session")
 def lift_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A pack of one pile whose answer is lift-off."""
-    out = tmp_path_factory.mktemp("studies") / "lift"
-    ended = pipeline.run(study.parse(LIFT_OFF, name="lift", where="lift"), out, workers=1)
-    assert not ended.failures
-    root = tmp_path_factory.mktemp("packs") / "lift"
-    export(root, out, (4,))
-    return root
+    """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
+    folder = tmp_path_factory.mktemp("lift-off")
+    return _theory(folder, closure="low", diameter=5e-4, bed="mobile_layers = 1")
+
+
+@pytest.fixture(scope="session")
+def level_rows(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A pack of one pile of level rows, which empties in chains."""
+    folder = tmp_path_factory.mktemp("level-rows")
+    return _theory(folder, closure="high", diameter=5e-4, bed='packing = "horizontal"')

@@ -4,6 +4,7 @@ import json
 import math
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -75,7 +76,7 @@ def test_a_pile_that_lifts_off_says_so_and_asks_for_it(lift_off: Path, all_level
     ((name, told),) = found.scenes.items()
     assert told["lift_off"] > 0.9
     assert found.about(name).endswith(", lift-off")
-    rows = found.expected.set_index("quantity")
+    rows: Any = found.expected.set_index("quantity")
     last = rows.loc["moved"].iloc[-1]
     assert rows.loc["carried_off", "at"] == last["at"]
     assert rows.loc["carried_off", "value"] == round(told["lift_off"] * last["value"])
@@ -85,6 +86,28 @@ def test_a_pile_that_lifts_off_says_so_and_asks_for_it(lift_off: Path, all_level
     others = pack.read(all_levels)
     assert not any("lift_off" in told for told in others.scenes.values())
     assert "carried_off" not in set(others.expected["quantity"])
+
+
+def test_where_details_decide_only_what_they_do_not_is_judged(
+    level_rows: Path, lift_off: Path, all_levels: Path
+) -> None:
+    rows: Any = pack.read(level_rows).expected.set_index("quantity")
+    count = rows.loc["moved", "value"].iloc[-1] + rows.loc["not_moved", "value"]
+    thresholds = rows.loc["shields"].set_index("at")["tolerance"]
+    assert thresholds[["0.1", "0.3"]].eq(0.03).all()
+    assert thresholds[["0.5", "0.7"]].isna().all()
+    moved = rows.loc["moved"]
+    judged = moved["tolerance"].notna()
+    assert judged.any()
+    assert moved.loc[judged, "value"].max() <= 0.35 * count < moved.loc[~judged, "high"].min()
+    # grains that fly collide: their thresholds are known less well
+    lifted: Any = pack.read(lift_off).expected.set_index("quantity")
+    assert lifted.loc["shields", "tolerance"].eq(0.2).all()
+    assert lifted.loc["moved", "tolerance"].eq(0).all()
+    # rows along the face are judged to their end
+    table = pack.read(all_levels).expected
+    aligned = table[table["scene"].str.startswith("4-")]
+    assert aligned["tolerance"].notna().all()
 
 
 @pytest.mark.parametrize("harm", ["changed", "removed", "added"])

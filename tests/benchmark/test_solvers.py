@@ -98,7 +98,7 @@ WRONG = {
     "the other closure": (
         OTHER_SCENE.format("'closure': {'low': 'high', 'high': 'low'}[scene['closure']]") + TAIL,
         FORMULA,
-        "the other closure, Eq. [24] in place of Eq. [24]",
+        r"the forces are those of Eq\. [24] \(.*\), not of Eq\. [24] \(",
     ),
     "down the slope": (
         OTHER_SCENE.format("'alpha_deg': -scene['alpha_deg']") + TAIL,
