@@ -18,7 +18,7 @@ toe of steep faces.
 
 Against the solved flow (h = 0.02 m, z0 = 3.3e-6 ... 1e-4 m) u* has an error of at most 8 % in the
 mean over the windward face for 10 to 25 degrees, of 11 % at 30; from 0.3 to 0.98 of the face of
-11 % at z0/h up to 1/600 and of 20 % at 1/200. On the lowest tenth it is 10 to 60 % too low at 15
+12 % at z0/h up to 1/600 and of 20 % at 1/200. On the lowest tenth it is 7 to 60 % too low at 15
 degrees and zero from 25 on. The bare triangle without the streamline is 17 to 31 % too high in the
 mean at 15 degrees already, 64 to 103 % at 30. docs/flow.md has the numbers.
 """
