@@ -160,16 +160,17 @@ def _workers(text: str) -> int:
 
 
 def _study(options: argparse.Namespace) -> int:
-    from orchestrator import pipeline
+    from orchestrator import paper, pipeline
     from orchestrator.study import study
 
-    asked = study.load(options.source)
+    asked = study.load(options.source, [paper.PRESETS])
     if options.tolerance is not None:
         study.check_tolerance(options.tolerance, "--tolerance")
         asked = replace(asked, tolerance=options.tolerance)
     out = options.out or Path("results") / asked.name
     queue = Queue(options.cluster, asked.cluster) if options.cluster else None
-    finished = pipeline.run(asked, out, workers=options.workers, queue=queue)
+    guests = (paper.report_card,)
+    finished = pipeline.run(asked, out, workers=options.workers, queue=queue, guests=guests)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     if finished.left:
@@ -182,10 +183,11 @@ def _study(options: argparse.Namespace) -> int:
 
 
 def _ladder(options: argparse.Namespace) -> int:
+    from orchestrator import paper
     from orchestrator.experiments import run
     from orchestrator.study import study
 
-    asked = study.load(options.source)
+    asked = study.load(options.source, [paper.PRESETS])
     out = options.out or Path("results") / "ladder"
     finished = run.run_ladder(asked, out, workers=options.workers)
     return _end(finished.page, finished.failures)
@@ -199,9 +201,9 @@ def _stability(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from orchestrator import pipeline
+    from orchestrator import paper, pipeline
 
-    finished = pipeline.redraw(options.directory)
+    finished = pipeline.redraw(options.directory, (paper.report_card,))
     return _end(finished.page, finished.failures)
 
 

@@ -1,6 +1,6 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
+from orchestrator.report.guest import Guest
 from orchestrator.runs import case, cluster, engine
 from orchestrator.runs import prune as pruning
 from orchestrator.runs.case import Case
@@ -41,7 +42,14 @@ class Finished:
     left: tuple[str, ...] = ()
 
 
-def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
+def run(
+    study: Study,
+    out: Path,
+    *,
+    workers: int,
+    queue: Queue | None = None,
+    guests: Sequence[Guest] = (),
+) -> Finished:
     """Run a study, or what is missing of it.
 
     Parameters
@@ -54,6 +62,8 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         Cases at a time.
     queue : Queue, optional
         Of the cluster that runs them; without it, this machine does.
+    guests : sequence of callable
+        Whoever may add to the page.
 
     Raises
     ------
@@ -82,7 +92,7 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
             states |= planned.done(space.cases, _without(planned.cases, states))
         failures = {name: error for name, error in failures.items() if name in planned.cases}
         if started or not _is_drawn(study, planned, space):
-            draw(study, planned, space, states, failures)
+            draw(study, planned, space, states, failures, guests)
         left = space.left(planned.cases) if changed else ()
         return Finished(space.page, started, failures, left)
 
@@ -123,14 +133,14 @@ def complete(
         return engine.run(todo, pool, display)
 
 
-def redraw(out: Path) -> Finished:
+def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
     with space.held(STUDY, study.name):
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, planned.done(space.cases), failures)
+        draw(study, planned, space, planned.done(space.cases), failures, guests)
     return Finished(space.page, 0, failures)
 
 
@@ -179,6 +189,7 @@ def draw(
     space: Workspace,
     states: Mapping[str, Mapping[str, Any]],
     failures: dict[str, OrchestratorError],
+    guests: Sequence[Guest] = (),
 ) -> None:
     """Write tables, figures and page, and last the marker that says of which cases.
 
@@ -192,7 +203,7 @@ def draw(
     with space.folder.renewed(*DRAWN):
         tables.write(results, space.folder, "tables")
         tables.write({"timings": times}, space.folder, "timings")
-        report.write(study, planned, results, times, causes, space.folder)
+        report.write(study, planned, results, times, causes, space.folder, guests)
     if not failures:
         drawn = {"of": _origin(study, planned), "sha256": space.folder.written()}
         space.folder.note(STATE, text_of(drawn))

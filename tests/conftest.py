@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.report.results import Results
 from orchestrator.runs import assets, process
 from orchestrator.solvers import liggghts
+from tests import small_study
 
 Deck = Callable[..., str]
 
@@ -57,3 +59,9 @@ def orchestrator(tmp_path: Path) -> Command:
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """The small study, finished, in a directory whose name asks for trouble."""
+    return small_study.run(tmp_path_factory.mktemp("study") / """grains d'été "1" & #2 %20""")

@@ -1,10 +1,11 @@
 """Figures and page of a study."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.report import settings
+from orchestrator.report.guest import Guest
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 FIGURES = "figures"
-CLAIMS = "claims.csv"
 
 
 def write(
@@ -27,6 +27,7 @@ def write(
     timings: "pd.DataFrame",
     failures: Mapping[str, str],
     folder: "Folder",
+    guests: Sequence[Guest] = (),
 ) -> None:
     """Draw the figures of a study and write its page.
 
@@ -40,17 +41,22 @@ def write(
         The cases that failed, with why.
     folder : Folder
         The study's directory: it holds ``cases`` and gets ``figures`` and the page.
+    guests : sequence of callable
+        Whoever may add to the page.
     """
     with settings.own():
         # the drawing libraries take half a second to import: only who draws waits for them
-        from orchestrator.report import claims, gallery, page
+        from orchestrator.report import gallery, page
         from orchestrator.report.results import Results
 
         results = Results(study, plan, tables, folder.root / "cases")
         figures = gallery.draw(results, folder)
-    judged = claims.judge(tables)
-    folder.put(CLAIMS, claims.frame(judged).to_csv(index=False))
-    folder.put(PAGE, page.render(results, figures, timings, failures, judged))
+    names = [figure.name for figure, _ in figures]
+    added = [one for one in (guest(study, tables, names) for guest in guests) if one]
+    for name, text in (item for one in added for item in one.files.items()):
+        folder.put(name, text)
+    sections = [one.section for one in added]
+    folder.put(PAGE, page.render(results, figures, timings, failures, sections))
 
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":

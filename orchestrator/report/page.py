@@ -12,8 +12,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from orchestrator.report import captions, claims, facts
-from orchestrator.report.claims.base import Claim
+from orchestrator.report import captions, facts
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
@@ -25,7 +24,7 @@ def render(
     figures: Sequence[tuple[Figure, bytes]],
     timings: pd.DataFrame,
     failures: Mapping[str, str],
-    judged: Sequence[Claim],
+    sections: Sequence[Markup] = (),
 ) -> str:
     """The page's HTML.
 
@@ -39,8 +38,8 @@ def render(
         Wall times of the finished cases.
     failures : mapping of str to str
         Causes by name of case.
-    judged : sequence of Claim
-        The paper's claims.
+    sections : sequence of Markup
+        What guests add, before the figures.
     """
     return fill(
         "page.html.j2",
@@ -53,7 +52,7 @@ def render(
         levels=facts.levels(results),
         checks=facts.checks(results),
         remarks=facts.remarks(results, failures),
-        card=claims.card(judged, [figure.name for figure, _ in figures]),
+        sections=sections,
         figures=[entry(figure, png) for figure, png in figures],
         failures=failures,
         links=links(results),
@@ -66,16 +65,16 @@ def render(
     )
 
 
-def fill(template: str, **values: Any) -> str:
-    """The HTML of one of the templates beside this file."""
-    css = (FOLDER / "page.css").read_text(encoding="utf-8")
-    return _template(template).render(css=css, **values)
+def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
+    """The HTML of a template, by default of one beside this file."""
+    css = Markup((FOLDER / "page.css").read_text(encoding="utf-8"))
+    return _template(template, folder).render(css=css, **values)
 
 
 @cache
-def _template(name: str) -> Template:
+def _template(name: str, folder: Path) -> Template:
     environment = Environment(
-        loader=FileSystemLoader(FOLDER),
+        loader=FileSystemLoader(folder),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

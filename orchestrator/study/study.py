@@ -9,7 +9,7 @@ import itertools
 import os
 import sys
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,23 +86,31 @@ class Study:
         return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
 
 
-def preset_names() -> list[str]:
-    """Names of the study files that the package brings."""
-    return sorted(path.stem for path in assets.presets().glob("*.toml"))
+def presets(folders: Iterable[Path] = ()) -> dict[str, Path]:
+    """The study files that the package brings by name, with those in some other folders."""
+    listed = (path for folder in (assets.presets(), *folders) for path in folder.glob("*.toml"))
+    return {path.stem: path for path in sorted(listed)}
 
 
-def load(source: str) -> Study:
+def load(source: str, folders: Iterable[Path] = ()) -> Study:
     """Read a study file, or a preset by its name.
+
+    Parameters
+    ----------
+    source : str
+        The file's path, or the preset's name.
+    folders : iterable of Path
+        Other folders with presets.
 
     Raises
     ------
     InputError
         Naming the file, the field and the remedy.
     """
-    preset = assets.presets() / f"{source}.toml"
-    path = preset if source in preset_names() else Path(source)
+    brought = presets(folders)
+    path = brought.get(source, Path(source))
     if not _is_file(path):
-        known = ", ".join(preset_names())
+        known = ", ".join(sorted(brought))
         raise InputError(
             "there is no such study file, nor a preset of this name",
             where=source,

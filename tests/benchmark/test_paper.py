@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator import plan, tables
 from orchestrator.benchmark import measured
+from orchestrator.paper import PRESETS
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
@@ -27,7 +28,7 @@ def expected() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def paper() -> Study:
-    return study.load("paper")
+    return study.load("paper", [PRESETS])
 
 
 def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None:

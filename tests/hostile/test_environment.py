@@ -47,7 +47,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _drawn(out: Path) -> dict[str, bytes]:
-    files = [out / "report.html", out / "claims.csv", *(out / "figures").iterdir()]
+    files = [out / "report.html", *(out / "figures").iterdir()]
     return {path.name: path.read_bytes() for path in files}
 
 

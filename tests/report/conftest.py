@@ -1,4 +1,4 @@
-"""One small study, run once: single grains in all regimes and a pile."""
+"""The page of the small study, and parts of it."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,52 +7,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestrator import plan, report, tables
+from orchestrator import report, tables
 from orchestrator.report import settings
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
 from orchestrator.runs.folder import Folder
-from orchestrator.study import study
-
-TITLE = """<script>alert(1)</script> & "sand" d'été"""
-TEXT = f"""title = '''{TITLE}'''
-protocol = {{ step = 0.02, quiet = 6.0 }}
-
-[[group]]
-name = "horizontal"
-[group.axes]
-"bed.entrainment_angle_deg" = [45.0, 60.0]
-"bed.roughness" = ["d/10", "d/30"]
-"fluid.viscosity" = [1e-5, 1e-3]
-"grain.diameter" = [5e-5, 2e-4, 1e-3]
-
-[[group]]
-name = "slope"
-bed = {{ slope_deg = 15.0 }}
-[group.axes]
-"grain.diameter" = [5e-5, 2e-4, 1e-3]
-
-[[group]]
-name = "pile"
-bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01, mobile_layers = 1 }}
-protocol = {{ step = 0.05 }}
-grain = {{ diameter = 1e-3 }}
-# </pre><b>
-"""
-
-
-@pytest.fixture(scope="session")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    """The study with its finished cases, in a directory whose name asks for trouble."""
-    out = tmp_path_factory.mktemp("study") / """grains d'été "1" & #2 %20"""
-    (out / "cases").mkdir(parents=True)
-    asked = study.parse(TEXT, name="small", where="test")
-    planned = plan.make(asked)
-    with engine.local(out / "cases", workers=2, limit_s=120.0) as pool:
-        assert not engine.run(planned.cases, pool, lambda outcome: None)
-    cases = out / "cases"
-    made = tables.make(asked, planned, cases, planned.done(cases))
-    return Results(asked, planned, made, out / "cases")
 
 
 @pytest.fixture(scope="session")

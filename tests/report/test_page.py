@@ -12,7 +12,8 @@ import pytest
 
 from orchestrator.report.results import Results
 from orchestrator.runs.folder import Folder
-from tests.report.conftest import TITLE, only, write
+from tests.report.conftest import only, write
+from tests.small_study import TITLE
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -67,6 +68,7 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     style = parsed.texts["style"]
     assert "url(" not in style
     assert "@import" not in style
+    assert '"DejaVu Sans", sans-serif' in style
     assert not any("://" in href for href in parsed.all("a", "href"))
     assert "default-src 'none'" in html
 

@@ -115,8 +115,8 @@ def test_defaults_are_the_papers() -> None:
 
 
 def test_presets_are_studies() -> None:
-    assert "first-look" in study.preset_names()
-    for name in study.preset_names():
+    assert "first-look" in study.presets()
+    for name in study.presets():
         assert study.load(name).scenes
 
 
@@ -170,7 +170,7 @@ SOLVERS = """
 import sys
 from orchestrator.study import study
 from orchestrator.study.study import make_scene
-for name in study.preset_names():
+for name in study.presets():
     assert study.load(name).scenes
 loaded = set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"}
 print(*loaded)

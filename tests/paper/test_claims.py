@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.paper import PRESETS, claims
+from orchestrator.paper.claims import base, counting
+from orchestrator.paper.claims.base import Claim, Evidence, Verdict
 from orchestrator.physics import curves
-from orchestrator.report import claims, page
-from orchestrator.report.claims import base, counting
-from orchestrator.report.claims.base import Claim, Evidence, Verdict
 from orchestrator.report.results import Results, valid
 from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form
@@ -124,7 +124,7 @@ def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Clai
 def exact() -> Tables:
     """Single grains of the preset of the paper, as if DEM gave the closed form."""
     asked, grains = [], []
-    for scene in study.load("paper").scenes:
+    for scene in study.load("paper", [PRESETS]).scenes:
         if scene.bed.kind == "grain":
             asked.append({"scene_id": scene.id, **_parameters(scene)})
             grains.append({"scene_id": scene.id, **_closed_form(scene)})
@@ -241,23 +241,26 @@ def test_card_names_the_figures_by_number(judged: dict[str, Claim]) -> None:
     assert shown[judged["motion.order"].says] == [3]
 
 
-def test_page_has_the_card(results: Results, judged: dict[str, Claim]) -> None:
-    html = page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
-    assert html == page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
-    card = html[html.index('<section id="claims">') :]
-    assert 'class="verdict reproduced">reproduced<' in card
-    assert 'class="verdict not">not reproduced<' in card
-    assert "Re* &lt; 3" in card
-    assert "no data to judge" in card
+def test_section_has_the_card(results: Results) -> None:
+    judged = claims.judge(results.tables)
+    section = claims.section(judged, ["dem-horizontal"])
+    assert section == claims.section(judged, ["dem-horizontal"])
+    assert 'class="verdict reproduced">reproduced<' in section
+    assert 'class="verdict not">not reproduced<' in section
+    assert "Re* &lt; 3" in section
+    assert "no data to judge" in section
+    assert "Figure 1" in section
 
 
-def test_what_is_measured_is_escaped(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_measured_is_escaped(results: Results) -> None:
     evil = replace(claims.judge(results.tables)[1], measured=("<b>&",), says="<i>", why="<u>")
-    monkeypatch.setattr(claims, "judge", lambda tables: [evil])
-    html = page.render(results, [], pd.DataFrame(), {}, claims.judge(results.tables))
-    assert "&lt;b&gt;&amp;" in html
-    section = html[html.index('id="claims"') :].split("</section>")[0]
+    section = claims.section([evil], [])
+    assert "&lt;b&gt;&amp;" in section
     assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in section]
+
+
+def test_no_card_where_nothing_could_be_judged() -> None:
+    assert claims.section([], []).strip() == ""
 
 
 def test_frame_has_a_row_for_each_claim(results: Results, tmp_path: Path) -> None:

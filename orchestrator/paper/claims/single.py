@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from orchestrator.physics import closures
-from orchestrator.report.claims.base import (
+from orchestrator.paper.claims.base import (
     BY_SHARE,
     NAMES,
     QUIET,
@@ -17,6 +16,7 @@ from orchestrator.report.claims.base import (
     pairs,
     up,
 )
+from orchestrator.physics import closures
 from orchestrator.report.results import split
 
 NEARLY = 0.05

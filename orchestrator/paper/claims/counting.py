@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.report.claims.base import Claim, Evidence, Verdict, by_share, combined
-from orchestrator.report.claims.piles import curves
+from orchestrator.paper.claims.base import Claim, Evidence, Verdict, by_share, combined
+from orchestrator.paper.claims.piles import curves
 from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]

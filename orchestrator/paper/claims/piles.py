@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics import closures
-from orchestrator.report.claims.base import (
+from orchestrator.paper.claims.base import (
     BY_SHARE,
     NAMES,
     Claim,
@@ -20,6 +19,7 @@ from orchestrator.report.claims.base import (
     pairs,
     up,
 )
+from orchestrator.physics import closures
 from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]

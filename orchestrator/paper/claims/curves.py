@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from orchestrator.paper.claims.base import NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.physics import curves
 from orchestrator.physics.closures import CLOSURES, Closure
 from orchestrator.report import labels, reference
-from orchestrator.report.claims.base import NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]

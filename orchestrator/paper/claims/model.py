@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from orchestrator.report import labels
-from orchestrator.report.claims.base import (
+from orchestrator.paper.claims.base import (
     NAMES,
     QUIET,
     Claim,
@@ -14,6 +13,7 @@ from orchestrator.report.claims.base import (
     combined,
     pairs,
 )
+from orchestrator.report import labels
 from orchestrator.report.results import split, valid
 from orchestrator.report.theory import drag_law_limit
 

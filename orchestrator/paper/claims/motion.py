@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from orchestrator.report.claims.base import (
+from orchestrator.paper.claims.base import (
     BY_SHARE,
     MOST,
     NAMES,

@@ -2,12 +2,15 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from markupsafe import Markup
 
-from orchestrator.report.claims import counting, curves, model, motion, piles, single
-from orchestrator.report.claims.base import Claim, Evidence
+from orchestrator.paper.claims import counting, curves, model, motion, piles, single
+from orchestrator.paper.claims.base import Claim, Evidence
+from orchestrator.report import page
 from orchestrator.tables import Tables
 
 JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
@@ -30,6 +33,7 @@ JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
     model.stress,
 )
 """One for each claim: in the paper's order, then those on its method."""
+FOLDER = Path(__file__).parent
 WORDS = {"reproduced": "reproduced", "partly": "partly", "not": "not reproduced"}
 """How the page says a verdict."""
 
@@ -40,8 +44,13 @@ def judge(tables: Tables) -> list[Claim]:
     return [one(evidence) for one in JUDGES]
 
 
+def section(found: Sequence[Claim], figures: Sequence[str]) -> Markup:
+    """The report card as a section of the page; empty where nothing could be judged."""
+    return Markup(page.fill("card.html.j2", FOLDER, **card(found, figures)))
+
+
 def card(found: Sequence[Claim], figures: Sequence[str]) -> dict[str, Any]:
-    """What the page shows of judged claims.
+    """What the card says of judged claims.
 
     Parameters
     ----------

@@ -1,0 +1,42 @@
+"""The paper: its studies, and the report card of what it claims. Only the command line asks it."""
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestrator.report.guest import Addition
+
+if TYPE_CHECKING:
+    from orchestrator.study.study import Study
+    from orchestrator.tables import Tables
+
+PRESETS = Path(__file__).parent / "presets"
+CLAIMS = "claims.csv"
+
+
+@cache
+def _texts() -> frozenset[str]:
+    return frozenset(path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml"))
+
+
+def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Addition | None:
+    """The report card of a study of the paper; none for any other.
+
+    Parameters
+    ----------
+    study : Study
+        One of the paper's is a preset of this package, word for word.
+    tables : mapping of str to DataFrame
+        What came of it.
+    figures : sequence of str
+        Names of the page's figures, in its order.
+    """
+    if study.text not in _texts():
+        return None
+    from orchestrator.paper import claims
+
+    judged = claims.judge(tables)
+    return Addition(
+        claims.section(judged, figures), {CLAIMS: claims.frame(judged).to_csv(index=False)}
+    )

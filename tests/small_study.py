@@ -1,0 +1,46 @@
+"""One small study, run once: single grains in all regimes and a pile."""
+
+from pathlib import Path
+
+from orchestrator import plan, tables
+from orchestrator.report.results import Results
+from orchestrator.runs import engine
+from orchestrator.study import study
+
+TITLE = """<script>alert(1)</script> & "sand" d'été"""
+TEXT = f"""title = '''{TITLE}'''
+protocol = {{ step = 0.02, quiet = 6.0 }}
+
+[[group]]
+name = "horizontal"
+[group.axes]
+"bed.entrainment_angle_deg" = [45.0, 60.0]
+"bed.roughness" = ["d/10", "d/30"]
+"fluid.viscosity" = [1e-5, 1e-3]
+"grain.diameter" = [5e-5, 2e-4, 1e-3]
+
+[[group]]
+name = "slope"
+bed = {{ slope_deg = 15.0 }}
+[group.axes]
+"grain.diameter" = [5e-5, 2e-4, 1e-3]
+
+[[group]]
+name = "pile"
+bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01, mobile_layers = 1 }}
+protocol = {{ step = 0.05 }}
+grain = {{ diameter = 1e-3 }}
+# </pre><b>
+"""
+
+
+def run(out: Path) -> Results:
+    """Run it in a directory."""
+    (out / "cases").mkdir(parents=True)
+    asked = study.parse(TEXT, name="small", where="test")
+    planned = plan.make(asked)
+    with engine.local(out / "cases", workers=2, limit_s=120.0) as pool:
+        assert not engine.run(planned.cases, pool, lambda outcome: None)
+    cases = out / "cases"
+    made = tables.make(asked, planned, cases, planned.done(cases))
+    return Results(asked, planned, made, out / "cases")
