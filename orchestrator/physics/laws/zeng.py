@@ -14,8 +14,8 @@ TORQUE_ARM = 2 * 0.944 / (3 * 1.7005) / 2
 """Torque over drag in units of d, 0.185: 0.944 (4 pi mu G R^3) over 1.7005 (6 pi mu G R^2).
 
 Values of a sphere that touches the wall in creeping flow (M. E. O'Neill, 1968; A. J. Goldman et
-al., 1967, doi:10.1016/0009-2509(67)80048-4). Both agree with a public table after the second; 1.7005
-is also the limit of Zeng's drag.
+al., 1967, doi:10.1016/0009-2509(67)80048-4). Both agree with a public table after the second;
+1.7005 is also the limit of Zeng's drag.
 """
 
 
