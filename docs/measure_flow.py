@@ -25,18 +25,18 @@ GRAIN = 1e-3
 LEVELS = {
     "80 cells a face": {"cells_per_face": 80},
     "40, the standard": {},
-    "growth 1.15": {"growth": 1.15},
-    "growth 1.2": {"growth": 1.2},
-    "growth 1.4": {"growth": 1.4},
+    "growth 1.15": {"expansion_ratio": 1.15},
+    "growth 1.2": {"expansion_ratio": 1.2},
+    "growth 1.4": {"expansion_ratio": 1.4},
     "20 cells a face": {"cells_per_face": 20},
 }
 MODELS = (
     {},
-    {"turbulence": "RNGkEpsilon"},
-    {"turbulence": "realizableKE"},
-    {"turbulence": "kOmegaSST"},
-    {"convection": "upwind"},
-    {"correctors": 0},
+    {"turbulence_model": "RNGkEpsilon"},
+    {"turbulence_model": "realizableKE"},
+    {"turbulence_model": "kOmegaSST"},
+    {"convection_scheme": "upwind"},
+    {"non_orthogonal_correctors": 0},
 )
 
 

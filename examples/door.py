@@ -12,7 +12,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent / "native"))
 from solver import forces, table
 
-LOOK = 0.5
+SAMPLING_INTERVAL = 0.5
 """Time between two looks at the grains, sqrt(d/g')."""
 SETTLE = 10.0
 """Time of hold 0."""
@@ -35,7 +35,7 @@ class Bed:
         # LAMMPS wants the highest id never to leave
         order = {"counted": 0, "fixed": 2}
         self.grains = sorted(rows, key=lambda row: order.get(row["kind"], 1))
-        self.holds = table(case / "holds.csv")
+        self.load_steps = table(case / "load_steps.csv")
         self.counted = sum(row["kind"] == "counted" for row in rows)
         alpha = math.radians(self.scene["alpha_deg"])
         self.along = math.cos(alpha), math.sin(alpha)
@@ -43,14 +43,14 @@ class Bed:
     @property
     def flow(self):
         """The flow of each hold, m/s."""
-        return [float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.holds]
+        return [float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.load_steps]
 
-    def force(self, hold):
+    def force(self, load_step):
         """The force of the flow on each grain in a hold: a list of (fx, fz), N."""
         if self.is_pivot:
-            own = float(self.holds[hold]["fx_n"]), float(self.holds[hold]["fz_n"])
+            own = float(self.load_steps[load_step]["fx_n"]), float(self.load_steps[load_step]["fz_n"])
             return [own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains]
-        return [self._pushed(row, self.flow[hold]) for row in self.grains]
+        return [self._pushed(row, self.flow[load_step]) for row in self.grains]
 
     def _pushed(self, row, ustar0):
         if row["kind"] not in ("counted", "pushed"):
@@ -93,24 +93,24 @@ class _Answer:
             return self.bed.counted - self._moved(int(at))
         if quantity == "ustar_m_s":
             return self._between(self.moved_in[0])
-        hold = self._first(float(at))
-        ustar0 = self._between(hold)
-        return ustar0 if quantity == "ustar0_m_s" else self._shields(hold, ustar0)
+        load_step = self._first(float(at))
+        ustar0 = self._between(load_step)
+        return ustar0 if quantity == "ustar0_m_s" else self._shields(load_step, ustar0)
 
-    def _moved(self, hold):
-        return sum(0 < level <= hold for level in self.moved_in)
+    def _moved(self, load_step):
+        return sum(0 < level <= load_step for level in self.moved_in)
 
     def _first(self, fraction):
         need = max(math.ceil(fraction * self.bed.counted - 1e-9), 1)
-        holds = range(1, len(self.flow))
-        return next((hold for hold in holds if self._moved(hold) >= need), len(self.flow) - 1)
+        load_steps = range(1, len(self.flow))
+        return next((load_step for load_step in load_steps if self._moved(load_step) >= need), len(self.flow) - 1)
 
-    def _between(self, hold):
-        return math.sqrt(self.flow[hold - 1] * self.flow[hold])
+    def _between(self, load_step):
+        return math.sqrt(self.flow[load_step - 1] * self.flow[load_step])
 
-    def _shields(self, hold, ustar0):
+    def _shields(self, load_step, ustar0):
         scene, rows = self.bed.scene, zip(self.bed.grains, self.moved_in, strict=False)
-        ratio = [float(row["ustar_over_ustar0"]) for row, level in rows if 0 < level <= hold]
+        ratio = [float(row["ustar_over_ustar0"]) for row, level in rows if 0 < level <= load_step]
         mean = sum(r * abs(r) for r in ratio) / max(len(ratio), 1)
         excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
         return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess

@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.fidelity import checks, limits
 from orchestrator.fidelity.decision import Bound, Decision, decide
-from orchestrator.grains.cells import CellsCase, batches
+from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
 from orchestrator.study.parts import PileBed
@@ -37,7 +37,7 @@ class Plan:
 
     decisions: dict[str, Decision]
     piles: dict[str, Pile]
-    cells: tuple[CellsCase, ...]
+    cells: tuple[SingleGrainCase, ...]
     checks: dict[str, Pile]
     cases: dict[str, Case]
 

@@ -9,7 +9,7 @@ from orchestrator.study import study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
-protocol = {{ step = 0.02, quiet = 6.0 }}
+protocol = {{ load_increment = 0.02, waiting_time = 6.0 }}
 
 [[group]]
 name = "horizontal"
@@ -28,7 +28,7 @@ bed = {{ slope_deg = 15.0 }}
 [[group]]
 name = "pile"
 bed = {{ kind = "pile", slope_deg = 15.0, height = 0.01, mobile_layers = 1 }}
-protocol = {{ step = 0.05 }}
+protocol = {{ load_increment = 0.05 }}
 grain = {{ diameter = 1e-3 }}
 # </pre><b>
 """

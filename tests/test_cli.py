@@ -14,7 +14,7 @@ import pytest
 from tests.conftest import Command
 
 GRAINS = """
-protocol = { step = 0.05 }
+protocol = { load_increment = 0.05 }
 [axes]
 "grain.diameter" = [7e-4, 1e-3]
 """
@@ -37,8 +37,8 @@ def test_threshold_as_json(orchestrator: Command) -> None:
     assert ended.returncode == 0
     found = json.loads(ended.stdout)
     assert found["regime"] == "transition"
-    for closure in ("low", "high"):
-        one = found[closure]
+    for law_name in ("low", "high"):
+        one = found[law_name]
         assert not one["valid"]
         # tau = rho_f u*^2 and Re* = u* d/nu tie the fields together
         assert one["reynolds"] == pytest.approx(one["friction_velocity"] * 2e-4 / 1e-5)

@@ -42,7 +42,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_study_on_a_full_disk_is_continued_when_there_is_room(
     orchestrator: Command, tmp_path: Path, small_disk: Path
 ) -> None:
-    study = 'protocol = { step = 0.02 }\n[axes]\n"grain.diameter" = [7e-4, 1e-3]\n'
+    study = 'protocol = { load_increment = 0.02 }\n[axes]\n"grain.diameter" = [7e-4, 1e-3]\n'
     (tmp_path / "grains.toml").write_text(study)
     filler = small_disk / "filler"
     filler.write_bytes(b"0" * (2 * 2**20 - 2**17))

@@ -28,13 +28,13 @@ CHECKS = {
     "collision": ("speed_m_s",),
     "incline": ("incline_deg",),
     "sliding": ("speed_m_s",),
-    "passing": ("force_n", "marker"),
+    "passing": ("force_n", "displacement_criterion"),
 }
 
 
 def parameters(scene):
     """The variables of every deck."""
-    step = scene["timestep"] * math.sqrt(scene["mass_kg"] / scene["spring_n_m"])
+    step = scene["time_step"] * math.sqrt(scene["mass_kg"] / scene["spring_n_m"])
     return {
         "diameter": scene["d_m"],
         "density": scene["rho_sol_kg_m3"],
@@ -50,15 +50,15 @@ def parameters(scene):
 def bed_parameters(bed, step):
     """The variables of the deck for beds."""
     unit = bed.scene["time_unit_s"]
-    look = int(door.LOOK * unit / step + 0.5)
+    sample = int(door.SAMPLING_INTERVAL * unit / step + 0.5)
     x, z = bed.ceiling
     return {
         "counted": bed.counted,
-        "look_steps": look,
-        "settle_steps": int(door.SETTLE / door.LOOK + 0.5) * look,
-        "quiet_looks": int(bed.scene["quiet"] / door.LOOK + 0.5),
-        "holds": len(bed.holds) - 1,
-        "marker": bed.scene["marker"],
+        "look_steps": sample,
+        "settle_steps": int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5) * sample,
+        "quiet_looks": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),
+        "load_steps": len(bed.load_steps) - 1,
+        "displacement_criterion": bed.scene["displacement_criterion"],
         "along_x": bed.along[0],
         "along_z": bed.along[1],
         "ceiling_x": x,
@@ -87,26 +87,26 @@ def write_bed(bed, folder):
     (folder / "grains.data").write_text("\n".join(lines) + "\n")
     with (folder / "force.x.txt").open("w") as fx, (folder / "force.z.txt").open("w") as fz:
         # LAMMPS reads one set more than it uses
-        for hold in (*range(len(bed.holds)), len(bed.holds) - 1):
+        for load_step in (*range(len(bed.load_steps)), len(bed.load_steps) - 1):
             for stream, axis in ((fx, 0), (fz, 1)):
                 stream.write(f"{len(places)}\n")
-                for number, force in enumerate(bed.force(hold), 1):
+                for number, force in enumerate(bed.force(load_step), 1):
                     stream.write(f"{number} {force[axis]!r}\n")
 
 
 def moved_in(bed, folder):
     """The hold in which each counted grain passed the marker or was gone; whether it was gone."""
-    looks = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
+    samples = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
     frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     rows = [[line.split() for line in frame.splitlines()[8:]] for frame in frames]
     found = [{int(a): (float(x), float(z)) for a, x, z in frame} for frame in rows]
-    start, marker = found[0], bed.scene["marker"] * bed.scene["d_m"]
+    start, marker = found[0], bed.scene["displacement_criterion"] * bed.scene["d_m"]
     first, gone = [0] * bed.counted, [False] * bed.counted
-    for hold, frame in zip(looks, found[1:], strict=True):
+    for load_step, frame in zip(samples, found[1:], strict=True):
         for number in range(1, bed.counted + 1):
             now = frame.get(number)
             if first[number - 1] == 0 and (now is None or _far(start[number], now, bed) >= marker):
-                first[number - 1], gone[number - 1] = hold, now is None
+                first[number - 1], gone[number - 1] = load_step, now is None
     return first, gone
 
 

@@ -22,7 +22,7 @@ def forces(scene, ustar):
     """Drag and lift on an exposed grain, N (Eqs. 2 and 4)."""
     d, rho, nu = scene["d_m"], scene["rho_f_kg_m3"], scene["nu_m2_s"]
     r = scene["z0_m"] / d
-    if scene["closure"] == "low":
+    if scene["force_law"] == "low":
         drag = 1.5 * math.pi * (1 + 2 * r) * rho * d**2 * ustar**2
         lift = scene["alpha_s"] / 2 * (1 + 2 * r) * rho * d**3 * ustar**3 / nu
         return drag, lift
@@ -174,7 +174,7 @@ class Bed:
         self.z += self.vz * self.dt
 
 
-def moves(scene, grains, resting, hold):
+def moves(scene, grains, resting, load_step):
     """Whether the grain passes the marker in a hold, after holds in which it rests."""
     bed = Bed(scene, grains)
     alpha, unit = math.radians(scene["alpha_deg"]), scene["time_unit_s"]
@@ -182,25 +182,25 @@ def moves(scene, grains, resting, hold):
         for _ in range(int(10 * unit / bed.dt)):
             bed.step(float(rest["fx_n"]), float(rest["fz_n"]))
     x, z = bed.x, bed.z
-    for _ in range(int(scene["quiet"] * unit / bed.dt)):
-        bed.step(float(hold["fx_n"]), float(hold["fz_n"]))
+    for _ in range(int(scene["waiting_time"] * unit / bed.dt)):
+        bed.step(float(load_step["fx_n"]), float(load_step["fz_n"]))
         travel = (bed.x - x) * math.cos(alpha) + (bed.z - z) * math.sin(alpha)
-        if travel >= scene["marker"] * scene["d_m"]:
+        if travel >= scene["displacement_criterion"] * scene["d_m"]:
             return True
     return False
 
 
 def pivot(scene, case):
     """Bisect among the holds; each trial starts from rest in the last hold that did not move it."""
-    grains, holds = table(case / "grains.csv"), table(case / "holds.csv")
-    low, high = 1, len(holds) - 1
+    grains, load_steps = table(case / "grains.csv"), table(case / "load_steps.csv")
+    low, high = 1, len(load_steps) - 1
     while high - low > 1:
         middle = (low + high) // 2
-        if moves(scene, grains, (holds[0], holds[low]), holds[middle]):
+        if moves(scene, grains, (load_steps[0], load_steps[low]), load_steps[middle]):
             high = middle
         else:
             low = middle
-    ustar = math.sqrt(float(holds[low]["ustar_m_s"]) * float(holds[high]["ustar_m_s"]))
+    ustar = math.sqrt(float(load_steps[low]["ustar_m_s"]) * float(load_steps[high]["ustar_m_s"]))
     return lambda quantity, at: ustar
 
 
@@ -210,7 +210,7 @@ def passing(scene, case):
     for _ in range(int(10 * unit / bed.dt)):
         bed.step(0.0, 0.0)
     x, steps = bed.x, 0
-    while bed.x - x < scene["marker"] * scene["d_m"]:
+    while bed.x - x < scene["displacement_criterion"] * scene["d_m"]:
         bed.step(scene["force_n"], 0.0)
         steps += 1
     return lambda quantity, at: steps * bed.dt / unit
@@ -221,7 +221,7 @@ def pile(scene, case):
     alone = threshold(scene)
     counted = [g for g in table(case / "grains.csv") if g["kind"] == "counted"]
     ratio = [float(g["ustar_over_ustar0"]) for g in counted]
-    flow = [float(h["ustar0_m_s"]) for h in table(case / "holds.csv")]
+    flow = [float(h["ustar0_m_s"]) for h in table(case / "load_steps.csv")]
     order = sorted((r for r in ratio if r > 0), reverse=True)
     moved = [sum(alone <= r * u for r in order) for u in flow]
     excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]

@@ -55,7 +55,7 @@ def set_up(scene, gravity):
         ),
         NewtonIntegrator(damping=0, gravity=gravity),
     ]
-    O.dt = scene["timestep"] * math.sqrt(mass / spring)
+    O.dt = scene["time_step"] * math.sqrt(mass / spring)
 
 
 def add(x, z, scene, kind="mobile"):
@@ -123,11 +123,11 @@ def passing(scene, case):
     start, since = grain.pos[0], O.time
     O.forces.setPermF(ids[-1], (scene["force_n"], 0, 0))
     before = start
-    while grain.pos[0] - start < scene["marker"] * scene["d_m"]:
+    while grain.pos[0] - start < scene["displacement_criterion"] * scene["d_m"]:
         before = grain.pos[0]
         run(0.01 * unit)
     # straight between the last two looks
-    late = (grain.pos[0] - start - scene["marker"] * scene["d_m"]) / (grain.pos[0] - before)
+    late = (grain.pos[0] - start - scene["displacement_criterion"] * scene["d_m"]) / (grain.pos[0] - before)
     value = (O.time - since) / unit - 0.01 * late
     return lambda quantity, at: value
 
@@ -144,7 +144,7 @@ def bed(scene, case):
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
     ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in asked.grains]
     protocol = Protocol(asked, ids)
-    period = int(door.LOOK * scene["time_unit_s"] / O.dt + 0.5)
+    period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
     # one run with looks inside: between two runs YADE waits a twentieth of a second
     O.engines += [PyRunner(command="protocol.look()", iterPeriod=period, initRun=False)]
     O.run(-1, True)
@@ -161,26 +161,26 @@ class Protocol:
         mobile = [row["kind"] != "fixed" for row in grains]
         self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
-        self.marker = scene["marker"] * scene["d_m"]
-        self.quiet_looks = int(scene["quiet"] / door.LOOK + 0.5)
+        self.marker = scene["displacement_criterion"] * scene["d_m"]
+        self.quiet_looks = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
         self.ceiling = asked.ceiling
         places = [(float(row["x_m"]), float(row["z_m"])) for row in grains]
         margin = (door.MARGIN + 1) * scene["d_m"]
         self.low = [min(values) - margin for values in zip(*places, strict=True)]
         self.high = [max(values) + margin for values in zip(*places, strict=True)]
         self.start = []
-        self.settling = int(door.SETTLE / door.LOOK + 0.5)
+        self.settling = int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5)
         self._begin(0)
 
-    def _begin(self, hold):
-        self.hold, self.calm = hold, 0
-        for number, (fx, fz) in zip(self.ids, self.asked.force(hold), strict=True):
+    def _begin(self, load_step):
+        self.load_step, self.calm = load_step, 0
+        for number, (fx, fz) in zip(self.ids, self.asked.force(load_step), strict=True):
             if (fx or fz) and O.bodies[number] is not None:
                 O.forces.setPermF(number, (fx, 0, fz))
 
-    def look(self):
+    def sample(self):
         """Note who has moved, take away who is gone, and go on to the next hold if all is calm."""
-        if self.hold == 0:
+        if self.load_step == 0:
             self.settling -= 1
             if self.settling == 0:
                 self.start = [tuple(O.bodies[number].state.pos) for number in self.counted]
@@ -191,8 +191,8 @@ class Protocol:
         lie = 0 in self.moved_in
         if lie and self.calm < self.quiet_looks:
             return
-        if lie and self.hold + 1 < len(self.asked.holds):
-            self._begin(self.hold + 1)
+        if lie and self.load_step + 1 < len(self.asked.load_steps):
+            self._begin(self.load_step + 1)
         else:
             O.pause()
 
@@ -200,7 +200,7 @@ class Protocol:
         before = self.moved_in.count(0)
         for place, (number, start) in enumerate(zip(self.counted, self.start, strict=True)):
             if self.moved_in[place] == 0 and self._passed(number, start):
-                self.moved_in[place] = self.hold
+                self.moved_in[place] = self.load_step
                 self.carried[place] = O.bodies[number] is None
         return self.moved_in.count(0) < before
 

@@ -28,7 +28,7 @@ another, and none stands out too far."""
 DISORDERED = 4
 """Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
 is the same for any number of mobile layers up to it."""
-TWIN = 1e-9
+PERTURBATION = 1e-9
 """How far the grains of a lattice's twin lie aside, diameters: as far as matters to nothing but
 which grain of a chain goes first."""
 LEE_DEPTH = 1.5
@@ -112,7 +112,7 @@ def pile(
     mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
     centres = np.vstack([body, _apron(body, surface)])
     rest = np.zeros(len(centres) - len(body), bool)
-    aside = TWIN if pattern != "disordered" and seed else 0.0
+    aside = PERTURBATION if pattern != "disordered" and seed else 0.0
     shift = np.random.default_rng(seed).uniform(-aside, aside, centres.shape)
     return Packing(
         centres=centres + shift,

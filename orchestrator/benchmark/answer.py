@@ -113,10 +113,10 @@ def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
 def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     total = found.get(("count", ""), count)
     moved = sorted((float(at), n) for (quantity, at), n in found.items() if quantity == "moved")
-    for (_, before), (hold, n) in pairwise(moved):
+    for (_, before), (load_step, n) in pairwise(moved):
         if n < before:
             raise AnswerError(
-                f"moved falls from {before:g} to {n:g} at hold {hold:g}: a grain that has moved "
+                f"moved falls from {before:g} to {n:g} at hold {load_step:g}: a grain that has moved "
                 "has moved for ever"
             )
     for (quantity, at), n in found.items():

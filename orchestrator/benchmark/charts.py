@@ -103,14 +103,14 @@ def _along_bed(ax: Axes, rows: pd.DataFrame, answers: Answers) -> None:
 
 def _moved(ax: Axes, rows: pd.DataFrame, answers: Answers) -> None:
     here = rows[rows["quantity"] == "moved"]
-    hold = here["at"].astype(float)
+    load_step = here["at"].astype(float)
     rest = rows[rows["quantity"] == "not_moved"]["value"].iloc[-1]
     total = here["value"].iloc[-1] + rest
-    ax.fill_between(hold, here["low"] / total, here["high"] / total, color="0.85", lw=0)
-    ax.plot(hold, here["value"] / total, color=EXPECTED)
+    ax.fill_between(load_step, here["low"] / total, here["high"] / total, color="0.85", lw=0)
+    ax.plot(load_step, here["value"] / total, color=EXPECTED)
     for found, look in answers:
-        ax.plot(hold, found[here.index] / total, "o", **look)
-    ax.set(ylim=(0, 1), xlabel="hold", ylabel="n/N")
+        ax.plot(load_step, found[here.index] / total, "o", **look)
+    ax.set(ylim=(0, 1), xlabel="load_step", ylabel="n/N")
 
 
 def _shields(pack: Pack, contenders: Sequence[Contender]) -> Figure:

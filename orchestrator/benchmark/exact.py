@@ -70,16 +70,16 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
     """Level 2: one grain on its two neighbours; `ours` is the DEM's threshold, m/s."""
     threshold = float(study_form.closed_form(scene).friction_velocity)
     # the mean of two holds is within half a step of what lies between them
-    half = float(np.sqrt(1 + scene.protocol.step))
+    half = float(np.sqrt(1 + scene.protocol.load_increment))
     interval = threshold / half, threshold * half
     asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
-    tables = {"grains": _cell(scene), "holds": _holds(scene, threshold)}
+    tables = {"grains": _cell(scene), "load_steps": _holds(scene, threshold)}
     return Problem(2, scene.id, "pivot", parameters(scene), tables, asked)
 
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by holds is the closed form's, and means something."""
-    return regime_of(scene) == scene.flow.closure and scene.protocol.quiet >= LEAST_QUIET
+    return regime_of(scene) == scene.forces.law and scene.protocol.waiting_time >= LEAST_QUIET
 
 
 def _cell(scene: Scene) -> pd.DataFrame:
@@ -97,8 +97,8 @@ def _three(centres: Any, diameter: float) -> pd.DataFrame:
 def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
     rising = cells.flows(scene)
     fx, fz = cells.force(scene, rising).T
-    holds = {"hold": range(len(rising)), "ustar_m_s": rising * threshold, "fx_n": fx, "fz_n": fz}
-    return pd.DataFrame(holds)
+    load_steps = {"load_step": range(len(rising)), "ustar_m_s": rising * threshold, "fx_n": fx, "fz_n": fz}
+    return pd.DataFrame(load_steps)
 
 
 def checks() -> Iterator[Problem]:
@@ -133,7 +133,7 @@ def _collision(damping: float) -> Problem:
     # the contact ends where the force does, not the overlap
     exponent = damping / root * (np.pi - 2 * np.arcsin(damping))
     asked = expectations([exact("restitution", float(np.exp(-exponent)), CHECK)])
-    told |= {"speed_m_s": MEETING * UNIT, "timestep": 0.01}
+    told |= {"speed_m_s": MEETING * UNIT, "time_step": 0.01}
     return Problem(2, f"collision-{damping:g}", "collision", told, {}, asked)
 
 
@@ -144,7 +144,7 @@ def _incline(incline_deg: float) -> Problem:
     rolls = np.tan(a) < 3.5 * friction
     value = 5 / 7 * np.sin(a) if rolls else np.sin(a) - friction * np.cos(a)
     asked = expectations([exact("acceleration_over_g", float(value), CHECK)])
-    told |= {"incline_deg": incline_deg, "timestep": 0.2}
+    told |= {"incline_deg": incline_deg, "time_step": 0.2}
     return Problem(2, f"incline-{incline_deg:g}", "incline", told, {}, asked)
 
 
@@ -158,7 +158,7 @@ def _sliding(speed: float) -> Problem:
         exact("spin_over_start", 5 / 7, CHECK, "2"),
     ]
     roll_time = 2 * start / (7 * friction * told["reduced_gravity_m_s2"])
-    told |= {"speed_m_s": start, "roll_time_s": roll_time, "timestep": 0.02}
+    told |= {"speed_m_s": start, "roll_time_s": roll_time, "time_step": 0.02}
     return Problem(2, f"sliding-{speed:g}", "sliding", told, {}, expectations(rows))
 
 
@@ -170,9 +170,9 @@ def _passing(push: float) -> Problem:
     told |= {
         "alpha_deg": 0.0,
         "beta_deg": PASSING_DEG,
-        "marker": MARKER,
+        "displacement_criterion": MARKER,
         "force_n": push * told["weight_n"] / float(np.tan(beta)),
-        "timestep": 0.2,
+        "time_step": 0.2,
     }
     x, z = float(np.cos(beta)), -float(np.sin(beta))
     tables = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}

@@ -30,19 +30,19 @@ Between = tuple[float, float]
 RANGES: dict[str, Between] = {
     "alpha_deg": (-90.0, 90.0),
     **dict.fromkeys(("phi_deg", "incline_deg", "beta_deg"), (0.1, 89.9)),
-    **dict.fromkeys(("damping", "timestep"), (1e-6, 0.999)),
+    **dict.fromkeys(("damping", "time_step"), (1e-6, 0.999)),
     **dict.fromkeys(("d_m", "z0_m", "h_m", "lid_m"), (1e-9, 1e4)),
     **dict.fromkeys(("rho_sol_kg_m3", "rho_f_kg_m3"), (1e-6, 1e6)),
     **dict.fromkeys(("g_m_s2", "reduced_gravity_m_s2", "nu_m2_s"), (1e-12, 1e6)),
     **dict.fromkeys(("speed_m_s", "u_e_m_s", "ustar0_m_s"), (1e-9, 1e6)),
     **dict.fromkeys(("force_n", "weight_n"), (1e-30, 1e9)),
     "alpha_s": (0.0, 1e3),
-    "marker": (1e-3, 10.0),
+    "displacement_criterion": (1e-3, 10.0),
     "lift_off": (0.0, 1.0),
     "count": (1, 1e6),
 }
 """Of the parameters that are used here, wherever they are given; SI units, angles in degrees."""
-_GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "timestep", "reduced_gravity_m_s2")
+_GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "time_step", "reduced_gravity_m_s2")
 _FLUID = (*_GRAIN, "rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
 _FLOW = ("alpha_deg", "h_m", "z0_m", "rho_f_kg_m3", "lid_m", "u_e_m_s", "ustar0_m_s")
 KINDS: dict[str, tuple[int, tuple[str, ...]]] = {
@@ -50,7 +50,7 @@ KINDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "collision": (2, (*_GRAIN, "speed_m_s")),
     "incline": (2, (*_GRAIN, "incline_deg")),
     "sliding": (2, (*_GRAIN, "speed_m_s")),
-    "passing": (2, (*_GRAIN, "beta_deg", "marker", "force_n", "weight_n")),
+    "passing": (2, (*_GRAIN, "beta_deg", "displacement_criterion", "force_n", "weight_n")),
     "pivot": (2, _FLUID),
     "flow": (3, _FLOW),
     "pile": (4, (*_FLUID, "count")),
@@ -196,7 +196,7 @@ def scene(path: Path, name: str) -> dict[str, Any]:
     level, needed = KINDS.get(str(told.get("kind")), (None, ()))
     if level is None or (told.get("level"), name[0]) != (level, str(level)):
         refuse(f"it has no kind that is known of level {name[0]}", path)
-    if set(_FLUID) <= {*needed} and told.get("closure") not in LAWS:
+    if set(_FLUID) <= {*needed} and told.get("force_law") not in LAWS:
         refuse("its closure is no force law that is known", path)
     _check_numbers(told, needed, path)
     return told

@@ -83,7 +83,7 @@ def answered(
         stresses = dict(iter(tables["wall_stress"].groupby("flow_case")))
     found = []
     for pile in piles:
-        if pile.bed.is_twin or pile.scene.protocol.method != "dem":
+        if pile.bed.is_replica or pile.scene.protocol.method != "dem":
             continue
         name = pile.scene.id
         stress = stresses[pile.flow.name] if pile.model.cases else nothing
@@ -145,7 +145,7 @@ def pile(one: Answered) -> Problem:
     """Level 4: the grains of a pile under a given stress."""
     scene = one.pile.scene
     told = parameters(scene) | {"count": one.pile.packing.count} | _lift_off(one)
-    tables = {"grains": _grains(one), "holds": holds(one)}
+    tables = {"grains": _grains(one), "load_steps": load_steps(one)}
     return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
 
 
@@ -153,7 +153,7 @@ def line(one: Answered) -> Problem:
     """Level 5: flow and grains."""
     scene = one.pile.scene
     told = parameters(scene) | flow_parameters(one) | _lift_off(one)
-    tables = {"bed": _bed(one.pile.flow), "holds": holds(one)}
+    tables = {"bed": _bed(one.pile.flow), "load_steps": load_steps(one)}
     count = float(one.pile.packing.count)
     counted = exact("count", count, LINE, ours=count)
     asked = expectations([counted, *_pile_rows(one, LINE)])
@@ -167,9 +167,9 @@ def _lift_off(one: Answered) -> dict[str, float]:
     return {"lift_off": carried / float(last["moved"])} if carried else {}
 
 
-def holds(one: Answered) -> pd.DataFrame:
+def load_steps(one: Answered) -> pd.DataFrame:
     """The holds that our run came to, the settling first."""
-    return one.curve[["hold", "ustar0_m_s", "u_e_m_s"]]
+    return one.curve[["load_step", "ustar0_m_s", "u_e_m_s"]]
 
 
 def _grains(one: Answered) -> pd.DataFrame:
@@ -230,16 +230,16 @@ def _pile_rows(one: Answered, threshold: float) -> Iterator[Row]:
         interval = row["shields_low"], row["shields_high"]
         yield expected("shields", at, shields, interval, tolerance, shields)
         # the number is the mean of two holds: one hold more to each side
-        hold = int(np.searchsorted(ustar0, flow))
-        around = ustar0[max(hold - 2, 0)], ustar0[min(hold + 1, len(ustar0) - 1)]
+        load_step = int(np.searchsorted(ustar0, flow))
+        around = ustar0[max(load_step - 2, 0)], ustar0[min(load_step + 1, len(ustar0) - 1)]
         yield expected("ustar0_m_s", at, flow, around, tolerance, flow)
 
 
 def _count_rows(curve: pd.DataFrame, margins: Margins) -> Iterator[Row]:
     total, last = float(curve["count"].iloc[0]), len(curve) - 1
     # hold 0 is the settling
-    for hold in range(1, last + 1):
-        yield _counted("moved", curve, hold, margins)
+    for load_step in range(1, last + 1):
+        yield _counted("moved", curve, load_step, margins)
     moved = _counted("moved", curve, last, margins)
     rest = total - moved["value"]
     interval = total - moved["high"], total - moved["low"]
@@ -248,11 +248,11 @@ def _count_rows(curve: pd.DataFrame, margins: Margins) -> Iterator[Row]:
         yield _counted("carried_off", curve, last, margins)
 
 
-def _counted(quantity: str, curve: pd.DataFrame, hold: int, margins: Margins) -> Row:
+def _counted(quantity: str, curve: pd.DataFrame, load_step: int, margins: Margins) -> Row:
     """Expectation of a number of grains: that of a hold earlier or later, and its margin."""
     total, n = float(curve["count"].iloc[0]), curve[quantity].to_numpy(float)
-    near = n[hold - 1 : hold + 2]
+    near = n[load_step - 1 : load_step + 2]
     low = max(float(near.min()) - margins.count * total, 0.0)
     high = min(float(near.max()) + margins.count * total, total)
     tolerance = 0.0 if near.max() <= margins.until * total else np.nan
-    return expected(quantity, place(hold), n[hold], (low, high), tolerance, n[hold])
+    return expected(quantity, place(load_step), n[load_step], (low, high), tolerance, n[load_step])

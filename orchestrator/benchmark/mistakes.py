@@ -104,7 +104,7 @@ def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]
 
 
 def _passing(told: Told, bodies: Bodies) -> Iterator[tuple[float, str]]:
-    marker = told["marker"]
+    marker = told["displacement_criterion"]
     push = told["force_n"] * math.tan(math.radians(told["beta_deg"])) / told["weight_n"]
     right = exact.passing_time(push, marker)
     for other in MARKERS:
@@ -129,9 +129,9 @@ def _formula(told: Told, wrong: pd.DataFrame) -> str:
 
 def _changes(told: Told) -> Iterator[tuple[str, Told]]:
     yield "there is no lift", {"alpha_s": 0.0}
-    own = LAWS[told["closure"]].label
+    own = LAWS[told["force_law"]].label
     for name, law in LAWS.items():
-        yield f"the forces are those of {law.label}, not of {own}", {"closure": name}
+        yield f"the forces are those of {law.label}, not of {own}", {"force_law": name}
     yield "the sign of the slope is turned", {"alpha_deg": -told["alpha_deg"]}
     yield "the slope is left out", {"alpha_deg": 0.0}
     submerged = 1 - told["rho_f_kg_m3"] / told["rho_sol_kg_m3"]
@@ -145,7 +145,7 @@ def _changes(told: Told) -> Iterator[tuple[str, Told]]:
 
 def _answer(told: Told) -> Callable[[str, str], float]:
     """The formulas of level 1."""
-    law = LAWS[told["closure"]]
+    law = LAWS[told["force_law"]]
     around = ("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s")
     exposure = Exposure(*(told[name] for name in around))
     found = threshold(

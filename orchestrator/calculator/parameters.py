@@ -74,7 +74,7 @@ ROUGHNESS = Parameter(
     geometric=True,
 )
 LIFT = Parameter(
-    *("lift_coefficient", "--lift-coefficient", "flow.lift_coefficient", "alpha_s", "alpha_s"),
+    *("lift_coefficient", "--lift-coefficient", "forces.lift_coefficient", "alpha_s", "alpha_s"),
     default=LIFT_COEFFICIENT,
 )
 G = Parameter("gravity", "--gravity", "fluid.gravity", "g_m_s2", "g, m/s2", GRAVITY)

@@ -149,7 +149,7 @@ def label(scene: Scene) -> str:
     words = [
         f"{scene.bed.slope_deg:g}°",
         f"d = {1e3 * scene.grain.diameter:g} mm",
-        scene.flow.closure,
+        scene.forces.law,
     ]
     if scene.bed.packing == "disordered":
         words.append(f"gaps {scene.bed.disorder:g} d")

@@ -22,7 +22,7 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
-FEW = {"protocol.step": 0.2, "protocol.quiet": 10.0, "protocol.timestep": 0.2}
+FEW = {"protocol.load_increment": 0.2, "protocol.waiting_time": 10.0, "protocol.time_step": 0.2}
 """Few holds, at the time step that is safe, on which the time of one is measured."""
 FAST = "1 layer, fast"
 """The level that the routes are beside; the name of its own row."""
@@ -91,13 +91,13 @@ def costs(
     rows: list[dict[str, Any]] = []
     # the dearest first: the others are compared with it
     for name, pile in reversed(list(piles.items())):
-        holds = len(Motion.from_csv(cases / pile.case.name).flow) - 1
+        load_steps = len(Motion.from_csv(cases / pile.case.name).flow) - 1
         whole = Pile(levels.level("grains", "full pile, fast").answer(fast.scene))
         grains = whole.packing.mobile.sum() / pile.packing.mobile.sum()
         rows.append(
             {
                 "route": name,
-                "core_s": seconds[pile.case.name] / holds * grains * runs,
+                "core_s": seconds[pile.case.name] / load_steps * grains * runs,
                 "extrapolated": True,
             }
         )

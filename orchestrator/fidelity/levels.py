@@ -56,7 +56,7 @@ class Level:
         """The scene as this level answers it."""
         return changed(scene, self.fields(scene))
 
-    def holds(self, scene: Scene) -> bool:
+    def load_steps(self, scene: Scene) -> bool:
         """Whether the scene is on this level as it is."""
         return all(
             getattr(getattr(scene, part), field) == value
@@ -85,7 +85,7 @@ def level(part: Part, name: str) -> Level:
 def holding(scene: Scene) -> Levels:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
     return {
-        part: next((one.name for one in reversed(listed) if one.holds(scene)), AS_ASKED)
+        part: next((one.name for one in reversed(listed) if one.load_steps(scene)), AS_ASKED)
         for part, listed in LEVELS.items()
     }
 
@@ -112,7 +112,7 @@ def _dem(layers: int, rules: Fields, **others: float) -> Fields:
 
 def _solve(cells: int, growth: float, **others: str) -> Fields:
     model = {f"flow.{name}": value for name, value in others.items()}
-    mesh = {"flow.cells_per_face": cells, "flow.growth": growth}
+    mesh = {"flow.cells_per_face": cells, "flow.expansion_ratio": growth}
     return {"flow.model": "solve", "flow.roughness": None, **mesh, **model}
 
 
@@ -138,17 +138,17 @@ def _paper_stiffness(scene: Scene) -> Fields:
 
 FAST: Fields = {
     "grain.stiffness": 1e3,
-    "protocol.timestep": 0.3,
-    "protocol.quiet": 6.0,
-    "protocol.step": 0.03,
+    "protocol.time_step": 0.3,
+    "protocol.waiting_time": 6.0,
+    "protocol.load_increment": 0.03,
 }
 SLOW: Fields = {
     "grain.stiffness": 1e4,
-    "protocol.timestep": 0.2,
-    "protocol.quiet": 10.0,
-    "protocol.step": 0.01,
+    "protocol.time_step": 0.2,
+    "protocol.waiting_time": 10.0,
+    "protocol.load_increment": 0.01,
 }
-SLOWEST: dict[str, float] = {"quiet": 15.0, "step": 0.004}
+SLOWEST: dict[str, float] = {"waiting_time": 15.0, "step": 0.004}
 OTHER_MODEL = "standard, with another turbulence model"
 
 FLOW = (

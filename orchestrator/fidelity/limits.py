@@ -126,7 +126,7 @@ def _timestep(scene: Scene) -> str | None:
     if scene.protocol.method != "dem":
         return None
     most = largest_timestep(scene.grain.damping)
-    step = scene.protocol.timestep
+    step = scene.protocol.time_step
     if step <= most:
         return None
     return f"{step:g} sqrt(m/K) is above {most:g} at a damping of {scene.grain.damping:g}"
@@ -145,13 +145,13 @@ def _undamped(scene: Scene) -> str | None:
 
 def _ramp(scene: Scene) -> str | None:
     rules = scene.protocol
-    if not _pile(scene) or rules.method != "dem" or rules.quiet >= QUIET:
+    if not _pile(scene) or rules.method != "dem" or rules.waiting_time >= WAITING_TIME:
         return None
-    return f"holds of {rules.quiet:g} sqrt(d/g') end before slow grains have passed: it is a ramp"
+    return f"holds of {rules.waiting_time:g} sqrt(d/g') end before slow grains have passed: it is a ramp"
 
 
 def _coarse(scene: Scene) -> str | None:
-    step = scene.protocol.step
+    step = scene.protocol.load_increment
     if not _pile(scene) or scene.protocol.method != "dem" or step <= COARSE_STEP:
         return None
     return f"holds {step:.0%} apart leave the threshold that wide an interval"
@@ -168,15 +168,15 @@ def _wedged(scene: Scene) -> str | None:
 
 
 def _forced(scene: Scene) -> str | None:
-    if not _pile(scene) or scene.flow.forced == "exposed":
+    if not _pile(scene) or scene.forces.loaded_grains == "exposed":
         return None
-    return f"{scene.flow.forced}: a grain without its force blocks those behind it"
+    return f"{scene.forces.loaded_grains}: a grain without its force blocks those behind it"
 
 
 def _scheme(scene: Scene) -> str | None:
-    if not _solved(scene) or scene.flow.convection == "linearUpwind":
+    if not _solved(scene) or scene.flow.convection_scheme == "linearUpwind":
         return None
-    return f"{scene.flow.convection} does not converge to the same answer, or not at all"
+    return f"{scene.flow.convection_scheme} does not converge to the same answer, or not at all"
 
 
 PILE_SLOPES_DEG = (10.0, 35.0)
@@ -184,7 +184,7 @@ PILE_SLOPES_DEG = (10.0, 35.0)
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Damping ratio, and the largest safe time step up to it."""
 LEAST_DAMPING = 0.03
-QUIET = 3.0
+WAITING_TIME = 3.0
 """Least time without a passage, sqrt(d/g')."""
 COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = 59.0
@@ -221,7 +221,7 @@ LIMITS = (
     ),
     Limit(
         "timestep-damping",
-        "protocol.timestep",
+        "protocol.time_step",
         _timestep,
         "The largest safe time step falls with the damping: "
         + ", ".join(f"{step:g} up to {damping:g}" for damping, step in TIMESTEPS)
@@ -244,23 +244,23 @@ LIMITS = (
     ),
     Limit(
         "quiet-step",
-        "protocol.quiet",
+        "protocol.waiting_time",
         _ramp,
-        f"A pile's hold waits for at least {QUIET:g} sqrt(d/g'): a warning below.",
+        f"A pile's hold waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
         "raise it, unless a ramp is what you want",
         refused=False,
     ),
     Limit(
         "quiet-step",
-        "protocol.step",
+        "protocol.load_increment",
         _coarse,
         "A pile's holds are at most 5 % apart: a warning above.",
         "lower it",
         refused=False,
     ),
     Limit(
-        "forced",
-        "flow.forced",
+        "loaded_grains",
+        "forces.loaded_grains",
         _forced,
         "Every exposed grain carries a force: a warning otherwise.",
         "exposed",
@@ -268,7 +268,7 @@ LIMITS = (
     ),
     Limit(
         "mesh-scheme-15",
-        "flow.convection",
+        "flow.convection_scheme",
         _scheme,
         "linearUpwind alone converges to the answer: a warning otherwise.",
         "linearUpwind",

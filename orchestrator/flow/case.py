@@ -77,10 +77,10 @@ class FlowCase(Case):
     viscosity_m2_s: float
     first_cell_m: float
     cells_per_face: int = 40
-    growth: float = 1.1
-    turbulence: Turbulence = "kEpsilon"
-    convection: Convection = "linearUpwind"
-    correctors: int = 1
+    expansion_ratio: float = 1.1
+    turbulence_model: Turbulence = "kEpsilon"
+    convection_scheme: Convection = "linearUpwind"
+    non_orthogonal_correctors: int = 1
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
@@ -106,7 +106,7 @@ class FlowCase(Case):
 
     def _check_numbers(self) -> None:
         for name, value in self.parameters.items():
-            if isinstance(value, str) or (value == 0 and name in ("slope_deg", "correctors")):
+            if isinstance(value, str) or (value == 0 and name in ("slope_deg", "non_orthogonal_correctors")):
                 continue
             if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
@@ -122,8 +122,8 @@ class FlowCase(Case):
             raise InputError(
                 f"{self.cells_per_face} is not within 8 to 400", where="cells_per_face"
             )
-        if not 1.0 < self.growth <= 2.0:
-            raise InputError(f"{self.growth:g} is not within 1 to 2", where="growth")
+        if not 1.0 < self.expansion_ratio <= 2.0:
+            raise InputError(f"{self.expansion_ratio:g} is not within 1 to 2", where="expansion_ratio")
         if self.first_cell_m > self.height_m / 4.0:
             raise InputError(
                 f"{self.first_cell_m:g} m is above h/4 = {self.height_m / 4:g} m",
@@ -133,7 +133,7 @@ class FlowCase(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The fields, as JSON; SI units, degrees."""
-        whole = {name: int(getattr(self, name)) for name in ("cells_per_face", "correctors")}
+        whole = {name: int(getattr(self, name)) for name in ("cells_per_face", "non_orthogonal_correctors")}
         fields = asdict(self).items()
         return {n: v if isinstance(v, str) else float(v) for n, v in fields} | whole
 
@@ -153,11 +153,11 @@ class FlowCase(Case):
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
-        growth = self.growth ** (40.0 / self.cells_per_face)
+        expansion_ratio = self.expansion_ratio ** (40.0 / self.cells_per_face)
         face = 1.0 / tan(radians(self.slope_deg)) if self.slope_deg else 4.0
         toe = 1.7 * face / self.cells_per_face
-        beside = _grown(10.0 / toe, growth) + _grown(20.0 / toe, growth)
-        up = _grown(LID_OVER_HEIGHT * self.height_m / self.first_cell_m, growth)
+        beside = _grown(10.0 / toe, expansion_ratio) + _grown(20.0 / toe, expansion_ratio)
+        up = _grown(LID_OVER_HEIGHT * self.height_m / self.first_cell_m, expansion_ratio)
         return (2 * self.cells_per_face + beside) * up
 
     def versions(self) -> dict[str, str]:
@@ -172,9 +172,9 @@ class FlowCase(Case):
             lidHeight=LID_OVER_HEIGHT * self.height_m,
             roughnessLength=self.roughness_m,
             viscosity=self.viscosity_m2_s,
-            turbulence=self.turbulence,
-            convection=self.convection,
-            correctors=self.correctors,
+            turbulence_model=self.turbulence_model,
+            convection_scheme=self.convection_scheme,
+            non_orthogonal_correctors=self.non_orthogonal_correctors,
         )
         _set_values(
             directory / "parameters.geo",
@@ -182,7 +182,7 @@ class FlowCase(Case):
             height=self.height_m,
             first_cell=self.first_cell_m,
             cells_per_face=self.cells_per_face,
-            growth_at_40=self.growth,
+            growth_at_40=self.expansion_ratio,
         )
         write_mesh(directory)
 
@@ -230,9 +230,9 @@ class FlowCase(Case):
             )
 
 
-def _grown(length_over_first: float, growth: float) -> float:
+def _grown(length_over_first: float, expansion_ratio: float) -> float:
     """How many cells that grow by `growth` fill a length."""
-    return log(1.0 + length_over_first * (growth - 1.0)) / log(growth)
+    return log(1.0 + length_over_first * (expansion_ratio - 1.0)) / log(expansion_ratio)
 
 
 def _set_values(path: Path, **values: float | str) -> None:

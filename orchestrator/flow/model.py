@@ -22,8 +22,8 @@ FIELD_OF = {
     "viscosity_m2_s": "flow.viscosity",
     "first_cell_m": "flow.first_cell_height",
     "cells_per_face": "flow.cells_per_face",
-    "growth": "flow.growth",
-    "correctors": "flow.correctors",
+    "expansion_ratio": "flow.expansion_ratio",
+    "non_orthogonal_correctors": "flow.non_orthogonal_correctors",
 }
 """What a study file calls the parameters of a flow case."""
 
@@ -101,10 +101,10 @@ class Solved(FlowModel):
                 viscosity_m2_s=flow.viscosity,
                 first_cell_m=self.scene.first_cell_height,
                 cells_per_face=flow.cells_per_face,
-                growth=flow.growth,
-                turbulence=flow.turbulence,
-                convection=flow.convection,
-                correctors=flow.correctors,
+                expansion_ratio=flow.expansion_ratio,
+                turbulence_model=flow.turbulence_model,
+                convection_scheme=flow.convection_scheme,
+                non_orthogonal_correctors=flow.non_orthogonal_correctors,
             )
         except InputError as error:
             field = FIELD_OF.get(error.where, error.where)

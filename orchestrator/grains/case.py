@@ -11,8 +11,8 @@ class GrainCase(Case):
     """A case that runs the deck ``in.bed``."""
 
     template: ClassVar[str] = "liggghts/bed"
-    results: ClassVar[tuple[str, ...]] = ("settling.csv", "levels.csv", "passage.dump", "bed.dump")
-    derived: ClassVar[tuple[str, ...]] = ("holds.csv", "motion.csv")
+    results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", "passage.dump", "bed.dump")
+    derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 

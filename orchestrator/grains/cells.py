@@ -30,14 +30,14 @@ LAST = 1.2
 """Flow of the last hold: a grain that still lies then contradicts the closed form by 20 %."""
 SPACING = 3.0
 """Of the cells across the flow, diameters: grains of two cells never meet."""
-UNUSED = {"fractions", "until"}
+UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
 BLOCK = 512
 """Most cells of a deck."""
 
 
 @dataclass(frozen=True)
-class CellsCase(GrainCase):
+class SingleGrainCase(GrainCase):
     """Cells of three grains, one for each scene; all scenes share grain contact and protocol."""
 
     scenes: tuple[Scene, ...]
@@ -54,8 +54,8 @@ class CellsCase(GrainCase):
     def cost_s(self) -> float:
         """Expected wall time, s."""
         rules = self.scenes[0].protocol
-        holds = np.log(1.02 / protocol.START) / np.log1p(rules.step)
-        return protocol.run_cost_s(holds, 3 * len(self.scenes), rules, self._grain.stiffness)
+        load_steps = np.log(1.02 / protocol.START) / np.log1p(rules.load_increment)
+        return protocol.run_cost_s(load_steps, 3 * len(self.scenes), rules, self._grain.stiffness)
 
     @property
     def _grain(self) -> Any:
@@ -84,7 +84,7 @@ class CellsCase(GrainCase):
         """Check the run and write what each grain did to ``motion.csv``."""
         self.check(directory)
         grains = self._grains()
-        marker = self.scenes[0].protocol.marker
+        marker = self.scenes[0].protocol.displacement_criterion
         rest.check(directory, grains, WEIGHT, self._grain.stiffness, all_rest=False)
         found = motion.read(directory, grains, marker, falls_out=True)
         found.to_csv(directory, grains)
@@ -121,7 +121,7 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray]:
 
 def flows(scene: Scene) -> FloatArray:
     """Friction velocity of the settling and of each hold, over that of the closed form."""
-    return protocol.flows(protocol.START, LAST, scene.protocol.step)
+    return protocol.flows(protocol.START, LAST, scene.protocol.load_increment)
 
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
@@ -132,7 +132,7 @@ def force(scene: Scene, rising: FloatArray) -> FloatArray:
     return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
 
 
-def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:
+def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
     """Cases for the single-grain scenes of a study: those that can share a deck, in fixed blocks.
 
     The split depends on the study alone, never on what is left to do: a study that was interrupted
@@ -144,7 +144,7 @@ def batches(scenes: Iterable[Scene]) -> Iterator[CellsCase]:
     for key in sorted(groups):
         members = sorted(groups[key], key=lambda scene: scene.id)
         for start in range(0, len(members), BLOCK):
-            yield CellsCase(tuple(members[start : start + BLOCK]))
+            yield SingleGrainCase(tuple(members[start : start + BLOCK]))
 
 
 def _shared_key(scene: Scene) -> str:

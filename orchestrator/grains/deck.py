@@ -19,11 +19,11 @@ MEANING = {
     "friction": "tan(phi)",
     "stiffness": "K d/W, normal and tangential",
     "damping": "ratio of a collision",
-    "timestep": "sqrt(m/K)",
-    "quiet": "a hold ends when nothing has passed for this long, sqrt(d/g')",
-    "look": "time between two looks at the grains, sqrt(d/g')",
+    "time_step": "sqrt(m/K)",
+    "waiting_time": "a hold ends when nothing has passed for this long, sqrt(d/g')",
+    "sampling_interval": "time between two looks at the grains, sqrt(d/g')",
     "settle": "time before the first hold, sqrt(d/g')",
-    "marker": "displacement along the bed that counts as motion, d",
+    "displacement_criterion": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
     "away": "displacement along the bed from which on a counted grain is gone, d",
     "enough": "the end: no more counted grains than this still lie",
@@ -106,7 +106,7 @@ def write(
         for name, value in numbers.items()
     )
     (directory / "parameters.liggghts").write_text("".join(lines))
-    (directory / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    (directory / "load_steps.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
     pushed = np.flatnonzero(grains.kind >= COUNTED)
     counted = np.flatnonzero(grains.kind == COUNTED)
     for place, axis in enumerate("xz"):

@@ -36,14 +36,14 @@ class Track:
     roll: FloatArray
 
 
-def read_track(directory: Path, grains: GrainTable, looks: pd.DataFrame) -> Track:
+def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Track:
     """Read what the counted grains did at each look; arguments as in `read_passage`."""
     ids = grains.counted_ids
-    state = read_passage(directory, ids, looks)
+    state = read_passage(directory, ids, samples)
     return _track(state, grains.along[ids - 1], grains.diameter)
 
 
-def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> FloatArray:
+def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> FloatArray:
     """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (5, T + 1, N).
 
     First after settling, then at each look. NaN of a grain that is gone; one that the deck does
@@ -67,11 +67,11 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
     """
     path = directory / PASSAGE
     dump = read_dump(path, PASSAGE_COLUMNS)
-    if not np.array_equal(dump.steps[1:], looks["step"]):
+    if not np.array_equal(dump.steps[1:], samples["step"]):
         raise SolverError("it is not of these holds", where=str(path), remedy="run the case again")
     rows = dump.rows
     if rows.empty or not rows["id"].isin(ids).all():
-        remedy = "a smaller protocol.timestep, or look for grains that overlap"
+        remedy = "a smaller protocol.time_step, or look for grains that overlap"
         if rows.empty:
             raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
         raise SolverError("it is not of these grains", where=str(path), remedy="run the case again")
@@ -80,16 +80,16 @@ def read_passage(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -
     for part, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
         part[row, column] = rows[name]
     listed = ~np.isnan(state[0, 1:])
-    resting = ~listed & _there(listed, _left(directory, ids, looks), looks)
+    resting = ~listed & _there(listed, _left(directory, ids, samples), samples)
     for part, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0), strict=True):
         np.copyto(part[1:], still, where=resting)
     return state
 
 
-def _left(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> NDArray[np.bool_]:
+def _left(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> NDArray[np.bool_]:
     """Which counted grains there were at the end of each hold, shape (holds, N)."""
     bed = read_dump(directory / BED, BED_COLUMNS)
-    ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
+    ends = samples.groupby("level")["step"].last().to_numpy(np.int64)
     if not np.array_equal(bed.steps, ends):
         raise SolverError(
             "it is not of these holds", where=str(directory / BED), remedy="run the case again"
@@ -101,11 +101,11 @@ def _left(directory: Path, ids: NDArray[np.int64], looks: pd.DataFrame) -> NDArr
 
 
 def _there(
-    listed: NDArray[np.bool_], left: NDArray[np.bool_], looks: pd.DataFrame
+    listed: NDArray[np.bool_], left: NDArray[np.bool_], samples: pd.DataFrame
 ) -> NDArray[np.bool_]:
     """Which grains were there at each look: those that are listed, or seen later in the hold."""
     found = np.empty_like(listed)
-    for left_then, (_, one) in zip(left, looks.reset_index().groupby("level"), strict=True):
+    for left_then, (_, one) in zip(left, samples.reset_index().groupby("level"), strict=True):
         rows = one.index
         found[rows] = np.logical_or.accumulate(listed[rows][::-1])[::-1] | left_then
     return found

@@ -22,7 +22,7 @@ from orchestrator.study.scene import Scene
 FloatArray = NDArray[np.float64]
 
 TOE = 0.05
-"""Part of the windward face, from its foot, that `flow.forced` may leave without a force."""
+"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave without a force."""
 
 _packed = cache(packing.pile)
 
@@ -116,17 +116,17 @@ class LoadedBed:
             Of the mean stress around each grain; positive is downstream.
         """
         flow, d = self.scene.flow, self.scene.grain.diameter
-        length = max(d, flow.average * self.bed.height)
-        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, flow.stress)
+        length = max(d, forces.averaging_length * self.bed.height)
+        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, forces.stress)
         return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
 
     @property
     def _forgotten(self) -> NDArray[np.bool_]:
         """Grains that go without the flow's force though they are exposed."""
         windward, s = self.packing.windward, self.packing.arc_length
-        if self.scene.flow.forced == "all but crest":
+        if self.scene.forces.loaded_grains == "all but crest":
             return np.asarray(windward & (s == s[windward].max()))
-        if self.scene.flow.forced == "all but toe":
+        if self.scene.forces.loaded_grains == "all but toe":
             return np.asarray(windward & (s < TOE * self.line.crest_s))
         return np.zeros_like(windward)
 

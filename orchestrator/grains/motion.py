@@ -19,8 +19,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-LEVELS = "levels.csv"
-HOLDS = "holds.csv"
+LEVELS = "samples.csv"
+LOAD_STEPS = "load_steps.csv"
 MOTION = "motion.csv"
 MODES = ("none", "rolled", "slid", "lifted")
 """How a grain moved."""
@@ -121,14 +121,14 @@ class Motion:
 
     def to_csv(self, directory: Path, grains: GrainTable) -> None:
         """Write ``holds.csv`` and ``motion.csv``: the same, for people and for `from_csv`."""
-        holds = pd.DataFrame({"hold": np.arange(len(self.flow)), "flow": self.flow})
-        holds = holds.assign(
+        load_steps = pd.DataFrame({"load_step": np.arange(len(self.flow)), "flow": self.flow})
+        load_steps = load_steps.assign(
             moved=self.moved,
             not_moved=self.count - self.moved,
             carried_off=self.carried_off,
             fallen_upstream=self.fallen_upstream,
         )
-        holds.to_csv(directory / HOLDS, index=False)
+        load_steps.to_csv(directory / LOAD_STEPS, index=False)
         columns = {
             "id": grains.counted_ids,
             "moved_in": self.level,
@@ -141,10 +141,10 @@ class Motion:
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
         """Read what `to_csv` wrote."""
-        holds = pd.read_csv(directory / HOLDS)
+        load_steps = pd.read_csv(directory / LOAD_STEPS)
         grains = pd.read_csv(directory / MOTION)
         return cls(
-            flow=holds["flow"].to_numpy(float),
+            flow=load_steps["flow"].to_numpy(float),
             level=grains["moved_in"].to_numpy(np.int64),
             fallen=grains["fallen_in"].to_numpy(np.int64),
             carried=grains["carried_off"].to_numpy(bool),
@@ -169,34 +169,34 @@ def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool)
     SolverError
         If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
     """
-    looks = _looks(directory)
-    track = read_track(directory, grains, looks)
-    _reconcile(directory, looks, track, marker)
+    samples = _looks(directory)
+    track = read_track(directory, grains, samples)
+    _reconcile(directory, samples, track, marker)
     found = counting.count(track.travel, marker, falls_out=falls_out)
-    hold = looks["level"].to_numpy(np.int64)
-    flow = looks.groupby("level")["flow"].first().to_numpy(float)
+    load_step = samples["level"].to_numpy(np.int64)
+    flow = samples.groupby("level")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
-        level=_first(found.moved, hold),
-        fallen=_first(found.fallen, hold),
+        level=_first(found.moved, load_step),
+        fallen=_first(found.fallen, load_step),
         carried=found.carried[-1],
         mode=_mode(track, found),
     )
 
 
-def _first(happened: BoolArray, hold: IntArray) -> IntArray:
-    return np.where(happened.any(axis=0), hold[happened.argmax(axis=0)], 0)
+def _first(happened: BoolArray, load_step: IntArray) -> IntArray:
+    return np.where(happened.any(axis=0), load_step[happened.argmax(axis=0)], 0)
 
 
 def _mode(track: Track, found: Count) -> IntArray:
     """How each grain moved, from its track around the look at which it was found to have moved."""
     passed = found.moved
-    looks = np.arange(len(passed))[:, None]
+    samples = np.arange(len(passed))[:, None]
     first = np.where(passed.any(axis=0), passed.argmax(axis=0), -1)
     present = ~np.isnan(track.travel)
     # one that was gone by then is judged by its last look
-    last_seen = np.max(np.where(present & (looks <= first), looks, 0), axis=0)
-    window = (looks >= last_seen) & (looks < first + WINDOW) & present
+    last_seen = np.max(np.where(present & (samples <= first), samples, 0), axis=0)
+    window = (samples >= last_seen) & (samples < first + WINDOW) & present
     rise = np.max(np.where(window, track.rise, -np.inf), axis=0)
     roll = np.take_along_axis(track.roll, last_seen[None], axis=0)[0]
     none, rolled, slid, lifted = range(len(MODES))
@@ -211,10 +211,10 @@ def _looks(directory: Path) -> pd.DataFrame:
     path = directory / LEVELS
     try:
         text = path.read_text(encoding="ascii")
-        looks = pd.read_csv(StringIO(text))
-        if looks.empty or not text.endswith("\n") or not np.isfinite(looks.to_numpy(float)).all():
+        samples = pd.read_csv(StringIO(text))
+        if samples.empty or not text.endswith("\n") or not np.isfinite(samples.to_numpy(float)).all():
             raise ValueError("it holds no whole line")
-        return looks
+        return samples
     except (OSError, ValueError) as error:
         raise SolverError(
             f"the table of holds cannot be read: {error}",
@@ -223,10 +223,10 @@ def _looks(directory: Path) -> pd.DataFrame:
         ) from None
 
 
-def _reconcile(directory: Path, looks: pd.DataFrame, track: Track, marker: float) -> None:
+def _reconcile(directory: Path, samples: pd.DataFrame, track: Track, marker: float) -> None:
     """Lying, fallen and gone make N at each look, by the deck's own count and by the places."""
     lying, fallen = counting.deck_counts(track.travel, marker)
-    agree = (looks["lying"] == lying) & (looks["fallen"] == fallen)
+    agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
         raise SolverError(
             f"the counts do not reconcile at look {int(agree.argmin()) + 1}",

@@ -47,7 +47,7 @@ def of_bed(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
         loading,
         ForceTable(loading.drag, loading.lift, scene.weight, alone),
         along=bed.tangents,
-        marker=scene.protocol.marker,
+        marker=scene.protocol.displacement_criterion,
     )
     return np.asarray(found[bed.packing.windward])
 
@@ -90,13 +90,13 @@ def flows(
     next_flow = np.full(len(centres), np.inf)
     ways: dict[int, list[Place]] = {}
 
-    def look(i: int) -> None:
+    def sample(i: int) -> None:
         others = [places[k] for k in near[i] if present[k]]
         push = _Push(table, ratio[i], tangents[i], normals[i])
         next_flow[i], ways[i] = _Climb(places[i], others, push, ups[i], marker).needed()
 
     for i in near:
-        look(i)
+        sample(i)
     reached = 0.0
     while np.isfinite(lowest := float(next_flow.min())):
         i = int(next_flow.argmin())
@@ -106,7 +106,7 @@ def flows(
         for k in near[i]:
             # whom it would not have rolled over was not on its way
             if k in near and present[k] and places[i] in ways[k]:
-                look(k)
+                sample(k)
     return left
 
 

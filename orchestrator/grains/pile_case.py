@@ -48,8 +48,8 @@ class PileCase(GrainCase):
         # the whole pile is half its rows thick on average
         layers = min(self.loaded.bed.mobile_layers, line.crest[1] / 2)
         grains = line.crest_s * (layers + 3)
-        holds = np.log(3.5) / np.log1p(rules.step)
-        return protocol.run_cost_s(holds, int(grains), rules, self.scene.grain.stiffness)
+        load_steps = np.log(3.5) / np.log1p(rules.load_increment)
+        return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the holds of the protocol."""
@@ -63,13 +63,13 @@ class PileCase(GrainCase):
         """The flow of the settling, then of each hold: from before the first grain goes."""
         bed, rules = self.loaded, self.scene.protocol
         thresholds = np.sort(peeling.of_bed(bed, ratio))
-        if not 0 < thresholds[0] < np.inf or self.scene.flow.forced != "exposed":
+        if not 0 < thresholds[0] < np.inf or self.scene.forces.loaded_grains != "exposed":
             # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
             thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
-        last = thresholds[int(np.ceil(rules.until * bed.packing.count)) - 1]
+        last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-        return protocol.flows(protocol.START * thresholds[0], protocol.BEYOND * last, rules.step)
+        return protocol.flows(protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment)
 
     @property
     def _numbers(self) -> dict[str, float | int]:
@@ -82,7 +82,7 @@ class PileCase(GrainCase):
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
-            **protocol.raising(rules, int((1 - rules.until) * bed.packing.count + 1e-9)),
+            **protocol.raising(rules, int((1 - rules.final_fraction) * bed.packing.count + 1e-9)),
             "slope": line.slopes_deg[line.windward],
             "ceiling_x": line.crest[0] * d,
             "ceiling_z": (line.crest[1] + ceiling) * d,
@@ -94,7 +94,7 @@ class PileCase(GrainCase):
         self.check(directory)
         grain = self.scene.grain
         rest.check(directory, self._grains, self.scene.weight, grain.stiffness, all_rest=True)
-        found = motion.read(directory, self._grains, self.scene.protocol.marker, falls_out=False)
+        found = motion.read(directory, self._grains, self.scene.protocol.displacement_criterion, falls_out=False)
         found.to_csv(directory, self._grains)
 
     @cached_property

@@ -9,7 +9,7 @@ from orchestrator.study.parts import Grain, Protocol
 
 FloatArray = NDArray[np.float64]
 
-LOOK = 0.5
+SAMPLING_INTERVAL = 0.5
 """Time between two looks at the grains, sqrt(d/g')."""
 SETTLE = 10.0
 """Time in which the bed settles before the first hold, sqrt(d/g')."""
@@ -33,7 +33,7 @@ def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
         "friction": math.tan(math.radians(grain.friction_angle_deg)),
         "stiffness": grain.stiffness,
         "damping": grain.damping,
-        "timestep": protocol.timestep,
+        "time_step": protocol.time_step,
     }
 
 
@@ -63,20 +63,20 @@ def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
         The sequence of holds ends early when no more than this many grains still lie.
     """
     return {
-        "quiet": protocol.quiet,
-        "look": LOOK,
+        "waiting_time": protocol.waiting_time,
+        "sampling_interval": SAMPLING_INTERVAL,
         "settle": SETTLE,
-        "marker": protocol.marker,
+        "displacement_criterion": protocol.displacement_criterion,
         "stir": STIR,
         "away": AWAY,
         "enough": enough,
     }
 
 
-def run_cost_s(holds: float, grains: int, protocol: Protocol, stiffness: float) -> float:
+def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
     """Expected wall time of a deck, s: holds of twice the quiet time, 6e7 grain-steps a second.
 
     Both figures are of piles of 80 to 770 counted grains on one core; fixed grains cost little.
     """
-    steps = holds * 2 * protocol.quiet * math.sqrt(stiffness) / protocol.timestep
+    steps = load_steps * 2 * protocol.waiting_time * math.sqrt(stiffness) / protocol.time_step
     return 0.1 + steps * grains / 6e7

@@ -22,7 +22,7 @@ DECAY = 0.5
 second quarter's, and grows when it has more than 1/DECAY of it."""
 BURST = 10.0
 """Kinetic energy per grain, over W d, that no fall of a grain can give it."""
-REMEDY = "a smaller protocol.timestep or grain.damping, or look for grains that overlap"
+REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 
 
 def check(

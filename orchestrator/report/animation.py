@@ -41,14 +41,14 @@ def draw(results: Results, folder: Folder) -> Iterator[tuple[Figure, bytes]]:
     for pile in list(grain_picture.chosen(results))[:1]:
         passage = snapshot.read(pile, results.cases)
         window = marks.windows(pile)[-1]
-        looks = choose(passage, window)
-        if len(looks):
-            data = _gif(passage, window, looks)
+        samples = choose(passage, window)
+        if len(samples):
+            data = _gif(passage, window, samples)
             folder.put(f"{FIGURES}/{NAME}.gif", data)
             d = labels.millimetres(pile.scene.grain.diameter)
             alpha = labels.plain("alpha_deg", pile.bed.slope_deg)
             title = f"The crest empties, {alpha}, d = {d} (animation)"
-            caption = captions.crest(pile, len(looks))
+            caption = captions.crest(pile, len(samples))
             yield Figure(NAME, title, caption, (pile.case.name,), None), data
 
 
@@ -62,20 +62,20 @@ def choose(passage: Passage, window: Window) -> NDArray[np.int64]:
     empty = passage.passed[:, here].all(axis=1)
     last = min(int(empty.argmax()) + AFTER, len(shown) - 1) if empty.any() else len(shown) - 1
     shown[last + 1 :] = False
-    looks = np.flatnonzero(shown)
-    if not len(looks):
-        return looks
-    looks = np.unique([0, *looks, last])
-    thinned = np.linspace(0, len(looks) - 1, min(MOST, len(looks))).round().astype(np.int64)
-    return np.asarray(looks[thinned])
+    samples = np.flatnonzero(shown)
+    if not len(samples):
+        return samples
+    samples = np.unique([0, *samples, last])
+    thinned = np.linspace(0, len(samples) - 1, min(MOST, len(samples))).round().astype(np.int64)
+    return np.asarray(samples[thinned])
 
 
-def _gif(passage: Passage, window: Window, looks: NDArray[np.int64]) -> bytes:
+def _gif(passage: Passage, window: Window, samples: NDArray[np.int64]) -> bytes:
     scene = Scene(passage, window)
     palette = _palette()
     frames = [
-        Image.fromarray(scene.frame(int(look))).quantize(palette=palette, dither=Image.Dither.NONE)
-        for look in looks
+        Image.fromarray(scene.frame(int(sample))).quantize(palette=palette, dither=Image.Dither.NONE)
+        for sample in samples
     ]
     times = [FRAME_MS] * (len(frames) - 1) + [LAST_MS]
     out = BytesIO()
@@ -126,9 +126,9 @@ class Scene:
         figure.set_layout_engine("none")  # it is laid out now
         self._still = self._agg.copy_from_bbox(figure.bbox)
 
-    def frame(self, look: int) -> NDArray[np.uint8]:
+    def frame(self, sample: int) -> NDArray[np.uint8]:
         """The picture at a look, (rows, columns, 3)."""
-        found = self._passage.at(look)
+        found = self._passage.at(sample)
         here, colours = found.mobile & ~found.gone, marks.by_mode(found)
         self._gone.set(offsets=found.start[found.gone], edgecolor=marks.edges(found))
         self._here.set(offsets=found.place[here], facecolor=list(colours[here]))
@@ -147,6 +147,6 @@ class Scene:
     def _said(self, found: Snapshot) -> str:
         count = len(self._passage.mode)
         return (
-            f"hold {found.hold}: $u^\\star_0$ = {found.ustar0:.3f} m/s,  "
+            f"hold {found.load_step}: $u^\\star_0$ = {found.ustar0:.3f} m/s,  "
             f"$n/N$ = {found.moved}/{count} = {found.moved / count:.0%}"
         )

@@ -53,11 +53,11 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame, l
     found = varying(table, *shown)
     panels = [column for column in found if fields.COLUMNS[column].info.about == "question"]
     looks = [column for column in found if column not in panels]
-    laws = list(dict.fromkeys([*PAPER, *table["closure"]]))
+    laws = list(dict.fromkeys([*PAPER, *table["force_law"]]))
     while looks and _count(table, looks) * len(laws) > len(SHAPES):
         panels.append(looks.pop(0))
     variant = _variant(table, looks)
-    shape = variant * len(laws) + table["closure"].map(laws.index)
+    shape = variant * len(laws) + table["force_law"].map(laws.index)
     rows = table.assign(**{SHAPE: shape.map(lambda at: SHAPES[at % len(SHAPES)])})
     entries = [_entry(own, looks) for _, own in rows.groupby(variant)] if looks else []
     return panels, rows, entries
@@ -74,5 +74,5 @@ def _variant(table: pd.DataFrame, looks: Sequence[str]) -> "pd.Series[int]":
 
 def _entry(rows: pd.DataFrame, looks: Sequence[str]) -> Sample:
     label = labels.panel(rows.iloc[0], looks)
-    markers = dict.fromkeys(rows.sort_values("closure", ascending=False)[SHAPE])
+    markers = dict.fromkeys(rows.sort_values("force_law", ascending=False)[SHAPE])
     return tuple(Line2D([], [], ls="", marker=m, color="0.2", label=label) for m in markers)

@@ -212,7 +212,7 @@ def grains(pile: Pile, found: Snapshot, fraction: float) -> str:
         f"{pile.packing.count} exposed windward grains had moved ({found.moved}): hold "
         f"{found.hold}, u*₀ = {found.ustar0:.3g} m/s, {_forces(pile)} Above, colour is the "
         "distance from the grain’s place in the packing; a grain counts as moved from "
-        f"{pile.scene.protocol.marker:g} d downstream along the bed. Below, colour and symbol are "
+        f"{pile.scene.protocol.displacement_criterion:g} d downstream along the bed. Below, colour and symbol are "
         f"how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which does not "
         "see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that had left "
         "the box, where they lay (without a symbol: not counted as moved). Other mobile grains, "
@@ -225,7 +225,7 @@ def crest(pile: Pile, looks: int) -> str:
     """Of the animation."""
     return (
         f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
-        f"symbol: how a grain moved, from {pile.scene.protocol.marker:g} d on: {_modes()} Hollow: "
+        f"symbol: how a grain moved, from {pile.scene.protocol.displacement_criterion:g} d on: {_modes()} Hollow: "
         "left the box, where it lay (without a symbol: not counted as moved). The "
         f"{looks} frames are looks of the deck, {LOOK:g} √(d/g′) apart where none is left out: "
         "left out are those at which no grain moves near its place, so that grains jump or vanish "
@@ -235,7 +235,7 @@ def crest(pile: Pile, looks: int) -> str:
 
 def _forces(pile: Pile) -> str:
     ratio = labels.ratio_of(pile.bed.roughness / pile.scene.grain.diameter, "d")
-    rows, forces = (_values(column, [pile]) for column in ("packing", "closure"))
+    rows, forces = (_values(column, [pile]) for column in ("packing", "force_law"))
     return f"z₀ = {ratio}, {rows}, forces: {forces}."
 
 

@@ -28,7 +28,7 @@ PACKAGES = (
     "pyvista",
     "vtk",
 )
-SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "closure")
+SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """What each row of the table of piles says of its pile."""
 MANY = 12
 """Values of a parameter beyond which only their range is listed."""
@@ -62,8 +62,8 @@ def piles(results: Results) -> Sheet | None:
 
 
 def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
-    forces = labels.value("closure", row["closure"])
-    holds = row["closure"] == row["regime"]
+    forces = labels.value("force_law", row["force_law"])
+    holds = row["force_law"] == row["regime"]
     cells = (
         f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
         f"{labels.ratio_of(row['z0_over_d'], 'd')}",
@@ -94,14 +94,14 @@ def single_grains(results: Results) -> Sheet | None:
     width = (found["ustar_high_m_s"] - found["ustar_low_m_s"]) / found["ustar_closed_form_m_s"] / 2
     table = found.assign(holds=valid(found), held=held(found), ratio=ratio, width=width)
     rows = []
-    for (closure, holds, quiet), own in split(table, "closure", "holds", "held"):
-        equation = labels.value("closure", closure)
+    for (law_name, holds, waiting_time), own in split(table, "force_law", "holds", "held"):
+        equation = labels.value("force_law", law_name)
         far = (own["ratio"] - 1).abs()
         rows.append(
             (
                 equation,
                 "yes" if holds else "no (transition)",
-                "holds" if quiet else "ramps",
+                "holds" if waiting_time else "ramps",
                 str(len(own)),
                 str(int(own["ratio"].isna().sum())),
                 f"{own['ratio'].mean() - 1:+.3%}",

@@ -13,7 +13,7 @@ from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, split, valid
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
-SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "closure")
+SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """What figures, panels, axes, colours and markers tell apart."""
 
 
@@ -75,12 +75,12 @@ def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
 
 
 def _curve(ax: Axes, curve: pd.DataFrame, column: str, colour: str) -> None:
-    closure = str(curve["closure"].iloc[0])
+    law_name = str(curve["force_law"].iloc[0])
     face = colour if valid(curve).all() else "white"
     ax.plot(
         curve[column],
         curve["fraction_moved"],
-        "--" if closure == "low" else "-",
+        "--" if law_name == "low" else "-",
         color=colour,
         lw=0.8,
         ms=3,
@@ -123,7 +123,7 @@ def _panel(
         shields.draw_branches(ax, theory.branches(scenes), "0.2")
     for (fraction,), points in split(rows, "fraction"):
         colour = colours[float(str(fraction))]
-        for _, series in split(points, "nu_m2_s", "closure", "regime", SHAPE):
+        for _, series in split(points, "nu_m2_s", "force_law", "regime", SHAPE):
             # piles that differ in more than d are a scatter, not a line
             if series["d_m"].is_unique:
                 ordered = series.sort_values("reynolds")

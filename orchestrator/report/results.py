@@ -86,7 +86,7 @@ def held(table: pd.DataFrame) -> pd.Series:
 
     A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the marker.
     """
-    return ~(table["quiet"] < RAMP_BELOW)
+    return ~(table["waiting_time"] < RAMP_BELOW)
 
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:
@@ -96,4 +96,4 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
 
 def valid(table: pd.DataFrame) -> pd.Series:
     """Whether the closure of each row holds at its scene's own single-grain threshold."""
-    return pd.Series(np.asarray(table["closure"] == table["regime"]), index=table.index)
+    return pd.Series(np.asarray(table["force_law"] == table["regime"]), index=table.index)

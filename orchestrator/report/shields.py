@@ -164,9 +164,9 @@ def line_entries() -> list[Artist]:
 def point_entries(rows: pd.DataFrame) -> list[Artist]:
     """Legend of the markers that some rows need: by which methods, with which forces."""
     markers = []
-    for closure in [name for name in LAWS if (rows["closure"] == name).any()]:
-        own = rows[rows["closure"] == closure]
-        name = f"{labels.methods(own)}, {labels.value('closure', closure)}"
+    for law_name in [name for name in LAWS if (rows["force_law"] == name).any()]:
+        own = rows[rows["force_law"] == law_name]
+        name = f"{labels.methods(own)}, {labels.value('closure', law_name)}"
         markers.append((name, own[SHAPE].mode()[0], "0.2"))
     if not valid(rows).all():
         markers.append(("hollow: closure does not hold", markers[-1][1], "white"))

@@ -15,7 +15,7 @@ from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, by_dem, held, split, valid
 
 CROSS = "beyond the paper"
-SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "closure")
+SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "force_law")
 """What the axes, colours and markers of these figures tell apart, or are meant to lump."""
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 

@@ -42,7 +42,7 @@ class Snapshot:
     exposed: BoolArray
     gone: BoolArray
     mode: IntArray
-    hold: int
+    load_step: int
     ustar0: float
 
     @property
@@ -77,7 +77,7 @@ class Passage:
     """
 
     pile: Pile
-    looks: pd.DataFrame
+    samples: pd.DataFrame
     exposed: FloatArray
     rest: FloatArray
     passed: BoolArray
@@ -89,14 +89,14 @@ class Passage:
         enough = np.flatnonzero(self.passed.sum(axis=1) >= needed)
         return int(enough[0]) if len(enough) else None
 
-    def at(self, look: int) -> Snapshot:
+    def at(self, sample: int) -> Snapshot:
         """The grains at a look: those not counted are known at the end of its hold only."""
-        packing, row = self.pile.packing, self.looks.iloc[look]
+        packing, row = self.pile.packing, self.samples.iloc[sample]
         now = np.where(packing.mobile[:, None], self.rest[int(row["level"]) - 1], packing.centres)
-        now[packing.windward] = self.exposed[look + 1]
+        now[packing.windward] = self.exposed[sample + 1]
         gone = np.isnan(now[:, 0])
         mode = np.zeros(len(now), np.int64)
-        mode[packing.windward] = np.where(self.passed[look], self.mode, 0)
+        mode[packing.windward] = np.where(self.passed[sample], self.mode, 0)
         return Snapshot(
             start=packing.centres,
             place=np.where(gone[:, None], packing.centres, now),
@@ -104,7 +104,7 @@ class Passage:
             exposed=packing.windward,
             gone=gone,
             mode=mode,
-            hold=int(row["level"]),
+            load_step=int(row["level"]),
             ustar0=float(row["flow"]),
         )
 
@@ -112,15 +112,15 @@ class Passage:
 def read(pile: Pile, cases: Path) -> Passage:
     """Read the dumps of a finished pile."""
     directory, d = cases / pile.case.name, pile.scene.grain.diameter
-    looks = pd.read_csv(directory / motion.LEVELS)
+    samples = pd.read_csv(directory / motion.LEVELS)
     counted = np.flatnonzero(pile.packing.windward) + 1
-    exposed = np.moveaxis(dump.read_passage(directory, counted, looks)[:2], 0, -1) / d
-    ends = looks.groupby("level")["step"].last().to_numpy(np.int64)
+    exposed = np.moveaxis(dump.read_passage(directory, counted, samples)[:2], 0, -1) / d
+    ends = samples.groupby("level")["step"].last().to_numpy(np.int64)
     bed = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS)
     rest = np.full((len(ends), len(pile.packing.centres), 2), np.nan)
     _place(rest, bed.rows, ends, d)
     passed = _passed(exposed, pile)
-    return Passage(pile, looks, exposed, rest, passed, Motion.from_csv(directory).mode)
+    return Passage(pile, samples, exposed, rest, passed, Motion.from_csv(directory).mode)
 
 
 def _place(into: FloatArray, rows: pd.DataFrame, steps: IntArray, d: float) -> None:
@@ -133,4 +133,4 @@ def _place(into: FloatArray, rows: pd.DataFrame, steps: IntArray, d: float) -> N
 def _passed(exposed: FloatArray, pile: Pile) -> BoolArray:
     along = pile.tangents[pile.packing.windward]
     travel = ((exposed[1:] - exposed[0]) * along).sum(axis=2)
-    return counting.count(travel, pile.scene.protocol.marker, falls_out=False).moved
+    return counting.count(travel, pile.scene.protocol.displacement_criterion, falls_out=False).moved

@@ -36,7 +36,7 @@ class Branch:
         Where the closure holds; where neither closure does.
     """
 
-    closure: Closure
+    law_name: Closure
     reynolds: FloatArray
     shields: FloatArray
     valid: NDArray[np.bool_]
@@ -47,7 +47,7 @@ def branches(scenes: pd.DataFrame) -> list[Branch]:
     """The lines through scenes of one slope, one entrainment angle and one z0/d."""
     found: list[Branch] = []
     for _, same in scenes.groupby("alpha_s"):
-        low, high = (_swept(closure, same) for closure in closures.CLOSURES)
+        low, high = (_swept(law_name, same) for law_name in closures.CLOSURES)
         transition = closures.regime(low, high) == "transition"
         found += [_branch("low", low, transition), _branch("high", high, transition)]
     return found
@@ -59,12 +59,12 @@ def sweep(scenes: pd.DataFrame) -> FloatArray:
     return np.geomspace(min(SWEEP_M[0], d.min()), max(SWEEP_M[1], d.max()), POINTS)
 
 
-def _swept(closure: Closure, scenes: pd.DataFrame) -> Threshold:
+def _swept(law_name: Closure, scenes: pd.DataFrame) -> Threshold:
     viscosities = np.unique(scenes["nu_m2_s"])
     d, nu = (grid.ravel() for grid in np.meshgrid(sweep(scenes), viscosities))
     one = scenes.iloc[0]
     return closures.threshold(
-        closure,
+        law_name,
         diameter=d,
         density=one["rho_sol_kg_m3"],
         fluid_density=one["rho_f_kg_m3"],
@@ -77,10 +77,10 @@ def _swept(closure: Closure, scenes: pd.DataFrame) -> Threshold:
     )
 
 
-def _branch(closure: Closure, found: Threshold, transition: NDArray[np.bool_]) -> Branch:
+def _branch(law_name: Closure, found: Threshold, transition: NDArray[np.bool_]) -> Branch:
     order = np.argsort(found.reynolds)
     reynolds, shields = found.reynolds[order], found.shields[order]
-    return Branch(closure, reynolds, shields, found.valid[order], transition[order])
+    return Branch(law_name, reynolds, shields, found.valid[order], transition[order])
 
 
 def drag_law_limit(z0_over_d: float) -> float:

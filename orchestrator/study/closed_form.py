@@ -29,7 +29,7 @@ _KNOWN: dict[Key, Threshold] = {}
 
 def law(scene: Scene) -> ForceLaw:
     """The force law of a resolved scene."""
-    return LAWS[scene.flow.closure]
+    return LAWS[scene.forces.law]
 
 
 def exposure(scene: Scene) -> Exposure:
@@ -39,7 +39,7 @@ def exposure(scene: Scene) -> Exposure:
         scene.bed.roughness,
         scene.fluid.density,
         scene.fluid.viscosity,
-        scene.flow.lift_coefficient,
+        scene.forces.lift_coefficient,
     )
 
 
@@ -59,7 +59,7 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     name : str, optional
         A force law; by default the scene's own.
     """
-    return closed_forms([scene], name or scene.flow.closure)[0]
+    return closed_forms([scene], name or scene.forces.law)[0]
 
 
 def closed_forms(scenes: Sequence[Scene], name: str) -> list[Threshold]:
@@ -79,7 +79,7 @@ def _grain(scene: Scene) -> tuple[float, ...]:
         scene.bed.roughness,
         scene.fluid.density,
         scene.fluid.viscosity,
-        scene.flow.lift_coefficient,
+        scene.forces.lift_coefficient,
         scene.grain.density,
         scene.bed.slope_deg,
         scene.bed.entrainment_angle_deg,
@@ -111,11 +111,11 @@ def regime_of(scene: Scene) -> Regime:
 
 def resolved(scenes: Sequence[Scene]) -> Iterator[Scene]:
     """The scenes with one force law each; by the paper's rule one becomes two in the transition."""
-    asking = [scene for scene in scenes if scene.flow.closure == PAPER]
+    asking = [scene for scene in scenes if scene.forces.law == PAPER]
     for name in ("low", "high"):
         closed_forms(asking, name)
     for scene in scenes:
-        named = scene.flow.closure
+        named = scene.forces.law
         yield from _under(scene, LAWS_OF[regime_of(scene)] if named == PAPER else (named,))
 
 
@@ -123,5 +123,5 @@ def _under(scene: Scene, names: Iterable[str]) -> Iterator[Scene]:
     """The scene under each of some force laws."""
     parts = {part: getattr(scene, part) for part in Scene.model_fields}
     for name in names:
-        flow = scene.flow.model_copy(update={"closure": name})
-        yield scene if name == scene.flow.closure else Scene(**{**parts, "flow": flow})
+        flow = scene.flow.model_copy(update={"force_law": name})
+        yield scene if name == scene.forces.law else Scene(**{**parts, "flow": flow})

@@ -81,7 +81,7 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "piles": lambda scene: isinstance(scene.bed, PileBed),
     "disordered piles": _is_disordered,
     "disordered piles and replicas": lambda scene: (
-        isinstance(scene.bed, PileBed) and (_is_disordered(scene) or scene.bed.is_twin)
+        isinstance(scene.bed, PileBed) and (_is_disordered(scene) or scene.bed.is_replica)
     ),
     "solved flows": _is_solved,
     "DEM": lambda scene: scene.protocol.method == "dem",

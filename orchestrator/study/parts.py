@@ -133,7 +133,7 @@ class PileBed(Bed):
     """layers of the windward face that may move; below them the grains are fixed"""
 
     @property
-    def is_twin(self) -> bool:
+    def is_replica(self) -> bool:
         """Whether it is a lattice but for shifts that matter to nothing but round-off."""
         return self.packing != "disordered" and self.seed > 0
 
@@ -184,7 +184,7 @@ class Flow(Part):
         int, Field(ge=10, le=400), Info("cells per face", scope="solved flows", about="answer")
     ] = 40
     """cells of the mesh along each face of the pile"""
-    growth: Annotated[
+    expansion_ratio: Annotated[
         float, Field(gt=1, le=2), Info("expansion ratio", scope="solved flows", about="answer")
     ] = 1.1
     """ratio of neighbouring cells up from the bed and away from the pile, with 40 cells along a
@@ -203,7 +203,7 @@ class Flow(Part):
     ] = None
     """roughness length at which the flow is found, for beds of nearly the same one to share it; by
     default the bed's"""
-    turbulence: Annotated[
+    turbulence_model: Annotated[
         Turbulence,
         Info(
             "turbulence model",
@@ -218,27 +218,32 @@ class Flow(Part):
         ),
     ] = "kEpsilon"
     """OpenFOAM's turbulence model"""
-    convection: Annotated[
+    convection_scheme: Annotated[
         Convection, Info("convection scheme", scope="solved flows", about="answer")
     ] = "linearUpwind"
     """OpenFOAM's scheme for the convection of U"""
-    correctors: Annotated[
+    non_orthogonal_correctors: Annotated[
         int,
         Field(ge=0, le=5),
         Info("non-orthogonal correctors", scope="solved flows", about="answer"),
     ] = 1
     """repeated solves of the pressure for cells that are not orthogonal, in each iteration"""
-    closure: Annotated[
+
+
+class Forces(Part):
+    """How the grains feel the flow."""
+
+    law: Annotated[
         str,
         Info(
             "force law",
-            column="closure",
+            column="force_law",
             choices={
-                "auto": "Eq. 2 or Eq. 4 where each holds, both in the transition",
+                "paper": "Eq. 2 or Eq. 4 where each holds, both in the transition",
                 **{name: law.label for name, law in LAWS.items()},
             },
         ),
-    ] = "auto"
+    ] = "paper"
     """drag and lift on an exposed grain"""
     lift_coefficient: Annotated[
         float, Field(ge=0), Info("lift coefficient", "α_s", column="alpha_s")
@@ -253,13 +258,13 @@ class Flow(Part):
         ),
     ] = "wall"
     """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
-    average: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = 1 / 40
+    averaging_length: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = 1 / 40
     """least length of bed that a grain's stress is averaged on: the crest's own value never
     converges with the mesh"""
-    forced: Annotated[
+    loaded_grains: Annotated[
         Forced,
         Info(
-            "forced grains",
+            "loaded grains",
             scope="piles",
             choices={
                 "exposed": "all exposed grains",
@@ -270,12 +275,12 @@ class Flow(Part):
     ] = "exposed"
     """grains of a pile that feel the flow's force"""
 
-    @field_validator("closure")
+    @field_validator("law")
     @classmethod
     def _is_known(cls, value: str) -> str:
-        if value not in ("auto", *LAWS):
-            known = ", ".join(("auto", *LAWS))
-            raise UnfitError("flow.closure", f"unknown force law {value!r}", f"known: {known}")
+        if value not in ("paper", *LAWS):
+            known = ", ".join(("paper", *LAWS))
+            raise UnfitError("forces.law", f"unknown force law {value!r}", f"known: {known}")
         return value
 
 
@@ -296,27 +301,27 @@ class Protocol(Part):
     ] = "dem"
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
     another), or DEM"""
-    step: Annotated[
+    load_increment: Annotated[
         float, Field(gt=0, le=0.2), Info("load increment", "Δu*/u*", scope="DEM", about="answer")
     ] = 0.02
     """relative rise of u* from one load step to the next"""
-    quiet: Annotated[
+    waiting_time: Annotated[
         float, Field(ge=1), Info("waiting time", unit="√(d/g′)", scope="DEM", about="answer")
     ] = 10.0
     """time without a passage of the displacement criterion that ends a load step"""
-    marker: Annotated[
+    displacement_criterion: Annotated[
         float,
         Field(gt=0, le=0.5),
         Info("displacement criterion", unit="d", scope="DEM and peeling", about="answer"),
     ] = 0.3
     """displacement along the bed from which a grain counts as moved"""
-    until: Annotated[Fraction, Info("last fraction", scope="DEM of piles", about="answer")] = 0.9
+    final_fraction: Annotated[Fraction, Info("last fraction", scope="DEM of piles", about="answer")] = 0.9
     """fraction of the exposed grains that should have moved by the last load step"""
     fractions: Annotated[
         tuple[Fraction, ...], Info("fractions", "n/N", column="-", scope="piles")
     ] = (0.1, 0.3, 0.5, 0.7)
     """fractions of the exposed grains at which the thresholds of a pile are reported"""
-    timestep: Annotated[
+    time_step: Annotated[
         float, Field(gt=0, le=2), Info("time step", unit="√(m/K)", scope="DEM", about="answer")
     ] = 0.2
     """time step of the grains' integration"""

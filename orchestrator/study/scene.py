@@ -42,7 +42,7 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
-        check_method(self.flow.closure, self.protocol.method)
+        check_method(self.forces.law, self.protocol.method)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
@@ -108,7 +108,7 @@ def check_method(law: str, method: str) -> None:
     """A grain feels forces in DEM and in peeling, no torque."""
     if law in LAWS and LAWS[law].turns and method != "pivot":
         raise UnfitError(
-            "flow.closure",
+            "forces.law",
             f"{law} turns the grain about its centre, which the method {method} leaves out",
             'choose the method "pivot", or a force law without torque',
         )

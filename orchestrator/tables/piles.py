@@ -70,8 +70,8 @@ def grains(answer: Answer) -> pd.DataFrame:
             "grain_id": face.ids,
             "s_m": face.arc_length,
             "ustar_over_ustar0": face.speed,
-            "moved_in_hold": motion.level,
-            "fallen_in_hold": motion.fallen,
+            "moved_in_load_step": motion.level,
+            "fallen_in_load_step": motion.fallen,
             "carried_off": motion.carried.astype(int),
             "mode": [MODES[mode] for mode in motion.mode],
             "ustar0_m_s": found.value,
@@ -86,7 +86,7 @@ def curve(answer: Answer) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "scene_id": answer.scene_id,
-            "hold": np.arange(len(motion.flow)),
+            "load_step": np.arange(len(motion.flow)),
             "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
             "ustar0_m_s": curve.ustar0,
             "count": motion.count,
@@ -113,7 +113,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "scene_id": answer.scene_id,
             **point(scene),
             "packing": pile.bed.packing,
-            "stress": scene.flow.stress,
+            "stress": scene.forces.stress,
             "fraction": fraction,
             "shields": _shields(scene, found.tau),
             **_interval(scene, found, answer.decision.error_estimate or 0.0),

@@ -4,7 +4,7 @@ import pandas as pd
 
 from orchestrator.study import fields
 
-SIMILAR = ["level", "alpha_deg", "closure", "fraction"]
+SIMILAR = ["level", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these are taken to scatter alike; rows are level, or lie along the slope."""
 
 
@@ -21,7 +21,7 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
     ids = thresholds["scene_id"]
     table = thresholds.assign(
-        level=ids.map(of_scene["packing"]) == "horizontal", twins=ids.map(_twins(of_scene))
+        level=ids.map(of_scene["packing"]) == "horizontal", replicas=ids.map(_twins(of_scene))
     )
     table = table.merge(_scatter(table), on=SIMILAR, how="left", validate="many_to_one")
     wider = table["scatter"].fillna(0.0)

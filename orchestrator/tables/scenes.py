@@ -10,7 +10,7 @@ from orchestrator.study.study import Study
 
 Row = dict[str, Any]
 
-POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "closure", "regime")
+POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from orchestrator.grains import threshold
-from orchestrator.grains.cells import CellsCase
+from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
 from orchestrator.study.closed_form import closed_form
@@ -13,7 +13,7 @@ from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
 
-def rows(plan: Plan, cells: Iterable[CellsCase], cases: Path) -> Iterator[Row]:
+def rows(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> Iterator[Row]:
     """A row for each scene that a finished case or the closed form answers, in the plan's order."""
     measured: dict[str, Row] = {}
     for one in cells:

@@ -76,13 +76,13 @@ def test_exposed_grains_lie_their_gap_above_the_bed_line(slope: float, height: f
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_a_twin_has_the_grains_of_its_lattice_but_for_a_billionth(pattern: Pattern) -> None:
-    lattice, twin, other = (_pile(20.0, 15.0, pattern, seed) for seed in (0, 1, 2))
-    for one in (twin, other):
+    lattice, replica, other = (_pile(20.0, 15.0, pattern, seed) for seed in (0, 1, 2))
+    for one in (replica, other):
         np.testing.assert_array_equal(one.windward, lattice.windward)
         np.testing.assert_array_equal(one.mobile, lattice.mobile)
         aside = np.abs(one.centres - lattice.centres)
-        assert 0 < aside[lattice.windward].min() <= aside.max() <= packing.TWIN
-    assert not np.array_equal(twin.centres, other.centres)
+        assert 0 < aside[lattice.windward].min() <= aside.max() <= packing.PERTURBATION
+    assert not np.array_equal(replica.centres, other.centres)
 
 
 @settings(max_examples=20, deadline=None)

@@ -16,9 +16,9 @@ STUDY = """
 diameter = 1e-3
 stiffness = 1e3
 [protocol]
-step = 0.05
-quiet = 6.0
-timestep = 0.3
+load_increment = 0.05
+waiting_time = 6.0
+time_step = 0.3
 [[group]]
 name = "piles"
 bed = { kind = "pile", height = 0.01, slope_deg = 20.0, mobile_layers = 1 }
@@ -56,16 +56,17 @@ def all_levels(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 THEORY = """
 [flow]
-closure = "{closure}"
 model = "hill"
+[forces]
+law = "{closure}"
 [grain]
 diameter = {diameter}
 stiffness = 1e3
 [protocol]
-step = 0.05
-quiet = 6.0
-timestep = 0.3
-until = 0.8
+load_increment = 0.05
+waiting_time = 6.0
+time_step = 0.3
+final_fraction = 0.8
 [[group]]
 name = "pile"
 bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", {bed} }}
@@ -86,11 +87,11 @@ def _theory(folder: Path, **fields: object) -> Path:
 def lift_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
     folder = tmp_path_factory.mktemp("lift-off")
-    return _theory(folder, closure="low", diameter=5e-4, bed="mobile_layers = 1")
+    return _theory(folder, law_name="low", diameter=5e-4, bed="mobile_layers = 1")
 
 
 @pytest.fixture(scope="session")
 def level_rows(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A pack of one pile of level rows, which empties in chains."""
     folder = tmp_path_factory.mktemp("level-rows")
-    return _theory(folder, closure="high", diameter=5e-4, bed='packing = "horizontal"')
+    return _theory(folder, law_name="high", diameter=5e-4, bed='packing = "horizontal"')

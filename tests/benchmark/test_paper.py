@@ -34,7 +34,7 @@ def paper() -> Study:
 def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None:
     assert (FOLDER / "study.toml").read_text() == paper.text
     beds = {scene.id: scene.bed for scene in paper.scenes}
-    piles = {name for name, bed in beds.items() if isinstance(bed, PileBed) and not bed.is_twin}
+    piles = {name for name, bed in beds.items() if isinstance(bed, PileBed) and not bed.is_replica}
     grains = {name for name, bed in beds.items() if bed.kind == "grain"}
     level = expected["scene"].str[0]
     name = expected["scene"].str[2:]

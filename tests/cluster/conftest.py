@@ -15,8 +15,8 @@ from tests.cluster.slurm import Slurm
 STUDY = """
 time_limit = 100
 [protocol]
-step = 0.006
-quiet = 3.0
+load_increment = 0.006
+waiting_time = 3.0
 [grain]
 diameter = 1e-3
 stiffness = 1e3

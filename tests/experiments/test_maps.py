@@ -21,13 +21,14 @@ SMALL = """
 title = "Small"
 question = "?"
 judge = "pile"
-x = { label = "dt", fields = { "protocol.timestep" = 1.0 }, values = [0.2, 1.5] }
+x = { label = "dt", fields = { "protocol.time_step" = 1.0 }, values = [0.2, 1.5] }
 y = { label = "h, d", fields = { "bed.height" = 1e-3 }, values = [10.0] }
 reference = { "protocol.method" = "peeling" }
 bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30" }
 grain = { diameter = 1e-3, stiffness = 1e3 }
-protocol = { step = 0.05, quiet = 6.0, until = 0.75 }
-flow = { model = "hill", closure = "high" }
+protocol = { load_increment = 0.05, waiting_time = 6.0, final_fraction = 0.75 }
+flow = { model = "hill" }
+forces = { law = "high" }
 """
 
 
@@ -75,8 +76,8 @@ def _tables_of_a_pile() -> dict[str, dict[str, object]]:
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"protocol": {"timestep": 0.5}}, "protocol.timestep"),
-        ({"grain": {"damping": 0.3}, "protocol": {"timestep": 0.3}}, "protocol.timestep"),
+        ({"protocol": {"time_step": 0.5}}, "protocol.time_step"),
+        ({"grain": {"damping": 0.3}, "protocol": {"time_step": 0.3}}, "protocol.time_step"),
         ({"grain": {"damping": 0.01}}, "grain.damping"),
         ({"bed": {"slope_deg": 31.0}}, "bed.slope_deg"),
         ({"bed": {"entrainment_angle_deg": 55.0}}, "bed.entrainment_angle_deg"),
@@ -96,10 +97,10 @@ def test_a_study_beyond_a_limit_is_refused_with_the_map(
 @pytest.mark.parametrize(
     ("part", "field", "value"),
     [
-        ("protocol", "quiet", 2.0),
+        ("protocol", "waiting_time", 2.0),
         ("protocol", "step", 0.1),
-        ("flow", "forced", "all but crest"),
-        ("flow", "convection", "upwind"),
+        ("flow", "loaded_grains", "all but crest"),
+        ("flow", "convection_scheme", "upwind"),
     ],
 )
 def test_a_study_whose_answer_is_merely_worse_is_warned(

@@ -15,10 +15,10 @@ ROOT = Path(__file__).parents[2]
 HEAD = """
 time_limit = 300
 [protocol]
-step = 0.05
-quiet = 3.0
-timestep = 0.3
-until = 0.8
+load_increment = 0.05
+waiting_time = 3.0
+time_step = 0.3
+final_fraction = 0.8
 fractions = [0.3, 0.5]
 [grain]
 stiffness = 1e3

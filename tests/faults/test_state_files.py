@@ -59,10 +59,10 @@ OF_A_STUDY = (
 OF_CELLS = (
     "case.json",
     "done.json",
-    "levels.csv",
+    "samples.csv",
     "passage.dump",
     "bed.dump",
-    "holds.csv",
+    "load_steps.csv",
     "motion.csv",
 )
 OF_A_PILE = (

@@ -98,7 +98,7 @@ def test_what_is_not_known_is_answered_as_asked(pile: MakePile) -> None:
 @pytest.mark.parametrize(
     ("field", "value", "word"),
     [
-        ("protocol.quiet", 1.0, "ramp"),
+        ("protocol.waiting_time", 1.0, "ramp"),
         ("protocol.method", "peeling", "peeling"),
         ("flow.model", "hill", "hill"),
     ],
@@ -113,7 +113,7 @@ def test_a_way_to_the_answer_that_is_asked_for_is_kept(
 
 
 def test_grains_that_lift_off_before_they_roll_are_left_to_dem(pile: MakePile) -> None:
-    lifted = changed(pile(slope_deg=20.0), {"flow.closure": "low"})
+    lifted = changed(pile(slope_deg=20.0), {"forces.law": "low"})
     assert closed_form(lifted, "low").lift > lifted.weight
     decision = decide(lifted, 0.2)
     assert decision.scene.protocol.method == "dem"

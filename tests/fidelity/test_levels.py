@@ -13,7 +13,7 @@ def test_a_scene_that_is_on_a_level_as_it_is_asked_is_recognised(
 ) -> None:
     for one in LEVELS[part]:
         assert levels.holding(one.answer(pile()))[part] == one.name
-    other = changed(pile(), {"flow.growth": 1.15, "protocol.step": 0.05})
+    other = changed(pile(), {"flow.expansion_ratio": 1.15, "protocol.load_increment": 0.05})
     assert levels.holding(other)[part] == AS_ASKED
 
 
@@ -23,7 +23,7 @@ def test_a_level_changes_how_a_scene_is_answered_not_what_it_asks(pile: MakePile
         answered = one.answer(scene)
         assert answered.fluid == scene.fluid
         assert answered.bed.slope_deg == scene.bed.slope_deg
-        assert answered.flow.stress == scene.flow.stress
+        assert answered.forces.stress == scene.forces.stress
         assert answered.protocol.fractions == scene.protocol.fractions
 
 

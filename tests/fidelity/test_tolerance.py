@@ -22,11 +22,12 @@ slope_deg = 20.0
 roughness = "d/30"
 packing = "{packing}"
 [protocol]
-step = 0.03
-quiet = 6.0
-until = 0.75
+load_increment = 0.03
+waiting_time = 6.0
+final_fraction = 0.75
 [flow]
-closure = "high"
+[forces]
+law = "high"
 [[group]]
 name = "small"
 [[group]]

@@ -250,8 +250,8 @@ def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
         ("viscosity_m2_s", 0.0),
         ("first_cell_m", 1e-2),
         ("cells_per_face", 2),
-        ("correctors", -1),
-        ("growth", 1.0),
+        ("non_orthogonal_correctors", -1),
+        ("expansion_ratio", 1.0),
     ],
 )
 def test_an_unusable_field_is_named(field: str, value: Any) -> None:
@@ -265,7 +265,7 @@ def test_other_models_of_turbulence_keep_a_flat_beds_friction_velocity(
     solve: Solve, model: Turbulence
 ) -> None:
     """Less well than k-epsilon, whose constants are those of the approaching flow."""
-    flat = replace(PILE, slope_deg=0.0, turbulence=model)
+    flat = replace(PILE, slope_deg=0.0, turbulence_model=model)
     stress = WallStress.from_csv(solve(flat) / WALL_STRESS)
     middle = np.abs(stress.x_m) < 0.1
     np.testing.assert_allclose(stress.ustar_over_ustar0_wall[middle], 1.0, atol=0.06)
@@ -273,13 +273,13 @@ def test_other_models_of_turbulence_keep_a_flat_beds_friction_velocity(
 
 
 def test_upwind_convection_gives_a_windward_stress_that_is_too_high(solve: Solve) -> None:
-    upwind = replace(PILE, convection="upwind")
+    upwind = replace(PILE, convection_scheme="upwind")
     means = [windward_mean(solve(flow), flow) for flow in (PILE, upwind)]
     assert 1.05 < means[1] / means[0] < 1.15
 
 
 def test_more_correctors_give_the_same_stress(solve: Solve) -> None:
-    more = replace(PILE, correctors=2)
+    more = replace(PILE, non_orthogonal_correctors=2)
     assert windward_mean(solve(more), more) == pytest.approx(
         windward_mean(solve(PILE), PILE), rel=1e-3
     )
@@ -292,7 +292,7 @@ def test_a_sound_run_says_so(solve: Solve) -> None:
 
 
 def test_upwind_convection_reattaches_too_early(solve: Solve) -> None:
-    upwind = replace(PILE, convection="upwind", cells_per_face=40)
+    upwind = replace(PILE, convection_scheme="upwind", cells_per_face=40)
     assert "reattachment_over_h,3." in (solve(upwind) / DIAGNOSTICS).read_text()
     assert (solve(upwind) / DIAGNOSTICS).read_text().splitlines()[-1].endswith(",no")
 
@@ -311,7 +311,7 @@ def test_a_wall_function_out_of_its_range_is_seen_upstream(
 def test_who_a_case_is() -> None:
     assert replace(PILE, slope_deg=15, speed_m_s=10).id == PILE.id
     assert replace(PILE, roughness_m=3.4e-5).id != PILE.id
-    assert replace(PILE, turbulence="kOmegaSST").id != PILE.id
+    assert replace(PILE, turbulence_model="kOmegaSST").id != PILE.id
     assert PILE.name.startswith("flow-")
     assert set(PILE.versions()) == {"gmsh", "openfoam"}
 

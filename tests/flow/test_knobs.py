@@ -46,7 +46,7 @@ def test_a_theory_is_not_refused_for_a_mesh_that_it_has_not(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("forced", "without"), [("exposed", []), ("all but crest", [-1]), ("all but toe", [0, 1, 2, 3])]
+    ("loaded_grains", "without"), [("exposed", []), ("all but crest", [-1]), ("all but toe", [0, 1, 2, 3])]
 )
 def test_which_grains_carry_the_flows_force(
     tmp_path: Path, forced: str, without: list[int]
@@ -61,7 +61,7 @@ def test_which_grains_carry_the_flows_force(
 
 
 def test_a_longer_average_takes_from_the_crest(tmp_path: Path) -> None:
-    short, long = piles('model = "hill"\n[axes]\n"flow.average" = [0.025, 0.5]\n')
+    short, long = piles('model = "hill"\n[axes]\n"forces.averaging_length" = [0.025, 0.5]\n')
     crest = [pile.face(tmp_path).speed[-1] for pile in (short, long)]
     assert crest[1] < 0.8 * crest[0]
 
@@ -77,7 +77,7 @@ def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
 
 def test_the_solvers_knobs_reach_its_case() -> None:
     (pile,) = piles('turbulence = "kOmegaSST"\nconvection = "upwind"\ncorrectors = 0\n')
-    assert (pile.flow.turbulence, pile.flow.convection, pile.flow.correctors) == (
+    assert (pile.flow.turbulence_model, pile.flow.convection_scheme, pile.flow.non_orthogonal_correctors) == (
         "kOmegaSST",
         "upwind",
         0,

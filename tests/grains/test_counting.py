@@ -22,13 +22,14 @@ diameter = 5e-4
 density = 2500.0
 stiffness = 1e3
 [flow]
-closure = "low"
 model = "hill"
+[forces]
+law = "low"
 [protocol]
-step = 0.05
-quiet = 6.0
-timestep = 0.3
-until = 0.5
+load_increment = 0.05
+waiting_time = 6.0
+time_step = 0.3
+final_fraction = 0.5
 fractions = [0.1, 0.3]
 [[group]]
 name = "lift"

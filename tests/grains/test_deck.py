@@ -22,14 +22,14 @@ OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))
 
 
 @given(
-    closure=st.sampled_from(closures.CLOSURES),
+    law_name=st.sampled_from(closures.CLOSURES),
     ratio=st.floats(-2, 2).filter(lambda r: abs(r) > 1e-3),
     ustar0=st.floats(0.05, 2),
 )
 def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
-    closure: Closure, ratio: float, ustar0: float
+    law_name: Closure, ratio: float, ustar0: float
 ) -> None:
-    drag, lift = closures.drag(closure, **WHERE), closures.lift(closure, **WHERE)
+    drag, lift = closures.drag(law_name, **WHERE), closures.lift(law_name, **WHERE)
     loading = Loading(drag, lift, np.array([ratio, 0.0]), ALONG, OUTWARD)
     local = abs(ratio) * ustar0
     exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
@@ -37,14 +37,14 @@ def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
 
 
 @given(
-    closure=st.sampled_from(closures.CLOSURES),
+    law_name=st.sampled_from(closures.CLOSURES),
     goal=st.floats(0.01, 10),
     arms=st.tuples(st.floats(0.1, 1), st.floats(0, 1)),
 )
 def test_the_table_of_forces_finds_the_flow_of_the_force_law(
-    closure: Closure, goal: float, arms: tuple[float, float]
+    law_name: Closure, goal: float, arms: tuple[float, float]
 ) -> None:
-    drag, lift = closures.drag(closure, **WHERE), closures.lift(closure, **WHERE)
+    drag, lift = closures.drag(law_name, **WHERE), closures.lift(law_name, **WHERE)
     weight = 1e-5
     ustar = ForceTable(drag, lift, weight, 0.5).reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))
@@ -64,10 +64,10 @@ def _table(count: int = 3) -> deck.GrainTable:
 
 def test_files_hold_every_digit(tmp_path: Path) -> None:
     grains = _table()
-    holds = np.array([1 / 3, 0.5])
+    load_steps = np.array([1 / 3, 0.5])
     force = np.random.default_rng(2).normal(size=(2, 3, 2))
     parameters = {"diameter": np.float64(1e-3), "enough": 7}
-    deck.write(tmp_path, grains, parameters, holds, force, margin=0.1)
+    deck.write(tmp_path, grains, parameters, load_steps, force, margin=0.1)
     lines = (tmp_path / "grains.data").read_text().splitlines()
     rows = [line.split() for line in lines[lines.index("Atoms") + 2 :]]
     np.testing.assert_array_equal([[float(v) for v in row[4:]] for row in rows], grains.position)
@@ -80,8 +80,8 @@ def test_files_hold_every_digit(tmp_path: Path) -> None:
         ["variable", "diameter", "equal", "0.001"],
         ["variable", "enough", "equal", "7"],
     ]
-    flows = (tmp_path / "holds.txt").read_text().splitlines()
-    assert [float(line) for line in flows] == holds.tolist()
+    flows = (tmp_path / "load_steps.txt").read_text().splitlines()
+    assert [float(line) for line in flows] == load_steps.tolist()
 
 
 def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
     shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
-    assert (copy / "levels.csv").read_text().splitlines()[-1].split(",")[3] == "0"
+    assert (copy / "samples.csv").read_text().splitlines()[-1].split(",")[3] == "0"
 
 
 def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:

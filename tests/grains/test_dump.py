@@ -32,8 +32,8 @@ def grains() -> deck.GrainTable:
 
 def _finer_steps(copy: Path, flows: deck.FloatArray) -> None:
     """Flows that take one grain after the other, with forces from the template's last set."""
-    last = float((copy / "holds.txt").read_text().split()[-1])
-    (copy / "holds.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    last = float((copy / "load_steps.txt").read_text().split()[-1])
+    (copy / "load_steps.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
     for path in (copy / "force.x.txt", copy / "force.z.txt"):
         lines = path.read_text().splitlines()
         rows = [line.split() for line in lines[-int(lines[0]) :]]
@@ -60,9 +60,9 @@ def test_grains_at_their_places_need_no_line(tmp_path: Path, grains: deck.GrainT
     short, whole = (_run(tmp_path, stir) for stir in (0.02, 0.0))
     sizes = [(folder / dump.PASSAGE).stat().st_size for folder in (short, whole)]
     assert sizes[0] < sizes[1] / 2
-    looks = pd.read_csv(short / motion.LEVELS)
-    pd.testing.assert_frame_equal(looks, pd.read_csv(whole / motion.LEVELS))
-    few, all_of_them = (dump.read_track(folder, grains, looks) for folder in (short, whole))
+    samples = pd.read_csv(short / motion.LEVELS)
+    pd.testing.assert_frame_equal(samples, pd.read_csv(whole / motion.LEVELS))
+    few, all_of_them = (dump.read_track(folder, grains, samples) for folder in (short, whole))
     gone = np.isnan(few.travel)
     np.testing.assert_array_equal(gone, np.isnan(all_of_them.travel))
     assert gone[-1].any()

@@ -51,7 +51,7 @@ def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
 
 
 @pytest.mark.parametrize("push", [1.5, 2.0, 3.0])
-@pytest.mark.parametrize("marker", [0.3, 0.5])
+@pytest.mark.parametrize("displacement_criterion", [0.3, 0.5])
 def test_a_pushed_grain_passes_the_marker_in_time(
     run_check: Deck, push: float, marker: float
 ) -> None:

@@ -28,8 +28,8 @@ packing = "{packing}"
 [flow]
 cells_per_face = 20
 [protocol]
-step = {step}
-until = 0.75
+load_increment = {step}
+final_fraction = 0.75
 """
 
 
@@ -71,9 +71,9 @@ def test_it_empties_from_the_crest_down(slow: Pile, cases: Path) -> None:
     moved = motion.level > 0
     # from the crest to the toe no grain moves in an earlier hold than the one above it
     downward = np.argsort(-face.arc_length[moved])
-    holds = motion.level[moved][downward]
-    assert holds[0] == holds.min()
-    assert np.mean(np.diff(holds) >= 0) > 0.9
+    load_steps = motion.level[moved][downward]
+    assert load_steps[0] == load_steps.min()
+    assert np.mean(np.diff(load_steps) >= 0) > 0.9
 
 
 def test_tables_reconcile(slow: Pile, cases: Path) -> None:
@@ -92,7 +92,7 @@ def test_tables_reconcile(slow: Pile, cases: Path) -> None:
     ustar = np.sqrt(found["shields"] * 2499 * 9.81 * 1e-3)
     np.testing.assert_allclose(found["reynolds"], ustar * 1e-3 / 1e-5, rtol=1e-12)
     grains = made["pile_grain"]
-    assert (grains["moved_in_hold"] > 0).sum() == curve["moved"].iloc[-1]
+    assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]
 
 
 def test_every_column_has_a_meaning_and_survives_its_files(

@@ -39,7 +39,7 @@ def _settled(folder: Path, *, timestep: float, damping: float) -> Path:
     shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
     text = (copy / "parameters.liggghts").read_text()
     for name, value in (
-        ("timestep", timestep),
+        ("time_step", timestep),
         ("damping", damping),
         ("stiffness", STIFFNESS),
     ):
@@ -64,11 +64,11 @@ def test_a_bed_comes_to_rest(tmp_path: Path, grains: GrainTable) -> None:
 def test_a_step_far_too_large_throws_the_grains_out(tmp_path: Path, grains: GrainTable) -> None:
     found = _settled(tmp_path, timestep=1.2, damping=0.1)
     for all_rest in (True, False):
-        with pytest.raises(Exploded, match=r"settling.csv: the bed burst .* protocol.timestep"):
+        with pytest.raises(Exploded, match=r"settling.csv: the bed burst .* protocol.time_step"):
             _check(found, grains, all_rest=all_rest)
 
 
-@pytest.mark.parametrize(("timestep", "damping"), [(0.6, 0.1), (0.5, 0.2), (0.4, 0.3)])
+@pytest.mark.parametrize(("time_step", "damping"), [(0.6, 0.1), (0.5, 0.2), (0.4, 0.3)])
 def test_a_step_too_large_keeps_the_grains_moving(
     tmp_path: Path, grains: GrainTable, timestep: float, damping: float
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.grains import threshold
-from orchestrator.grains.cells import CellsCase, batches
+from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
@@ -19,18 +19,18 @@ from orchestrator.study.closed_form import regime_of
 BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
 
 
-def _cells(text: str) -> CellsCase:
+def _cells(text: str) -> SingleGrainCase:
     (one,) = batches(study.parse(text, name="cells", where="test").scenes)
     return one
 
 
-def _run(one: CellsCase, cases: Path, limit_s: float = 120.0) -> Motion:
+def _run(one: SingleGrainCase, cases: Path, limit_s: float = 120.0) -> Motion:
     engine.execute(one, cases, limit_s)
     return Motion.from_csv(cases / one.name)
 
 
 FIGURE = f"""
-protocol = {{ step = 0.002 }}
+protocol = {{ load_increment = 0.002 }}
 [axes]
 "bed.entrainment_angle_deg" = {list(BETAS)}
 "bed.slope_deg" = {list(SLOPES)}
@@ -41,7 +41,7 @@ fluid = {{ viscosity = 1e-3 }}
 grain = {{ diameter = 1e-3 }}
 """
 FEW = """
-protocol = { step = 0.005 }
+protocol = { load_increment = 0.005 }
 [axes]
 "grain.diameter" = [7e-4, 1e-3]
 """
@@ -61,8 +61,8 @@ def test_threshold_of_the_pivot_law_in_both_regimes_from_one_run(tmp_path: Path)
 def test_a_bed_has_no_scale(tmp_path: Path) -> None:
     # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the hold
     text = """
-    flow = { closure = "high" }
-    protocol = { step = 0.002 }
+    forces = { law = "high" }
+    protocol = { load_increment = 0.002 }
     [[group]]
     grain = { diameter = 1e-3 }
     [[group]]
@@ -89,8 +89,8 @@ def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> Non
     assert "the results are those of results.sha256" in ended.stdout
     with (copy / "grains.data").open("a") as stream:
         stream.write("\n# the same grains\n")
-    holds = (copy / "holds.txt").read_text()
-    (copy / "holds.txt").write_text(holds.replace("0.9\n", "0.901\n", 1))
+    load_steps = (copy / "load_steps.txt").read_text()
+    (copy / "load_steps.txt").write_text(load_steps.replace("0.9\n", "0.901\n", 1))
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode != 0
 
@@ -140,7 +140,7 @@ def test_a_solver_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert "within 1 s" in _failure(tmp_path, limit_s=1)
 
 
-@pytest.mark.parametrize("name", ["passage.dump", "levels.csv", "settling.csv"])
+@pytest.mark.parametrize("name", ["passage.dump", "samples.csv", "settling.csv"])
 def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
     one = _cells(FEW)
     _run(one, tmp_path)
@@ -157,8 +157,8 @@ def test_a_grain_that_falls_back_and_leaves_has_not_moved(tmp_path: Path) -> Non
     text = """
     grain = { diameter = 3e-4 }
     bed = { slope_deg = 30.0 }
-    flow = { closure = "low" }
-    protocol = { step = 0.02 }
+    forces = { law = "low" }
+    protocol = { load_increment = 0.02 }
     """
     one = _cells(text)
     motion = _run(one, tmp_path)
@@ -173,17 +173,17 @@ def test_how_grains_move(tmp_path: Path) -> None:
     # leaves its bed
     text = """
     grain = { diameter = 1e-3 }
-    protocol = { step = 0.2 }
+    protocol = { load_increment = 0.2 }
     [[group]]
-    flow = { closure = "high", lift_coefficient = 0.0 }
+    forces = { law = "high", lift_coefficient = 0.0 }
     [[group]]
-    flow = { closure = "high", lift_coefficient = 200.0 }
+    forces = { law = "high", lift_coefficient = 200.0 }
     bed = { entrainment_angle_deg = 20.0 }
     """
     one = _cells(text)
     motion = _run(one, tmp_path)
     found = {
-        scene.flow.lift_coefficient: MODES[mode]
+        scene.forces.lift_coefficient: MODES[mode]
         for scene, mode in zip(one.scenes, motion.mode, strict=True)
     }
     assert found == {0.0: "rolled", 200.0: "lifted"}

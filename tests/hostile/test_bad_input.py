@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from orchestrator import cli
-from orchestrator.grains.cells import CellsCase
+from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.runs import case
 from orchestrator.study.parts import Flow, Fluid, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.scene import Scene
@@ -274,8 +274,8 @@ def test_directories_with_any_state(
 @QUICK
 @given(state=_state())
 def test_a_case_with_any_marker_is_not_done(shell: Shell, state: object) -> None:
-    one = CellsCase(
-        (Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), flow=Flow(closure="low")),)
+    one = SingleGrainCase(
+        (Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), flow=Flow(law_name="low")),)
     )
     directory = shell.folder / one.name
     directory.mkdir(exist_ok=True)

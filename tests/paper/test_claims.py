@@ -57,7 +57,7 @@ def test_verdicts_that_differ_are_partly() -> None:
 def test_pairs_agree_in_all_else() -> None:
     table = pd.DataFrame(
         {
-            "closure": "high",
+            "force_law": "high",
             "alpha_deg": [20.0, 15.0, 25.0, 15.0],
             "d_m": [1e-3, 1e-3, 1e-3, 5e-4],
             "seed": [None] * 4,
@@ -74,12 +74,12 @@ def test_pairs_agree_in_all_else() -> None:
 @pytest.mark.parametrize(
     "column",
     [
-        *("flow_model", "turbulence", "convection", "forced", "average", "growth", "method"),
-        *("first_cell_m", "timestep", "until", "answered_method", "answered_growth", "flow_level"),
+        *("flow_model", "turbulence_model", "convection_scheme", "loaded_grains", "averaging_length", "expansion_ratio", "method"),
+        *("first_cell_m", "time_step", "final_fraction", "answered_method", "answered_growth", "flow_level"),
     ],
 )
 def test_rows_that_differ_in_anything_else_are_no_pair(column: str) -> None:
-    table = pd.DataFrame({"closure": "high", "alpha_deg": [15.0, 20.0], "value": [1.0, 2.0]})
+    table = pd.DataFrame({"force_law": "high", "alpha_deg": [15.0, 20.0], "value": [1.0, 2.0]})
     assert len(base.pairs(table.assign(**{column: "same"}), "alpha_deg", "value")) == 1
     assert base.pairs(table.assign(**{column: ["one", "other"]}), "alpha_deg", "value").empty
 
@@ -112,7 +112,7 @@ def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Clai
     later = changed(
         results.tables,
         "pile_grain",
-        lambda t: t.assign(moved_in_hold=t["moved_in_hold"].max() + 1 - t["moved_in_hold"]),
+        lambda t: t.assign(moved_in_hold=t["moved_in_load_step"].max() + 1 - t["moved_in_load_step"]),
     )
     assert later["motion.order"].verdict == "not"
     low = changed(results.tables, "pile_threshold", lambda t: t.assign(shields=1e-9))
@@ -202,7 +202,7 @@ def test_transition_is_not_judged(results: Results, judged: dict[str, Claim]) ->
 
 def test_a_faster_rise_counts_as_a_ramp(results: Results) -> None:
     asked = results.tables["scenes"]
-    fast = asked.assign(quiet=np.where(asked["alpha_deg"] > 0, 1.0, asked["quiet"]))
+    fast = asked.assign(waiting_time=np.where(asked["alpha_deg"] > 0, 1.0, asked["waiting_time"]))
     ramps = asked.loc[asked["alpha_deg"] > 0, "scene_id"]
     grains = results.tables["single_grain"]
     factor = np.where(grains["scene_id"].isin(ramps), 1.3, 1.0)

@@ -37,21 +37,21 @@ def test_study_with_a_pile_has_one_animation(results: Results, tmp_path: Path) -
 
 def test_quiet_looks_are_left_out(passage: Passage) -> None:
     window = marks.windows(passage.pile)[-1]
-    looks = animation.choose(passage, window)
-    assert looks[0] == 0
-    assert (np.diff(looks) > 0).all()
-    assert len(looks) < len(passage.looks) / 2
-    assert passage.at(int(looks[-1])).moved > 0.5 * passage.pile.packing.count
+    samples = animation.choose(passage, window)
+    assert samples[0] == 0
+    assert (np.diff(samples) > 0).all()
+    assert len(samples) < len(passage.samples) / 2
+    assert passage.at(int(samples[-1])).moved > 0.5 * passage.pile.packing.count
     still = np.broadcast_to(passage.exposed[:1], passage.exposed.shape)
-    quiet = replace(passage, exposed=still, passed=np.zeros_like(passage.passed))
-    assert len(animation.choose(quiet, window)) == 0
+    waiting_time = replace(passage, exposed=still, passed=np.zeros_like(passage.passed))
+    assert len(animation.choose(waiting_time, window)) == 0
 
 
 def test_frame_shows_how_grains_moved(passage: Passage) -> None:
     scene = animation.Scene(passage, marks.windows(passage.pile)[-1])
-    look = passage.first(0.3)
-    assert look is not None
-    before, after = (_coloured(scene.frame(when)) for when in (0, look))
+    sample = passage.first(0.3)
+    assert sample is not None
+    before, after = (_coloured(scene.frame(when)) for when in (0, sample))
     assert after > before + 300
     assert (scene.frame(0) == scene.frame(0)).all()
 

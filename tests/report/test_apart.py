@@ -22,7 +22,7 @@ def table() -> pd.DataFrame:
         {
             "alpha_deg": [15.0, 15.0, 15.0, 25.0],
             "d_m": 1e-3,
-            "closure": "high",
+            "force_law": "high",
             "mobile_layers": [1, 2, 1, 1],
             "stiffness": [1e3, 1e3, 1e4, 1e3],
             "step": [0.02, 0.03, 0.02, 0.02],
@@ -56,8 +56,8 @@ def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
 
 
 def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
-    laws = table.assign(closure=["high", "bridged", "zeng", "low"])
-    _, rows, _ = apart.parted(laws, *SHOWN, "closure", "mobile_layers", "stiffness")
+    laws = table.assign(law_name=["high", "bridged", "zeng", "low"])
+    _, rows, _ = apart.parted(laws, *SHOWN, "force_law", "mobile_layers", "stiffness")
     assert rows[SHAPE].tolist() == ["s", "^", "D", "o"]
 
 
@@ -100,7 +100,7 @@ def test_page_lists_every_parameter(results: Results) -> None:
     unused = {"bed.disorder", "bed.seed", "protocol.fractions"}
     assert set(listed) >= {one.name for one in fields.FIELDS} - unused
     asked = dict(zip(listed, sheet.rows, strict=True))
-    assert asked["flow.turbulence"][3:] == ("kEpsilon", "kEpsilon")
+    assert asked["flow.turbulence_model"][3:] == ("kEpsilon", "kEpsilon")
     assert asked["flow.first_cell_height"][3] == "default"
     assert float(asked["flow.first_cell_height"][4]) > 0
 
@@ -108,7 +108,7 @@ def test_page_lists_every_parameter(results: Results) -> None:
 def test_captions_say_what_the_scene_has(results: Results) -> None:
     (pile,) = results.plan.piles.values()
     flow = pile.scene.flow.model_copy(
-        update={"turbulence": "RNGkEpsilon", "average": 1 / 20, "speed": 7.0}
+        update={"turbulence_model": "RNGkEpsilon", "averaging_length": 1 / 20, "speed": 7.0}
     )
     other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
     assert "(k-ε, rough wall)" in captions.flow([pile])
@@ -134,11 +134,11 @@ def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
         ("alpha_deg", 15.0, "α = 15°"),
         ("z0_over_d", 0.033333333, "z₀ = d/30"),
         ("d_m", 7e-4, "d = 0.7 mm"),
-        ("turbulence", "RNGkEpsilon", "RNG k-ε"),
-        ("convection", "upwind", "convection scheme upwind"),
+        ("turbulence_model", "RNGkEpsilon", "RNG k-ε"),
+        ("convection_scheme", "upwind", "convection scheme upwind"),
         ("mobile_layers", 3, "mobile layers = 3"),
-        ("quiet", 6.0, "waiting time = 6 √(d/g′)"),
-        ("average", 0.05, "averaging length = h/20"),
+        ("waiting_time", 6.0, "waiting time = 6 √(d/g′)"),
+        ("averaging_length", 0.05, "averaging length = h/20"),
         ("fraction", 0.3, "n/N = 30 %"),
     ],
 )

@@ -226,7 +226,7 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
 
 
 def test_ramps_are_no_points_of_the_diagrams(results: Results) -> None:
-    ramps = {**results.tables, "scenes": results.tables["scenes"].assign(quiet=1.0)}
+    ramps = {**results.tables, "scenes": results.tables["scenes"].assign(waiting_time=1.0)}
     assert list(single.draw(replace(results, tables=ramps))) == []
 
 

@@ -93,9 +93,9 @@ def passage(results: Results) -> Passage:
 
 def test_grains_have_passed_as_the_tables_say(results: Results, passage: Passage) -> None:
     curve = results.tables["pile_curve"]
-    ends = np.flatnonzero(np.diff(passage.looks["level"], append=0))
+    ends = np.flatnonzero(np.diff(passage.samples["level"], append=0))
     assert passage.passed.sum(axis=1)[ends].tolist() == curve["moved"].tolist()[-len(ends) :]
-    lost = passage.at(len(passage.looks) - 1)
+    lost = passage.at(len(passage.samples) - 1)
     table = results.tables["pile_grain"]
     modes = [motion.MODES[mode] for mode in lost.mode[passage.pile.packing.windward]]
     assert modes == table["mode"].tolist()
@@ -106,15 +106,15 @@ def test_snapshot_is_the_first_look_with_enough_grains_moved(
     results: Results, passage: Passage
 ) -> None:
     for fraction in (0.3, 0.7):
-        look = passage.first(fraction)
-        assert look is not None
-        found, before = passage.at(look), passage.at(look - 1)
+        sample = passage.first(fraction)
+        assert sample is not None
+        found, before = passage.at(sample), passage.at(sample - 1)
         needed = int(np.ceil(fraction * passage.pile.packing.count))
         assert before.moved < needed <= found.moved
         along = ((found.place - found.start) * passage.pile.tangents).sum(axis=1)
         assert (found.mode[found.exposed & (found.gone | (along >= 0.31))] > 0).all()
         curve = results.tables["pile_curve"]
-        assert found.hold == curve[curve["moved"] >= needed]["hold"].iloc[0]
+        assert found.load_step == curve[curve["moved"] >= needed]["load_step"].iloc[0]
         assert not found.gone[~found.mobile].any()
         assert (found.displacement[~found.mobile] == 0).all()
 
@@ -134,9 +134,9 @@ def test_picture_shows_grains_that_are_gone_where_they_lay(
     passage: Passage, figure: Figure
 ) -> None:
     assert figure.canvas is not None
-    look = passage.first(0.3)
-    assert look is not None
-    found = passage.at(look)
+    sample = passage.first(0.3)
+    assert sample is not None
+    found = passage.at(sample)
     for ax in figure.canvas.axes[:3]:
         (gone,) = [c for c in ax.collections if c.get_gid() == "gone"]
         offsets = np.asarray(gone.get_offsets())

@@ -20,7 +20,8 @@ kind = "pile"
 slope_deg = 15.0
 packing = "disordered"
 [flow]
-closure = "high"
+[forces]
+law = "high"
 """
 CHANGEABLE = [one for one in fields.FIELDS if one.name not in ("bed.kind", "protocol.fractions")]
 
@@ -84,7 +85,7 @@ def test_a_level_changes_fields_of_the_answer_alone(one: Level, scene: Scene) ->
 def test_what_has_no_effect_is_empty(scene: Scene) -> None:
     flat = changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
     row = fields.asked(flat)
-    empty = ("turbulence", "cells_per_face", "solve_u_e_m_s", "stiffness", "quiet", "marker")
+    empty = ("turbulence_model", "cells_per_face", "solve_u_e_m_s", "stiffness", "waiting_time", "displacement_criterion")
     assert [row[column] for column in empty] == [None] * len(empty)
     assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
 

@@ -76,19 +76,19 @@ def test_an_unknown_law_is_named_with_the_known_ones() -> None:
 
 def _with_law(law: str, parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     empty: dict[str, dict[str, Any]] = {"fluid": {}, "bed": {}, "protocol": {}}
-    return {**empty, "flow": {"closure": law}, **parts}
+    return {**empty, "flow": {"force_law": law}, **parts}
 
 
 def test_the_transition_is_run_with_both_closures() -> None:
     found = _parse("[grain]\ndiameter = 2e-4\n")
-    assert [s.flow.closure for s in found.scenes] == ["low", "high"]
+    assert [s.forces.law for s in found.scenes] == ["low", "high"]
     assert {regime_of(s) for s in found.scenes} == {"transition"}
 
 
 @pytest.mark.parametrize(("d", "nu", "regime"), [(5e-5, 1e-5, "low"), (1e-3, 1e-5, "high")])
 def test_auto_takes_the_valid_closure(d: float, nu: float, regime: str) -> None:
     (scene,) = _parse(f"[grain]\ndiameter = {d}\n[fluid]\nviscosity = {nu}\n").scenes
-    assert (scene.flow.closure, regime_of(scene)) == (regime, regime)
+    assert (scene.forces.law, regime_of(scene)) == (regime, regime)
 
 
 def test_roughness_as_a_part_of_the_diameter() -> None:
@@ -111,7 +111,7 @@ def test_defaults_are_the_papers() -> None:
     assert (scene.fluid.density, scene.fluid.viscosity, scene.fluid.gravity) == (1.0, 1e-5, 9.81)
     assert (scene.grain.density, scene.grain.friction_angle_deg) == (2500.0, 35.0)
     assert (scene.bed.height, scene.bed.entrainment_angle_deg) == (0.02, 60.0)
-    assert (scene.protocol.marker, scene.protocol.fractions) == (0.3, (0.1, 0.3, 0.5, 0.7))
+    assert (scene.protocol.displacement_criterion, scene.protocol.fractions) == (0.3, (0.1, 0.3, 0.5, 0.7))
 
 
 def test_presets_are_studies() -> None:

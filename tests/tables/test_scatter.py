@@ -15,7 +15,7 @@ def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
         {
             "scene_id": list("abcdefg"),
             "alpha_deg": [15.0, 15.0, 15.0, 15.0, 30.0, 15.0, 15.0],
-            "closure": "high",
+            "force_law": "high",
             "fraction": 0.5,
             "d_m": 1e-3,
             "z0_over_d": 0.1,

@@ -64,7 +64,7 @@ def scene_class(part: Part, scene: Scene) -> str:
     assert isinstance(scene.bed, PileBed)
     ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
     if part == "flow":
-        return scene.flow.stress + ending
+        return scene.forces.stress + ending
     packing: str = scene.bed.packing
     if packing == "disordered":
         size = next(size for size in DISORDERS if scene.bed.disorder <= size)
@@ -101,7 +101,7 @@ def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known
 def measured() -> dict[tuple[str, str, str], dict[float, Known]]:
     """What was measured, by part, level and class of scene, then by fraction."""
     found: dict[tuple[str, str, str], dict[float, Known]] = {}
-    with (FOLDER / "levels.csv").open(encoding="utf-8", newline="") as stream:
+    with (FOLDER / "samples.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):
             key = (row["part"], row["level"], row["scene_class"])
             numbers = (float(row[name]) for name in ("error", "uncertainty", "cost_core_s"))

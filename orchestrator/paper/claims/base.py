@@ -21,14 +21,14 @@ BY_SHARE = (
     f"reproduced: so in at least {MOST:.0%} of the comparisons of each regime; not: in at most "
     f"{1 - MOST:.0%} of each; else partly"
 )
-QUIET = 5.0
+WAITING_TIME = 5.0
 """Least quiet time of what is a hold rather than a ramp, sqrt(d/g')."""
 NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that are answers by whatever method; the others show what DEM alone measures."""
 BESIDE = ("fraction", "flow_level", "grain_level")
 """Columns in which two answers must agree beside those of their scenes."""
-GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "closure")
+GRAIN = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law")
 """Columns by which single grains are told apart. Of all others they are judged at one combination:
 the one with most scenes."""
 PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg": 35.0}
@@ -95,7 +95,7 @@ class Evidence:
     @cached_property
     def held(self) -> pd.DataFrame:
         """Those of them under held flows, at the study's commonest contact and protocol."""
-        held = self.grains[self.grains["quiet"] >= QUIET]
+        held = self.grains[self.grains["waiting_time"] >= WAITING_TIME]
         choices = others(held, *GRAIN)
         if held.empty:
             return held
@@ -123,7 +123,7 @@ EMPTY = (
     "fraction_moved",
     "mode",
     "s_m",
-    "moved_in_hold",
+    "moved_in_load_step",
 )
 """Columns of results that are asked for even of tables without rows."""
 
@@ -139,11 +139,11 @@ def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = (
     """
     same = others(table, along, *ignore)
     series = table.groupby(same, sort=True, dropna=False).ngroup()
-    columns = {"series": series, "closure": table["closure"], "x": table[along], "y": table[value]}
+    columns = {"series": series, "force_law": table["force_law"], "x": table[along], "y": table[value]}
     ordered = pd.DataFrame(columns).sort_values(["series", "x"], kind="stable")
     low, high = ordered.iloc[:-1].reset_index(drop=True), ordered.iloc[1:].reset_index(drop=True)
     beside = (low["series"] == high["series"]) & (high["x"] > low["x"])
-    found = {"closure": low["closure"], "low": low["x"], "high": high["x"]}
+    found = {"force_law": low["force_law"], "low": low["x"], "high": high["x"]}
     return pd.DataFrame({**found, "ratio": high["y"] / low["y"]})[beside].reset_index(drop=True)
 
 
@@ -166,10 +166,10 @@ def rising(found: pd.DataFrame, each: str, names: tuple[str, str] = ("rises", "r
 
 def by_regime(found: pd.DataFrame, each: str) -> tuple[str, ...]:
     """`rising` for each regime that has pairs."""
-    parts = {closure: found[found["closure"] == closure] for closure in NAMES}
+    parts = {law_name: found[found["force_law"] == law_name] for law_name in NAMES}
     return tuple(
-        f"{NAMES[closure]}: {rising(part, each)}"
-        for closure, part in parts.items()
+        f"{NAMES[law_name]}: {rising(part, each)}"
+        for law_name, part in parts.items()
         if part["ratio"].notna().any()
     )
 
@@ -177,7 +177,7 @@ def by_regime(found: pd.DataFrame, each: str) -> tuple[str, ...]:
 def up(found: pd.DataFrame) -> Verdict:
     """Whether a value rises, by `BY_SHARE`."""
     known = found[found["ratio"].notna()]
-    return combined(by_share(part["ratio"] > 1) for _, part in split(known, "closure"))
+    return combined(by_share(part["ratio"] > 1) for _, part in split(known, "force_law"))
 
 
 def by_share(true: Iterable[object]) -> Verdict:

@@ -22,7 +22,7 @@ Z0_OVER_D = 1 / 30
 GOOD = 1.25
 """Mean factor from the curves up to which a fit is called good."""
 COLUMNS = (
-    "closure",
+    "force_law",
     "beta_deg",
     "z0_over_d",
     "factor",
@@ -58,12 +58,12 @@ def _families(evidence: Evidence, flat: pd.DataFrame) -> dict[str, Lines]:
 def _distances(flat: pd.DataFrame, lines: Lines) -> pd.DataFrame:
     """Mean factor, its sign and the range of Re* of each series, by regime."""
     rows = []
-    for closure in CLOSURES:
-        part = flat[flat["closure"] == closure]
+    for law_name in CLOSURES:
+        part = flat[flat["force_law"] == law_name]
         series = [own for _, own in split(part, "beta_deg", "z0_over_d") if len(own) > 1]
         grid = _common(series)
         for own in series if len(grid) else ():
-            rows.append((closure, *_distance(own.sort_values("reynolds"), grid, lines)))
+            rows.append((law_name, *_distance(own.sort_values("reynolds"), grid, lines)))
     return pd.DataFrame(rows, columns=list(COLUMNS)).dropna().sort_values("factor", kind="stable")
 
 
@@ -99,10 +99,10 @@ def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
     measured = []
     verdicts: list[Verdict] = []
     for family, table in tables.items():
-        for closure in CLOSURES:
-            own = table[table["closure"] == closure]
+        for law_name in CLOSURES:
+            own = table[table["force_law"] == law_name]
             if len(own):
-                measured.append(_said(family, closure, own))
+                measured.append(_said(family, law_name, own))
                 verdicts += [_judged(own)] if family == "water" else []
     return Claim(
         "Best fit with Shields’ laboratory results: β from 50° to 55° and z₀ ≈ d/30, for small and "
@@ -134,12 +134,12 @@ def _is_named(ratio: float) -> bool:
     return abs(ratio / Z0_OVER_D - 1) < 1e-3
 
 
-def _said(family: str, closure: Closure, own: pd.DataFrame) -> str:
+def _said(family: str, law_name: Closure, own: pd.DataFrame) -> str:
     best = own.iloc[0]
     named = own[own["beta_deg"].between(*BETA) & own["z0_over_d"].map(_is_named)]
     rest = [_fit(row) for at, row in named.sort_values("beta_deg").iterrows() if at != best.name]
     return (
-        f"{family}, {NAMES[closure]}, Re* = {best['first']:.2g} … {best['last']:.3g}: best "
+        f"{family}, {NAMES[law_name]}, Re* = {best['first']:.2g} … {best['last']:.3g}: best "
         + "; ".join([_fit(best), *rest])
     )
 

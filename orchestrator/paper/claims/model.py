@@ -5,7 +5,7 @@ import pandas as pd
 
 from orchestrator.paper.claims.base import (
     NAMES,
-    QUIET,
+    WAITING_TIME,
     Claim,
     Evidence,
     Verdict,
@@ -73,9 +73,9 @@ def _denied(works: list[bool]) -> Verdict:
 
 def _stiffness(evidence: Evidence) -> tuple[float, pd.Series]:
     """Largest spread of u* over the closed form within grains that differ in stiffness."""
-    held = evidence.grains[evidence.grains["quiet"] >= QUIET]
+    held = evidence.grains[evidence.grains["waiting_time"] >= WAITING_TIME]
     ratio = held["ustar_m_s"] / held["ustar_closed_form_m_s"]
-    keys = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "closure")
+    keys = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law")
     parts = [own for _, own in split(held.assign(ratio=ratio), *keys)]
     parts = [own for own in parts if own["stiffness"].nunique() > 1]
     if not parts:
@@ -140,7 +140,7 @@ def _beyond_drag_law(evidence: Evidence) -> tuple[str, ...]:
         ("single grains", evidence.held, "reynolds"),
         ("thresholds of piles", evidence.piles("pile_threshold"), "reynolds"),
     ):
-        high = table[(table["closure"] == "high") & table[reynolds].notna()]
+        high = table[(table["force_law"] == "high") & table[reynolds].notna()]
         if len(high):
             limit = high["z0_over_d"].map(lambda ratio: drag_law_limit(float(ratio)))
             texts.append(f"{int((high[reynolds] > limit).sum())} of {len(high)} {name}")
@@ -153,12 +153,12 @@ def stress(evidence: Evidence) -> Claim:
     both = table[valid(table) & (table["packing"] == "aligned")]
     found = _eq10(both)
     measured = tuple(
-        f"{NAMES[closure]}: Eq. 10 changes τ by {own['tau'].median() - 1:+.1%} in the median "
+        f"{NAMES[law_name]}: Eq. 10 changes τ by {own['tau'].median() - 1:+.1%} in the median "
         f"({own['tau'].min() - 1:+.1%} … {own['tau'].max() - 1:+.1%}) and the undisturbed u*₀ by "
         f"{own['ustar0'].median() - 1:+.1%} ({own['ustar0'].min() - 1:+.1%} … "
         f"{own['ustar0'].max() - 1:+.1%}), {len(own)} thresholds"
-        for closure in NAMES
-        if len(own := found[found["closure"] == closure])
+        for law_name in NAMES
+        if len(own := found[found["force_law"] == law_name])
     )
     inside = (found["ustar0"] - 1).abs() <= 0.05
     return Claim(
@@ -178,5 +178,5 @@ def _eq10(table: pd.DataFrame) -> pd.DataFrame:
     """Ratios, by Eq. 10 over by the wall stress, of thresholds that agree in all else."""
     coded = table.assign(code=(table["stress"] == "eq10").astype(float))
     tau, ustar0 = (pairs(coded, "code", value, ["stress"]) for value in ("shields", "ustar0_m_s"))
-    found = tau[["closure"]].assign(tau=tau["ratio"], ustar0=ustar0["ratio"])
+    found = tau[["force_law"]].assign(tau=tau["ratio"], ustar0=ustar0["ratio"])
     return found.dropna()

@@ -50,14 +50,14 @@ def _orders(grains: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for _, own in split(grains, "scene_id"):
         own = own.sort_values("s_m")
-        hold = own["moved_in_hold"].to_numpy(int)
-        if not (hold > 0).any():
+        load_step = own["moved_in_load_step"].to_numpy(int)
+        if not (load_step > 0).any():
             continue
-        late = np.where(hold > 0, hold, hold.max() + 1)
+        late = np.where(load_step > 0, load_step, load_step.max() + 1)
         place = (np.arange(len(late)) + 0.5) / len(late)
         first = place[late == late.min()].max()
         order = np.mean(late[1:] <= late[:-1])
-        rows.append((_rank(place, late), order, first, np.sum(hold == 0), len(hold)))
+        rows.append((_rank(place, late), order, first, np.sum(load_step == 0), len(load_step)))
     return pd.DataFrame(rows, columns=["rank", "in_order", "first", "still", "count"], dtype=float)
 
 
@@ -85,15 +85,15 @@ def modes(evidence: Evidence) -> Claim:
     """How crest grains and those of the middle move."""
     found = _modes(evidence.piles("pile_grain"))
     verdicts = []
-    for _, own in split(found, "closure"):
+    for _, own in split(found, "force_law"):
         verdicts += [by_share(own["crest"] >= 0.5), by_share(own["middle"] < 0.5)]
     return Claim(
         "Grains near the crest lift after a short roll; at mid slope rolling prevails",
         "3.2, Fig. 13",
         tuple(
             text
-            for closure in NAMES
-            for text in _modes_said(found[found["closure"] == closure], NAMES[closure])
+            for law_name in NAMES
+            for text in _modes_said(found[found["force_law"] == law_name], NAMES[law_name])
         ),
         BY_SHARE.replace("comparisons", "piles")
         + "; so: at least half of the topmost tenth of the grains that moved lifted, and less than "
@@ -113,14 +113,14 @@ def _modes(grains: pd.DataFrame) -> pd.DataFrame:
     for _, own in split(grains, "scene_id"):
         own = own.sort_values("s_m")
         place = (np.arange(len(own)) + 0.5) / len(own)
-        moved = own["moved_in_hold"].to_numpy(int) > 0
+        moved = own["moved_in_load_step"].to_numpy(int) > 0
         kinds = own["mode"].to_numpy(str)
         middle = (place > MIDDLE[0]) & (place < MIDDLE[1])
         parts = (kinds[moved & (place > CREST)], kinds[moved & middle])
         if all(map(len, parts)):
             shares = (np.mean(part == kind) for kind in ("lifted", "slid") for part in parts)
-            rows.append((own["closure"].iloc[0], *shares))
-    columns = ["closure", "crest", "middle", "crest_slid", "middle_slid"]
+            rows.append((own["force_law"].iloc[0], *shares))
+    columns = ["force_law", "crest", "middle", "crest_slid", "middle_slid"]
     return pd.DataFrame(rows, columns=columns)
 
 

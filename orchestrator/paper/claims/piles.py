@@ -50,21 +50,21 @@ def above_single(evidence: Evidence) -> Claim:
     found = table.assign(ratio=ratio).dropna(subset=["ratio"])
     silent = len(table) - len(found)
     measured = tuple(
-        f"{NAMES[closure]}: τ over that of one grain (closed form, same slope, d and z₀), median "
+        f"{NAMES[law_name]}: τ over that of one grain (closed form, same slope, d and z₀), median "
         + ", ".join(
             f"{own['ratio'].median():.2f} at n/N = {float(str(part)):.0%} (above 1 in "
             f"{int((own['ratio'] > 1).sum())} of {len(own)})"
-            for (part,), own in split(found[found["closure"] == closure], "fraction")
+            for (part,), own in split(found[found["force_law"] == law_name], "fraction")
         )
-        for closure in NAMES
-        if (found["closure"] == closure).any()
+        for law_name in NAMES
+        if (found["force_law"] == law_name).any()
     )
     return Claim(
         "Piles behave as one grain does, with higher limiting values due to the averaging",
         "3.2, Figs. 15 and 16",
         (*measured, f"{silent} thresholds were not reached") if silent else measured,
         BY_SHARE.replace("comparisons", "thresholds"),
-        combined(by_share(part["ratio"] > 1) for _, part in split(found, "closure")),
+        combined(by_share(part["ratio"] > 1) for _, part in split(found, "force_law")),
         "The grains that go first stand in the strongest stress; by the time the next ones go, the "
         "first feel far more than they need, and the mean over all that have moved rises with n/N. "
         "Near n/N → 0 it is the threshold of one grain.",
@@ -74,10 +74,10 @@ def above_single(evidence: Evidence) -> Claim:
 
 def _one_grain(table: pd.DataFrame) -> pd.Series:
     found = pd.Series(np.nan, index=table.index)
-    for closure in closures.CLOSURES:
-        own = table[table["closure"] == closure]
+    for law_name in closures.CLOSURES:
+        own = table[table["force_law"] == law_name]
         exact = closures.threshold(
-            closure,
+            law_name,
             diameter=own["d_m"],
             density=own["rho_sol_kg_m3"],
             fluid_density=own["rho_f_kg_m3"],
@@ -110,7 +110,7 @@ def curves(evidence: Evidence) -> Iterator[pd.DataFrame]:
     """Of each pile the holds in which something had moved, in their order."""
     table = evidence.piles("pile_curve")
     for _, own in split(table, "scene_id"):
-        moved = own[own["moved"] > 0].sort_values("hold")
+        moved = own[own["moved"] > 0].sort_values("load_step")
         if moved["fraction_moved"].nunique() > 2:
             yield moved
 
@@ -205,20 +205,20 @@ def fraction(evidence: Evidence) -> Claim:
     for _, same in split(firsts, *others(firsts, "alpha_deg")):
         ordered = [found[key] for key in same.sort_values("alpha_deg")["scene_id"]]
         for flat, steep in pairwise(ordered):
-            rows.append((flat["closure"].iloc[0], _fraction_at(steep, _stress_at(flat, 0.5))))
-    table = pd.DataFrame(rows, columns=["closure", "steep"])
+            rows.append((flat["force_law"].iloc[0], _fraction_at(steep, _stress_at(flat, 0.5))))
+    table = pd.DataFrame(rows, columns=["force_law", "steep"])
     return Claim(
         "At the same stress, the fraction of moving grains decreases with the slope",
         "3.2, Figs. 15 and 16",
         tuple(
-            f"{NAMES[closure]}: at the τ that moves 50 % of a pile, the next steeper one has "
+            f"{NAMES[law_name]}: at the τ that moves 50 % of a pile, the next steeper one has "
             f"{own['steep'].median():.0%} (median; {own['steep'].min():.0%} … "
             f"{own['steep'].max():.0%}), less in {int((own['steep'] < 0.5).sum())} of {len(own)}"
-            for closure in NAMES
-            if len(own := table[table["closure"] == closure].dropna())
+            for law_name in NAMES
+            if len(own := table[table["force_law"] == law_name].dropna())
         ),
         BY_SHARE,
-        combined(by_share(own["steep"] < 0.5) for _, own in split(table.dropna(), "closure")),
+        combined(by_share(own["steep"] < 0.5) for _, own in split(table.dropna(), "force_law")),
         "Gravity resists more on the steeper face, and its stress falls off faster from the crest, "
         "so that the mean over the grains that moved is reached by fewer.",
         ("fractions", "extended-shields"),

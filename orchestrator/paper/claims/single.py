@@ -6,7 +6,7 @@ import pandas as pd
 from orchestrator.paper.claims.base import (
     BY_SHARE,
     NAMES,
-    QUIET,
+    WAITING_TIME,
     Claim,
     Evidence,
     Verdict,
@@ -28,7 +28,7 @@ SMALL_RE = 0.3
 def constant(evidence: Evidence) -> Claim:
     """Tau at small Re*."""
     grains = evidence.held[evidence.held["shields_dem"].notna()]
-    flat = grains[(grains["closure"] == "low") & (grains["alpha_deg"] == 0)]
+    flat = grains[(grains["force_law"] == "low") & (grains["alpha_deg"] == 0)]
     series = [own for _, own in split(flat, "beta_deg", "z0_over_d") if len(own) > 1]
     falls = [_fall(own, closures.LOW_BELOW) for own in series]
     ends = [_constant_to(own) for own in series]
@@ -161,7 +161,7 @@ def numerical(evidence: Evidence) -> Claim:
 
 
 def _ramps(evidence: Evidence) -> pd.DataFrame:
-    return evidence.grains[evidence.grains["quiet"] < QUIET]
+    return evidence.grains[evidence.grains["waiting_time"] < WAITING_TIME]
 
 
 def _ratio(grains: pd.DataFrame) -> pd.Series:
@@ -177,9 +177,9 @@ def _held_measured(held: pd.DataFrame) -> tuple[str, ...]:
     if held.empty:
         return ()
     texts = [
-        f"{NAMES[closure]} {own.mean() - 1:+.2%} (largest {(own - 1).abs().max():.2%})"
-        for closure in NAMES
-        if len(own := _ratio(held[held["closure"] == closure]).dropna())
+        f"{NAMES[law_name]} {own.mean() - 1:+.2%} (largest {(own - 1).abs().max():.2%})"
+        for law_name in NAMES
+        if len(own := _ratio(held[held["force_law"] == law_name]).dropna())
     ]
     known = held[held["shields_dem"].notna()]
     above = int((known["shields_dem_low"] > known["shields_closed_form"]).sum())
@@ -199,9 +199,9 @@ def _ramps_measured(ramps: pd.DataFrame) -> tuple[str, ...]:
     ]
     if not texts:
         return ()
-    quiet = ", ".join(labels_of(ramps["quiet"]))
+    waiting_time = ", ".join(labels_of(ramps["waiting_time"]))
     return (
-        f"ramps, τ over the closed form, mean, by the rise of u* per {quiet} √(d/g′): "
+        f"ramps, τ over the closed form, mean, by the rise of u* per {waiting_time} √(d/g′): "
         + "; ".join(texts),
     )
 
