@@ -1,4 +1,4 @@
-"""What the foreign solvers share: the scene, the holds of a bed, and the answer.
+"""What the foreign solvers share: the scene, the load steps of a bed, and the answer.
 
 The forces are those of the example in examples/native; the format is docs/benchmark.md.
 """
@@ -13,15 +13,15 @@ sys.path.insert(0, str(Path(__file__).parent / "native"))
 from solver import forces, table
 
 SAMPLING_INTERVAL = 0.5
-"""Time between two looks at the grains, sqrt(d/g')."""
+"""Time between two samples of the grains, sqrt(d/g')."""
 SETTLE = 10.0
-"""Time of hold 0."""
+"""Time of load step 0."""
 MARGIN = 3.0
 """From a face to the height at which a grain in flight is gone, d."""
 
 
 class Bed:
-    """The grains of a pivot or a pile, and the force on each in each hold.
+    """The grains of a pivot or a pile, and the force on each in each load step.
 
     The counted grains come first, the fixed ones last.
     """
@@ -42,13 +42,18 @@ class Bed:
 
     @property
     def flow(self):
-        """The flow of each hold, m/s."""
-        return [float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.load_steps]
+        """The flow of each load step, m/s."""
+        return [
+            float(row["ustar_m_s" if self.is_pivot else "ustar0_m_s"]) for row in self.load_steps
+        ]
 
     def force(self, load_step):
-        """The force of the flow on each grain in a hold: a list of (fx, fz), N."""
+        """The force of the flow on each grain in a load step: a list of (fx, fz), N."""
         if self.is_pivot:
-            own = float(self.load_steps[load_step]["fx_n"]), float(self.load_steps[load_step]["fz_n"])
+            own = (
+                float(self.load_steps[load_step]["fx_n"]),
+                float(self.load_steps[load_step]["fz_n"]),
+            )
             return [own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains]
         return [self._pushed(row, self.flow[load_step]) for row in self.grains]
 
@@ -73,8 +78,8 @@ class Bed:
     def answer(self, moved_in, carried):
         """Write nothing; give the answer to a question, from what each counted grain did.
 
-        `moved_in` has the hold in which it moved, or 0 for never; `carried` says whether it was
-        gone before it had passed the marker.
+        `moved_in` has the load step in which it moved, or 0 for never; `carried` says whether it
+        was gone before it had passed the displacement criterion.
         """
         return _Answer(self, moved_in, carried)
 
@@ -103,7 +108,10 @@ class _Answer:
     def _first(self, fraction):
         need = max(math.ceil(fraction * self.bed.counted - 1e-9), 1)
         load_steps = range(1, len(self.flow))
-        return next((load_step for load_step in load_steps if self._moved(load_step) >= need), len(self.flow) - 1)
+        return next(
+            (load_step for load_step in load_steps if self._moved(load_step) >= need),
+            len(self.flow) - 1,
+        )
 
     def _between(self, load_step):
         return math.sqrt(self.flow[load_step - 1] * self.flow[load_step])

@@ -54,9 +54,9 @@ def bed_parameters(bed, step):
     x, z = bed.ceiling
     return {
         "counted": bed.counted,
-        "look_steps": sample,
+        "sampling_steps": sample,
         "settle_steps": int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5) * sample,
-        "quiet_looks": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),
+        "waiting_samples": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),
         "load_steps": len(bed.load_steps) - 1,
         "displacement_criterion": bed.scene["displacement_criterion"],
         "along_x": bed.along[0],
@@ -73,7 +73,7 @@ def write_variables(path, values):
 
 
 def write_bed(bed, folder):
-    """Write the grains, and the force on each for every hold."""
+    """Write the grains, and the force on each for every load step."""
     d, rho = bed.scene["d_m"], bed.scene["rho_sol_kg_m3"]
     kinds = {"fixed": 1, "mobile": 2, "counted": 3, "pushed": 3}
     places = [(float(row["x_m"]), float(row["z_m"])) for row in bed.grains]
@@ -95,8 +95,8 @@ def write_bed(bed, folder):
 
 
 def moved_in(bed, folder):
-    """The hold in which each counted grain passed the marker or was gone; whether it was gone."""
-    samples = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
+    """The load step in which each counted grain moved or was gone; whether it was gone."""
+    samples = [int(line) for line in (folder / "samples.csv").read_text().split()[1:]]
     frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     rows = [[line.split() for line in frame.splitlines()[8:]] for frame in frames]
     found = [{int(a): (float(x), float(z)) for a, x, z in frame} for frame in rows]
@@ -134,7 +134,7 @@ def check(kind, scene):
 
 
 def steps(folder):
-    """The time steps of a run: those of the last look at the grains."""
+    """The time steps of a run: those of the last sample of the grains."""
     return int((folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[-1].split()[0])
 
 

@@ -44,7 +44,7 @@ struct Forces {
 // Drag and lift on an exposed grain, N: Eq. 2 (low) and Eq. 4 (high)
 Forces forces(const Scene& s, double ustar) {
     const double d = s["d_m"], rho = s["rho_f_kg_m3"], nu = s["nu_m2_s"], r = s["z0_m"] / d;
-    if (s.word.at("closure") == "low")
+    if (s.word.at("force_law") == "low")
         return {1.5 * pi * (1 + 2 * r) * rho * d * d * ustar * ustar,
                 s["alpha_s"] / 2 * (1 + 2 * r) * rho * std::pow(d * ustar, 3) / nu};
     const double v = 2.5 * ((1 + r) * std::log1p(1 / r) - 1);

@@ -175,7 +175,7 @@ class Bed:
 
 
 def moves(scene, grains, resting, load_step):
-    """Whether the grain passes the marker in a hold, after holds in which it rests."""
+    """Whether the grain passes the criterion in a load step, after those in which it rests."""
     bed = Bed(scene, grains)
     alpha, unit = math.radians(scene["alpha_deg"]), scene["time_unit_s"]
     for rest in resting:
@@ -191,7 +191,7 @@ def moves(scene, grains, resting, load_step):
 
 
 def pivot(scene, case):
-    """Bisect among the holds; each trial starts from rest in the last hold that did not move it."""
+    """Bisect among the load steps; each trial starts from rest in the last that did not move it."""
     grains, load_steps = table(case / "grains.csv"), table(case / "load_steps.csv")
     low, high = 1, len(load_steps) - 1
     while high - low > 1:
@@ -205,7 +205,7 @@ def pivot(scene, case):
 
 
 def passing(scene, case):
-    """A grain is let rest, then pushed: when has it passed the marker?"""
+    """A grain is let rest, then pushed: when has it passed the displacement criterion?"""
     bed, unit = Bed(scene, table(case / "grains.csv")), scene["time_unit_s"]
     for _ in range(int(10 * unit / bed.dt)):
         bed.step(0.0, 0.0)

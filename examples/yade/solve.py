@@ -114,7 +114,7 @@ def sliding(scene, case):
 
 
 def passing(scene, case):
-    """A grain rests on two fixed ones and is pushed until it has passed the marker."""
+    """A grain rests on two fixed ones and is pushed until it has passed the criterion."""
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
     rows = door.table(case / "grains.csv")
     ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in rows]
@@ -126,8 +126,10 @@ def passing(scene, case):
     while grain.pos[0] - start < scene["displacement_criterion"] * scene["d_m"]:
         before = grain.pos[0]
         run(0.01 * unit)
-    # straight between the last two looks
-    late = (grain.pos[0] - start - scene["displacement_criterion"] * scene["d_m"]) / (grain.pos[0] - before)
+    # straight between the last two samples
+    late = (grain.pos[0] - start - scene["displacement_criterion"] * scene["d_m"]) / (
+        grain.pos[0] - before
+    )
     value = (O.time - since) / unit - 0.01 * late
     return lambda quantity, at: value
 
@@ -138,15 +140,15 @@ def run(seconds):
 
 
 def bed(scene, case):
-    """The grains of a pivot or a pile: hold after hold."""
+    """The grains of a pivot or a pile: hold after load step."""
     global protocol
     asked = door.Bed(case)
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
     ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in asked.grains]
     protocol = Protocol(asked, ids)
     period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
-    # one run with looks inside: between two runs YADE waits a twentieth of a second
-    O.engines += [PyRunner(command="protocol.look()", iterPeriod=period, initRun=False)]
+    # one run with samples inside: between two runs YADE waits a twentieth of a second
+    O.engines += [PyRunner(command="protocol.sample()", iterPeriod=period, initRun=False)]
     O.run(-1, True)
     return asked.answer(protocol.moved_in, protocol.carried)
 
@@ -162,7 +164,7 @@ class Protocol:
         self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
         self.marker = scene["displacement_criterion"] * scene["d_m"]
-        self.quiet_looks = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
+        self.waiting_samples = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
         self.ceiling = asked.ceiling
         places = [(float(row["x_m"]), float(row["z_m"])) for row in grains]
         margin = (door.MARGIN + 1) * scene["d_m"]
@@ -179,7 +181,7 @@ class Protocol:
                 O.forces.setPermF(number, (fx, 0, fz))
 
     def sample(self):
-        """Note who has moved, take away who is gone, and go on to the next hold if all is calm."""
+        """Note who has moved, remove who is gone, go on to the next load step if all is calm."""
         if self.load_step == 0:
             self.settling -= 1
             if self.settling == 0:
@@ -189,7 +191,7 @@ class Protocol:
         self.calm = 0 if self._note() else self.calm + 1
         self.moving = [number for number in self.moving if not self._gone(number)]
         lie = 0 in self.moved_in
-        if lie and self.calm < self.quiet_looks:
+        if lie and self.calm < self.waiting_samples:
             return
         if lie and self.load_step + 1 < len(self.asked.load_steps):
             self._begin(self.load_step + 1)

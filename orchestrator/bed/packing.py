@@ -29,7 +29,7 @@ DISORDERED = 4
 """Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
 is the same for any number of mobile layers up to it."""
 PERTURBATION = 1e-9
-"""How far the grains of a lattice's twin lie aside, diameters: as far as matters to nothing but
+"""How far the grains of a lattice's replica lie aside, diameters: as far as matters to nothing but
 which grain of a chain goes first."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
@@ -90,7 +90,7 @@ def pile(
     disorder : float
         Of a disordered packing: largest gap in the row below the mobile ones, diameters.
     seed : int
-        Of a disordered packing: which of the many. Of a lattice: itself, or which of its twins.
+        Of a disordered packing: which of the many. Of a lattice: itself, or which of its replicas.
     """
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap

@@ -116,7 +116,8 @@ def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     for (_, before), (load_step, n) in pairwise(moved):
         if n < before:
             raise AnswerError(
-                f"moved falls from {before:g} to {n:g} at hold {load_step:g}: a grain that has moved "
+                f"moved falls from {before:g} to {n:g} at load step {load_step:g}: a grain that "
+                f"has moved "
                 "has moved for ever"
             )
     for (quantity, at), n in found.items():
@@ -124,10 +125,12 @@ def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
         if quantity == "not_moved" and total is not None and gone + n != total:
             lost = "are lost" if gone + n < total else "are too many"
             raise AnswerError(
-                f"grains {lost}: {gone:g} moved and {n:g} not, at hold {at}, of {total:g}"
+                f"grains {lost}: {gone:g} moved and {n:g} not, at load step {at}, of {total:g}"
             )
         if quantity == "carried_off" and n > gone:
-            raise AnswerError(f"{n:g} grains are carried off at hold {at}, of {gone:g} that moved")
+            raise AnswerError(
+                f"{n:g} grains are carried off at load step {at}, of {gone:g} that moved"
+            )
 
 
 def _said(one: Key) -> str:

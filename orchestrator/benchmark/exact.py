@@ -39,7 +39,7 @@ UNIT = float(np.sqrt(DIAMETER * GRAVITY))
 MEETING = 0.1
 """Speed of each of two colliding grains, sqrt(d g')."""
 PUSHES = (1.5, 2.0, 3.0)
-"""Forces on the grain that passes the marker, over that at which it begins to roll."""
+"""Forces on the grain that passes the criterion, over that at which it begins to roll."""
 PASSING_DEG, MARKER, PASSING_STIFFNESS = 60.0, 0.3, 1e5
 """Its entrainment angle, its marker (d), and K d/W: springs of 1e4 would start it 1 % early."""
 LEAST_QUIET = 5.0
@@ -69,7 +69,7 @@ def closed_form(scene: Scene) -> Problem:
 def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
     """Level 2: one grain on its two neighbours; `ours` is the DEM's threshold, m/s."""
     threshold = float(study_form.closed_form(scene).friction_velocity)
-    # the mean of two holds is within half a step of what lies between them
+    # the mean of two load steps is within half a step of what lies between them
     half = float(np.sqrt(1 + scene.protocol.load_increment))
     interval = threshold / half, threshold * half
     asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
@@ -78,7 +78,7 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
 
 
 def has_pivot(scene: Scene) -> bool:
-    """Whether the grain's threshold by holds is the closed form's, and means something."""
+    """Whether the grain's threshold by load steps is the closed form's, and means something."""
     return regime_of(scene) == scene.forces.law and scene.protocol.waiting_time >= LEAST_QUIET
 
 
@@ -97,7 +97,12 @@ def _three(centres: Any, diameter: float) -> pd.DataFrame:
 def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
     rising = cells.flows(scene)
     fx, fz = cells.force(scene, rising).T
-    load_steps = {"load_step": range(len(rising)), "ustar_m_s": rising * threshold, "fx_n": fx, "fz_n": fz}
+    load_steps = {
+        "load_step": range(len(rising)),
+        "ustar_m_s": rising * threshold,
+        "fx_n": fx,
+        "fz_n": fz,
+    }
     return pd.DataFrame(load_steps)
 
 
@@ -180,7 +185,7 @@ def _passing(push: float) -> Problem:
 
 
 def passing_time(push: float, marker: float, inertia: float = 0.4) -> float:
-    """Time, sqrt(d/g'), in which a pushed grain rolls by the marker over its neighbour.
+    """Time, sqrt(d/g'), in which a pushed grain rolls over its neighbour as far as the criterion.
 
     It rolls without slip on a circle of radius d, from rest: the work of the force and of the
     weight is its energy, (1 + inertia) v^2/2.

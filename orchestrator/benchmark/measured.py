@@ -29,7 +29,8 @@ FACE = (0.1, 0.9)
 GRAINS, LINE = 0.03, 0.10
 """Relative tolerances of a pile's thresholds under the given stress, and with one's own flow."""
 SCATTER = 0.10
-"""Of the count, that the number of moved grains may differ by besides one hold: three engines with
+"""Of the count, that the number of moved grains may differ by besides one load step: three engines
+with
 one contact law do so by up to 13 % where a chain of grains goes at once (docs/benchmark.md)."""
 LEVEL_ROWS = 0.35
 """Of N: level rows are judged until so many have moved. Then a whole step goes at once or not, as
@@ -37,7 +38,7 @@ the least detail decides: runs that differ in the time step, the dashpots or pla
 to 20 % of N and six holds apart (docs/benchmark.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
-round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a hold."""
+round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
 UPSTREAM, DOWNSTREAM, LID = 10.0, 20.0, 10.0
 """Ends of the flow's domain, h."""
 
@@ -71,7 +72,7 @@ def answered(
 ) -> list[Answered]:
     """The piles that DEM answered, with what the tables say of each.
 
-    Twins of lattices are left out: they are in the intervals of the others.
+    Replicas of lattices are left out: they are in the intervals of the others.
     """
     if "pile_curve" not in tables:
         return []
@@ -168,7 +169,7 @@ def _lift_off(one: Answered) -> dict[str, float]:
 
 
 def load_steps(one: Answered) -> pd.DataFrame:
-    """The holds that our run came to, the settling first."""
+    """The load steps that our run came to, the settling first."""
     return one.curve[["load_step", "ustar0_m_s", "u_e_m_s"]]
 
 
@@ -194,7 +195,7 @@ def _grains(one: Answered) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class Margins:
-    """How far an answer to a pile may be off besides what the holds and seeds enclose.
+    """How far an answer to a pile may be off besides what the load steps and seeds enclose.
 
     Attributes
     ----------
@@ -229,7 +230,7 @@ def _pile_rows(one: Answered, threshold: float) -> Iterator[Row]:
         tolerance = margins.threshold if row["fraction"] <= margins.until else np.nan
         interval = row["shields_low"], row["shields_high"]
         yield expected("shields", at, shields, interval, tolerance, shields)
-        # the number is the mean of two holds: one hold more to each side
+        # the number is the mean of two load steps: one load step more to each side
         load_step = int(np.searchsorted(ustar0, flow))
         around = ustar0[max(load_step - 2, 0)], ustar0[min(load_step + 1, len(ustar0) - 1)]
         yield expected("ustar0_m_s", at, flow, around, tolerance, flow)
@@ -237,7 +238,7 @@ def _pile_rows(one: Answered, threshold: float) -> Iterator[Row]:
 
 def _count_rows(curve: pd.DataFrame, margins: Margins) -> Iterator[Row]:
     total, last = float(curve["count"].iloc[0]), len(curve) - 1
-    # hold 0 is the settling
+    # load step 0 is the settling
     for load_step in range(1, last + 1):
         yield _counted("moved", curve, load_step, margins)
     moved = _counted("moved", curve, last, margins)
@@ -249,7 +250,7 @@ def _count_rows(curve: pd.DataFrame, margins: Margins) -> Iterator[Row]:
 
 
 def _counted(quantity: str, curve: pd.DataFrame, load_step: int, margins: Margins) -> Row:
-    """Expectation of a number of grains: that of a hold earlier or later, and its margin."""
+    """Expectation of a number of grains: that of a load step earlier or later, and its margin."""
     total, n = float(curve["count"].iloc[0]), curve[quantity].to_numpy(float)
     near = n[load_step - 1 : load_step + 2]
     low = max(float(near.min()) - margins.count * total, 0.0)

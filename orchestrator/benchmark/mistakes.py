@@ -29,7 +29,7 @@ ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians ta
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""
 MARKERS = (0.1, 0.2, 0.5)
-"""What the marker is taken for, d."""
+"""What the displacement criterion is taken for, d."""
 GRAVITIES = (9.8, 9.80665, 10.0)
 """What g is taken for, m/s2."""
 DERIVED = ("reynolds", "shields")

@@ -183,7 +183,10 @@ def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
     if kind == "passing":
         beta = np.radians(told["beta_deg"])
         own["push"] = float(told["force_n"] * np.tan(beta) / told["weight_n"])
-        own |= {"displacement_criterion": told["displacement_criterion"], "stiffness": told["stiffness"]}
+        own |= {
+            "displacement_criterion": told["displacement_criterion"],
+            "stiffness": told["stiffness"],
+        }
     return own
 
 
@@ -192,7 +195,7 @@ def _given(problem: Problem) -> pd.DataFrame:
 
 
 def _with_steps(given: pd.DataFrame, case: Path) -> pd.DataFrame:
-    """With the time steps of the run: those of the last look at the grains."""
+    """With the time steps of the run: those of the last sample of the grains."""
     steps = pd.read_csv(case / "samples.csv")["step"].iloc[-1]
     row = dict(zip(given.columns, (*STEPS, float(steps)), strict=True))
     return pd.concat([given, pd.DataFrame([row])], ignore_index=True)

@@ -19,7 +19,8 @@ WIDE = 100
 LIMITS = (
     "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs: agreement "
     "there is that of solvers, not with nature.",
-    "The intervals hold the step between two holds, the count’s resolution and the scatter over "
+    "The intervals hold the step between two load steps, the count’s resolution and the scatter "
+    "over "
     "packings where it was run; they do not hold what the flow model does.",
     "Scenes of less than a second are mostly start-up of the programs.",
 )

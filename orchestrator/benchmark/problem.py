@@ -111,7 +111,7 @@ def expectations(rows: Iterable[Row]) -> pd.DataFrame:
 
 
 def parameters(scene: Scene) -> dict[str, Any]:
-    """What a pack says of a scene, whose closure is decided: every field that has an effect."""
+    """What a pack says of a scene, whose force law is decided: every field that has an effect."""
     told = {k: v for k, v in fields.used(scene).items() if k != "bed" and v is not None}
     grain = scene.grain
     return told | mechanics(

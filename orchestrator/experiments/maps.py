@@ -148,7 +148,7 @@ def _runs(data: Mapping[str, Any], x: Axis, y: Axis, where: str) -> Iterator[Run
 
 
 def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> tuple[Scene, ...]:
-    """The scene with some changes; in the transition one for each closure."""
+    """The scene with some changes; in the transition one for each force law."""
     parts = {part: dict(data.get(part, {})) for part in PARTS}
     for key, value in changes.items():
         part, _, field = key.partition(".")

@@ -1,9 +1,9 @@
 """The naive route beside which the ladder stands: one run of the whole pile for each Re*.
 
 Every grain of the pile is mobile and explicit, and each Re* is a run of its own that settles the
-bed and holds the flow. It is measured on a small pile, with few flows, and extrapolated: the time
-of a run is that of a hold, in proportion to the grains; the runs are as many as the holds by which
-the fast level finds the same curve.
+bed and load steps the flow. It is measured on a small pile, with few flows, and extrapolated: the
+time of a run is that of a load step, in proportion to the grains; the runs are as many as the load
+steps by which the fast level finds the same curve.
 """
 
 from collections.abc import Mapping

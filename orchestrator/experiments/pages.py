@@ -53,7 +53,8 @@ def _ladder(points: pd.DataFrame, known: pd.DataFrame, routes: pd.DataFrame) -> 
     yield Section(
         "What is gained over the naive route",
         "One explicit run of the whole pile for each Re*, at K d/W = 1e4 and at the paper's "
-        "K = 1e6 N/m with the time step that it forces. The time of a hold is measured on a small "
+        "K = 1e6 N/m with the time step that it forces. The time of a load step is measured on "
+        "a small "
         "pile; the pile of the figure has more grains, in proportion to which it is extrapolated, "
         "and needs as many runs as the fast level has holds.",
         (Figure("gains", "Factors gained", "", (), ladder.gains(routes)),),

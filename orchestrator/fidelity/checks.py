@@ -1,6 +1,6 @@
 """Piles by DEM that check the answers without DEM of a study with a tolerance.
 
-Of the piles of each slope, packing and closure that the tool chose to answer without DEM, the one
+Of the piles of each slope, packing and force law that the tool chose to answer without DEM, the one
 that DEM answers fastest is answered by it as well, on a flow that is not a cheap one either. Where
 the two differ by more than the tolerance, all of them go to dearer levels.
 """

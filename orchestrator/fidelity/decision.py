@@ -148,7 +148,11 @@ def _asks_for(scene: Scene) -> str:
         return f"the study asks for the method {scene.protocol.method}"
     if scene.flow.model != "solve":
         return f"the study asks for the flow model {scene.flow.model}"
-    return "" if scene.protocol.waiting_time >= QUIET_ENOUGH else "the study asks for a ramp of the flow"
+    return (
+        ""
+        if scene.protocol.waiting_time >= QUIET_ENOUGH
+        else "the study asks for a ramp of the flow"
+    )
 
 
 def lifts_off(scene: Scene) -> bool:

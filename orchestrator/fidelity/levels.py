@@ -148,7 +148,7 @@ SLOW: Fields = {
     "protocol.waiting_time": 10.0,
     "protocol.load_increment": 0.01,
 }
-SLOWEST: dict[str, float] = {"waiting_time": 15.0, "step": 0.004}
+SLOWEST: dict[str, float] = {"waiting_time": 15.0, "load_increment": 0.004}
 OTHER_MODEL = "standard, with another turbulence model"
 
 FLOW = (
@@ -165,13 +165,13 @@ FLOW = (
     Level(
         "RNG k-epsilon",
         OTHER_MODEL,
-        _set(_solve(40, 1.1, turbulence="RNGkEpsilon")),
+        _set(_solve(40, 1.1, turbulence_model="RNGkEpsilon")),
         same_model=False,
     ),
     Level(
         "realizable k-eps.",
         OTHER_MODEL,
-        _set(_solve(40, 1.1, turbulence="realizableKE")),
+        _set(_solve(40, 1.1, turbulence_model="realizableKE")),
         same_model=False,
     ),
 )
@@ -190,24 +190,24 @@ GRAINS = (
     ),
     Level(
         "1 layer, coarse",
-        "DEM, 1 mobile layer, holds 6 % apart",
-        _set(_dem(1, FAST, step=0.06)),
+        "DEM, 1 mobile layer, load steps 6 % apart",
+        _set(_dem(1, FAST, load_increment=0.06)),
     ),
-    Level("1 layer, fast", "DEM, 1 mobile layer, holds 3 % apart", _set(_dem(1, FAST))),
-    Level("2 layers, fast", "DEM, 2 mobile layers, holds 3 % apart", _set(_dem(2, FAST))),
-    Level("4 layers, fast", "DEM, 4 mobile layers, holds 3 % apart", _set(_dem(4, FAST))),
-    Level("1 layer, slow", "DEM, 1 mobile layer, holds 1 % apart", _set(_dem(1, SLOW))),
-    Level("2 layers, slow", "DEM, 2 mobile layers, holds 1 % apart", _set(_dem(2, SLOW))),
-    Level("4 layers, slow", "DEM, 4 mobile layers, holds 1 % apart", _set(_dem(4, SLOW))),
+    Level("1 layer, fast", "DEM, 1 mobile layer, load steps 3 % apart", _set(_dem(1, FAST))),
+    Level("2 layers, fast", "DEM, 2 mobile layers, load steps 3 % apart", _set(_dem(2, FAST))),
+    Level("4 layers, fast", "DEM, 4 mobile layers, load steps 3 % apart", _set(_dem(4, FAST))),
+    Level("1 layer, slow", "DEM, 1 mobile layer, load steps 1 % apart", _set(_dem(1, SLOW))),
+    Level("2 layers, slow", "DEM, 2 mobile layers, load steps 1 % apart", _set(_dem(2, SLOW))),
+    Level("4 layers, slow", "DEM, 4 mobile layers, load steps 1 % apart", _set(_dem(4, SLOW))),
     Level(
         "full pile, fast",
-        "DEM, every grain mobile, holds 3 % apart",
+        "DEM, every grain mobile, load steps 3 % apart",
         _set(_dem(FULL, FAST)),
         on_lattices=True,
     ),
     Level(
         "paper's K, fast",
-        "DEM, 1 mobile layer, K = 1e6 N/m, holds 3 % apart",
+        "DEM, 1 mobile layer, K = 1e6 N/m, load steps 3 % apart",
         _paper_stiffness,
         most_grains=40,
     ),
@@ -218,7 +218,7 @@ GRAINS = (
     ),
     Level(
         "reference",
-        "DEM, 3 mobile layers, holds 0.4 % apart",
+        "DEM, 3 mobile layers, load steps 0.4 % apart",
         _set(_dem(3, SLOW, **SLOWEST)),
     ),
 )

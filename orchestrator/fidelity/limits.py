@@ -147,7 +147,8 @@ def _ramp(scene: Scene) -> str | None:
     rules = scene.protocol
     if not _pile(scene) or rules.method != "dem" or rules.waiting_time >= WAITING_TIME:
         return None
-    return f"holds of {rules.waiting_time:g} sqrt(d/g') end before slow grains have passed: it is a ramp"
+    waited = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
+    return f"{waited} end before slow grains pass: it is a ramp"
 
 
 def _coarse(scene: Scene) -> str | None:
@@ -254,12 +255,12 @@ LIMITS = (
         "quiet-step",
         "protocol.load_increment",
         _coarse,
-        "A pile's holds are at most 5 % apart: a warning above.",
+        "A pile's load steps are at most 5 % apart: a warning above.",
         "lower it",
         refused=False,
     ),
     Limit(
-        "loaded_grains",
+        "forced",
         "forces.loaded_grains",
         _forced,
         "Every exposed grain carries a force: a warning otherwise.",

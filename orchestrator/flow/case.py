@@ -54,14 +54,14 @@ class FlowCase(Case):
         The stress depends on it: `default_first_cell_height` is the choice of the studies.
     cells_per_face : int
         Cells along each face of the pile; the others follow.
-    growth : float
+    expansion_ratio : float
         Ratio of neighbouring cells up from the bed and away from the pile, with 40 cells on a face;
         it follows the number of cells, so that twice of these is a mesh twice as fine.
-    turbulence : str
+    turbulence_model : str
         OpenFOAM's model of it: kEpsilon, RNGkEpsilon, realizableKE or kOmegaSST.
-    convection : str
+    convection_scheme : str
         Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
-    correctors : int
+    non_orthogonal_correctors : int
         Of the pressure for cells that are not orthogonal, in each iteration.
 
     Raises
@@ -106,7 +106,9 @@ class FlowCase(Case):
 
     def _check_numbers(self) -> None:
         for name, value in self.parameters.items():
-            if isinstance(value, str) or (value == 0 and name in ("slope_deg", "non_orthogonal_correctors")):
+            if isinstance(value, str) or (
+                value == 0 and name in ("slope_deg", "non_orthogonal_correctors")
+            ):
                 continue
             if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
@@ -123,7 +125,9 @@ class FlowCase(Case):
                 f"{self.cells_per_face} is not within 8 to 400", where="cells_per_face"
             )
         if not 1.0 < self.expansion_ratio <= 2.0:
-            raise InputError(f"{self.expansion_ratio:g} is not within 1 to 2", where="expansion_ratio")
+            raise InputError(
+                f"{self.expansion_ratio:g} is not within 1 to 2", where="expansion_ratio"
+            )
         if self.first_cell_m > self.height_m / 4.0:
             raise InputError(
                 f"{self.first_cell_m:g} m is above h/4 = {self.height_m / 4:g} m",
@@ -133,7 +137,10 @@ class FlowCase(Case):
     @property
     def parameters(self) -> dict[str, Any]:
         """The fields, as JSON; SI units, degrees."""
-        whole = {name: int(getattr(self, name)) for name in ("cells_per_face", "non_orthogonal_correctors")}
+        whole = {
+            name: int(getattr(self, name))
+            for name in ("cells_per_face", "non_orthogonal_correctors")
+        }
         fields = asdict(self).items()
         return {n: v if isinstance(v, str) else float(v) for n, v in fields} | whole
 
@@ -172,9 +179,9 @@ class FlowCase(Case):
             lidHeight=LID_OVER_HEIGHT * self.height_m,
             roughnessLength=self.roughness_m,
             viscosity=self.viscosity_m2_s,
-            turbulence_model=self.turbulence_model,
-            convection_scheme=self.convection_scheme,
-            non_orthogonal_correctors=self.non_orthogonal_correctors,
+            turbulence=self.turbulence_model,
+            convection=self.convection_scheme,
+            correctors=self.non_orthogonal_correctors,
         )
         _set_values(
             directory / "parameters.geo",

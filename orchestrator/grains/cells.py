@@ -27,7 +27,7 @@ GRAVITY = 9.81
 WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 """The reference grain of a deck, SI; GRAVITY is its g'."""
 LAST = 1.2
-"""Flow of the last hold: a grain that still lies then contradicts the closed form by 20 %."""
+"""Flow of the last load step: a grain that still lies then contradicts the closed form by 20 %."""
 SPACING = 3.0
 """Of the cells across the flow, diameters: grains of two cells never meet."""
 UNUSED = {"fractions", "final_fraction"}
@@ -62,7 +62,7 @@ class SingleGrainCase(GrainCase):
         return self.scenes[0].grain
 
     def write(self, directory: Path, cases: Path) -> None:
-        """Write the grains with their forces, and the holds of the protocol."""
+        """Write the grains with their forces, and the load steps of the protocol."""
         rules = self.scenes[0].protocol
         parameters = {
             "diameter": DIAMETER,
@@ -120,7 +120,7 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray]:
 
 
 def flows(scene: Scene) -> FloatArray:
-    """Friction velocity of the settling and of each hold, over that of the closed form."""
+    """Friction velocity of the settling and of each load step, over that of the closed form."""
     return protocol.flows(protocol.START, LAST, scene.protocol.load_increment)
 
 

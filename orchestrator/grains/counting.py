@@ -1,7 +1,7 @@
 """The counting rule: which of the counted grains have moved, gone back or been carried off.
 
 Its words are in docs/benchmark.md, "The counting rule"; the deck in.bed holds the same marker to
-know when a hold may end, and its counts are compared with those of this rule.
+know when a load step may end, and its counts are compared with those of this rule.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,18 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Count:
-    """What N counted grains have done by each of T looks. What is once true stays true.
+    """What N counted grains have done by each of T samples. What is once true stays true.
 
     Attributes
     ----------
     moved : ndarray of bool, shape (T, N)
-        Displaced downstream by the marker at a look, or carried off.
+        Displaced downstream by the displacement criterion at a sample, or carried off.
     fallen : ndarray of bool, shape (T, N)
-        Displaced upstream by the marker at a look. Such a grain has not moved, but may yet.
+        Displaced upstream by the displacement criterion at a sample. Such a grain has not moved,
+        but may yet.
     carried : ndarray of bool, shape (T, N)
-        Gone without having been seen beyond the marker: the flow lifted it off the pile.
+        Gone without having been seen beyond the displacement criterion: the flow lifted it off the
+        pile.
     """
 
     moved: BoolArray
@@ -44,7 +46,8 @@ def count(travel: FloatArray, marker: float, *, falls_out: bool) -> Count:
     marker : float
         Displacement that counts as motion, d.
     falls_out : bool
-        What it means that a grain is gone which was not seen beyond the marker: from the two
+        What it means that a grain is gone which was not seen beyond the displacement criterion:
+        from the two
         neighbours of a single grain it fell upstream, for no bed is there to hold it; only lift
         can have taken it from a pile.
     """
@@ -56,7 +59,7 @@ def count(travel: FloatArray, marker: float, *, falls_out: bool) -> Count:
 
 
 def deck_counts(travel: FloatArray, marker: float) -> tuple[IntArray, IntArray]:
-    """What the deck prints at each look, shape (T,): grains short of the marker, grains fallen."""
+    """What the deck prints at each sample, shape (T,): grains short of the criterion; fallen."""
     return (travel < marker).sum(axis=1), (travel <= -marker).sum(axis=1)
 
 

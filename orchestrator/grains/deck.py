@@ -20,9 +20,9 @@ MEANING = {
     "stiffness": "K d/W, normal and tangential",
     "damping": "ratio of a collision",
     "time_step": "sqrt(m/K)",
-    "waiting_time": "a hold ends when nothing has passed for this long, sqrt(d/g')",
-    "sampling_interval": "time between two looks at the grains, sqrt(d/g')",
-    "settle": "time before the first hold, sqrt(d/g')",
+    "waiting_time": "a load step ends when nothing has passed for this long, sqrt(d/g')",
+    "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
+    "settle": "time before the first load step, sqrt(d/g')",
     "displacement_criterion": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
     "away": "displacement along the bed from which on a counted grain is gone, d",
@@ -92,7 +92,7 @@ def write(
     parameters : mapping
         Each becomes a variable of the deck.
     flows : ndarray, shape (holds + 1,)
-        The flow of the settling, then of each hold.
+        The flow of the settling, then of each load step.
     force : ndarray, shape (holds + 1, n, 2)
         The flow's force on each grain at these flows, N; only pushed grains feel one.
     margin : float

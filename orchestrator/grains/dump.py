@@ -21,7 +21,7 @@ BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 
 @dataclass(frozen=True)
 class Track:
-    """The counted grains at each look; arrays of shape (T, N), NaN for a grain that is gone.
+    """The counted grains at each sample; arrays of shape (T, N), NaN for a grain that is gone.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Track:
 
 
 def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Track:
-    """Read what the counted grains did at each look; arguments as in `read_passage`."""
+    """Read what the counted grains did at each sample; arguments as in `read_passage`."""
     ids = grains.counted_ids
     state = read_passage(directory, ids, samples)
     return _track(state, grains.along[ids - 1], grains.diameter)
@@ -46,8 +46,8 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
 def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> FloatArray:
     """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (5, T + 1, N).
 
-    First after settling, then at each look. NaN of a grain that is gone; one that the deck does
-    not list and that ``bed.dump`` has at the end of the hold is at rest where it had settled.
+    First after settling, then at each sample. NaN of a grain that is gone; one that the deck does
+    not list and that ``bed.dump`` has at the end of the load step is at rest where it had settled.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame)
     ids : ndarray of int, shape (N,)
         Ids of the counted grains, rising.
     looks : DataFrame
-        The deck's table of looks, T rows.
+        The deck's table of samples, T rows.
 
     Raises
     ------
@@ -87,9 +87,9 @@ def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame)
 
 
 def _left(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which counted grains there were at the end of each hold, shape (holds, N)."""
+    """Which counted grains there were at the end of each load step, shape (holds, N)."""
     bed = read_dump(directory / BED, BED_COLUMNS)
-    ends = samples.groupby("level")["step"].last().to_numpy(np.int64)
+    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
     if not np.array_equal(bed.steps, ends):
         raise SolverError(
             "it is not of these holds", where=str(directory / BED), remedy="run the case again"
@@ -103,9 +103,9 @@ def _left(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> NDA
 def _there(
     listed: NDArray[np.bool_], left: NDArray[np.bool_], samples: pd.DataFrame
 ) -> NDArray[np.bool_]:
-    """Which grains were there at each look: those that are listed, or seen later in the hold."""
+    """Which grains were there at each sample: listed ones, or seen later in the load step."""
     found = np.empty_like(listed)
-    for left_then, (_, one) in zip(left, samples.reset_index().groupby("level"), strict=True):
+    for left_then, (_, one) in zip(left, samples.reset_index().groupby("load_step"), strict=True):
         rows = one.index
         found[rows] = np.logical_or.accumulate(listed[rows][::-1])[::-1] | left_then
     return found

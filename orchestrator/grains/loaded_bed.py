@@ -22,7 +22,7 @@ from orchestrator.study.scene import Scene
 FloatArray = NDArray[np.float64]
 
 TOE = 0.05
-"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave without a force."""
+"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
 
 _packed = cache(packing.pile)
 
@@ -115,9 +115,9 @@ class LoadedBed:
         ndarray, shape (n,)
             Of the mean stress around each grain; positive is downstream.
         """
-        flow, d = self.scene.flow, self.scene.grain.diameter
-        length = max(d, forces.averaging_length * self.bed.height)
-        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, forces.stress)
+        how, d = self.scene.forces, self.scene.grain.diameter
+        length = max(d, how.averaging_length * self.bed.height)
+        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, how.stress)
         return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
 
     @property

@@ -1,4 +1,4 @@
-"""What the counted grains of a deck did: who passed the marker, at which flow, and how."""
+"""What the counted grains of a deck did: who moved, at which flow, and how."""
 
 from dataclasses import dataclass
 from io import StringIO
@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-LEVELS = "samples.csv"
+SAMPLES = "samples.csv"
 LOAD_STEPS = "load_steps.csv"
 MOTION = "motion.csv"
 MODES = ("none", "rolled", "slid", "lifted")
@@ -30,7 +30,7 @@ an entrainment angle of 60 degrees."""
 ROLLED = 0.5
 """A grain rolls when its spin makes at least this part of its speed, else it slides."""
 WINDOW = 5
-"""Looks from the passage of the marker on in which a grain may lift: 2 sqrt(d/g')."""
+"""Samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')."""
 
 
 @dataclass(frozen=True)
@@ -40,17 +40,18 @@ class Motion:
     Attributes
     ----------
     flow : ndarray, shape (levels + 1,)
-        The flow of each hold, rising, in the deck's unit; first the flow of the settling.
+        The flow of each load step, rising, in the deck's unit; first the flow of the settling.
     level : ndarray of int, shape (N,)
         Hold (index into `flow`) in which a grain moved by the rule of `counting`; 0 for never.
     fallen : ndarray of int, shape (N,)
-        Hold in which a grain was first a marker's length upstream of its place; 0 for never.
+        Load step in which a grain was first the criterion upstream of its place; 0 for never.
     carried : ndarray of bool, shape (N,)
-        Whether it moved by being carried off: it was gone before it was seen beyond the marker.
+        Whether it moved by being carried off: it was gone before it was seen beyond the
+        displacement criterion.
     mode : ndarray of int, shape (N,)
         How it moved: index into `MODES`.
     exact : bool
-        Whether a grain moves at its level's very flow, as by a formula; else between the hold
+        Whether a grain moves at its level's very flow, as by a formula; else between the load step
         before and that one.
     """
 
@@ -85,7 +86,7 @@ class Motion:
         return self.flow if self.exact else self.flow[np.maximum(np.arange(len(self.flow)), 1) - 1]
 
     def moved_by(self, level: int) -> BoolArray:
-        """Which grains have moved by the end of a hold."""
+        """Which grains have moved by the end of a load step."""
         return (self.level > 0) & (self.level <= level)
 
     @property
@@ -95,17 +96,17 @@ class Motion:
 
     @property
     def fraction(self) -> FloatArray:
-        """n/N at the end of each hold, shape (levels + 1,)."""
+        """n/N at the end of each load step, shape (levels + 1,)."""
         return np.asarray(self.moved / self.count)
 
     @property
     def moved(self) -> IntArray:
-        """How many grains had moved by the end of each hold, shape (levels + 1,)."""
+        """How many grains had moved by the end of each load step, shape (levels + 1,)."""
         return self._counts(self.level)
 
     @property
     def fallen_upstream(self) -> IntArray:
-        """How many had been a marker's length upstream by then, shape (levels + 1,)."""
+        """How many had been the displacement criterion upstream by then, shape (levels + 1,)."""
         return self._counts(self.fallen)
 
     @property
@@ -114,13 +115,13 @@ class Motion:
         return self._counts(np.where(self.carried, self.level, 0))
 
     def _counts(self, level: IntArray) -> IntArray:
-        """How many grains had their level by the end of each hold."""
+        """How many grains had their level by the end of each load step."""
         counts = np.bincount(level, minlength=len(self.flow))
         counts[0] = 0
         return np.cumsum(counts)
 
     def to_csv(self, directory: Path, grains: GrainTable) -> None:
-        """Write ``holds.csv`` and ``motion.csv``: the same, for people and for `from_csv`."""
+        """Write ``load_steps.csv`` and ``motion.csv``: the same, for people and for `from_csv`."""
         load_steps = pd.DataFrame({"load_step": np.arange(len(self.flow)), "flow": self.flow})
         load_steps = load_steps.assign(
             moved=self.moved,
@@ -169,12 +170,12 @@ def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool)
     SolverError
         If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
     """
-    samples = _looks(directory)
+    samples = _samples(directory)
     track = read_track(directory, grains, samples)
     _reconcile(directory, samples, track, marker)
     found = counting.count(track.travel, marker, falls_out=falls_out)
-    load_step = samples["level"].to_numpy(np.int64)
-    flow = samples.groupby("level")["flow"].first().to_numpy(float)
+    load_step = samples["load_step"].to_numpy(np.int64)
+    flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
     return Motion(
         flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
         level=_first(found.moved, load_step),
@@ -189,12 +190,12 @@ def _first(happened: BoolArray, load_step: IntArray) -> IntArray:
 
 
 def _mode(track: Track, found: Count) -> IntArray:
-    """How each grain moved, from its track around the look at which it was found to have moved."""
+    """How each grain moved, from its track around the sample at which it had moved."""
     passed = found.moved
     samples = np.arange(len(passed))[:, None]
     first = np.where(passed.any(axis=0), passed.argmax(axis=0), -1)
     present = ~np.isnan(track.travel)
-    # one that was gone by then is judged by its last look
+    # one that was gone by then is judged by its last sample
     last_seen = np.max(np.where(present & (samples <= first), samples, 0), axis=0)
     window = (samples >= last_seen) & (samples < first + WINDOW) & present
     rise = np.max(np.where(window, track.rise, -np.inf), axis=0)
@@ -207,29 +208,33 @@ def _mode(track: Track, found: Count) -> IntArray:
     )
 
 
-def _looks(directory: Path) -> pd.DataFrame:
-    path = directory / LEVELS
+def _samples(directory: Path) -> pd.DataFrame:
+    path = directory / SAMPLES
     try:
         text = path.read_text(encoding="ascii")
         samples = pd.read_csv(StringIO(text))
-        if samples.empty or not text.endswith("\n") or not np.isfinite(samples.to_numpy(float)).all():
+        if (
+            samples.empty
+            or not text.endswith("\n")
+            or not np.isfinite(samples.to_numpy(float)).all()
+        ):
             raise ValueError("it holds no whole line")
         return samples
     except (OSError, ValueError) as error:
         raise SolverError(
-            f"the table of holds cannot be read: {error}",
+            f"the table of load steps cannot be read: {error}",
             where=str(path),
             remedy="run the same command again",
         ) from None
 
 
 def _reconcile(directory: Path, samples: pd.DataFrame, track: Track, marker: float) -> None:
-    """Lying, fallen and gone make N at each look, by the deck's own count and by the places."""
+    """Lying, fallen and gone make N at each sample, by the deck's own count and by the places."""
     lying, fallen = counting.deck_counts(track.travel, marker)
     agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
         raise SolverError(
             f"the counts do not reconcile at look {int(agree.argmin()) + 1}",
-            where=str(directory / LEVELS),
+            where=str(directory / SAMPLES),
             remedy="grains were lost, or the tables are of different runs",
         )

@@ -25,7 +25,7 @@ Place = tuple[float, float]
 TOUCH = 1e-3
 """Two grains closer than this touch, d."""
 REACH = 2.4
-"""Only grains this near can touch one on its way to the marker, d."""
+"""Only grains this near can touch one on its way to the displacement criterion, d."""
 MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
 
@@ -149,7 +149,7 @@ class _Climb:
     marker: float
 
     def needed(self) -> tuple[float, list[Place]]:
-        """The least flow that takes it to the marker, and the neighbours that it rolls over."""
+        """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
         place, pivot = self.start, self._foremost()
         flow, way = 0.0, []
         while pivot is not None:
@@ -174,7 +174,7 @@ class _Climb:
         return self.push.flow_to_reach(math.cos(lean), math.sin(lean), math.sin(lean))
 
     def _next(self, place: Place, pivot: Place) -> tuple[Place, Place] | None:
-        """Where the grain, rolling over its pivot, meets another before the marker, and which."""
+        """Where the grain, rolling over its pivot, meets another before the criterion; which."""
         turned = math.atan2(place[1] - pivot[1], place[0] - pivot[0])
         meetings = [m for m in self._meetings(pivot) if -1.0 < m[0] < turned - 1e-9]
         if not meetings:

@@ -52,7 +52,7 @@ class PileCase(GrainCase):
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
     def write(self, directory: Path, cases: Path) -> None:
-        """Write the grains with their forces, and the holds of the protocol."""
+        """Write the grains with their forces, and the load steps of the protocol."""
         ratio = self.loaded.ustar_over_ustar0(cases)
         flows = self._flows(ratio)
         force = self.loaded.loading(ratio).in_steps(flows.tolist())
@@ -60,7 +60,7 @@ class PileCase(GrainCase):
         deck.write(directory, self._grains, self._numbers, flows, force, margin=margin)
 
     def _flows(self, ratio: FloatArray) -> FloatArray:
-        """The flow of the settling, then of each hold: from before the first grain goes."""
+        """The flow of the settling, then of each load step: from before the first grain goes."""
         bed, rules = self.loaded, self.scene.protocol
         thresholds = np.sort(peeling.of_bed(bed, ratio))
         if not 0 < thresholds[0] < np.inf or self.scene.forces.loaded_grains != "exposed":
@@ -69,7 +69,9 @@ class PileCase(GrainCase):
         last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
         if not np.isfinite(last):
             last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-        return protocol.flows(protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment)
+        return protocol.flows(
+            protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment
+        )
 
     @property
     def _numbers(self) -> dict[str, float | int]:
@@ -94,7 +96,9 @@ class PileCase(GrainCase):
         self.check(directory)
         grain = self.scene.grain
         rest.check(directory, self._grains, self.scene.weight, grain.stiffness, all_rest=True)
-        found = motion.read(directory, self._grains, self.scene.protocol.displacement_criterion, falls_out=False)
+        found = motion.read(
+            directory, self._grains, self.scene.protocol.displacement_criterion, falls_out=False
+        )
         found.to_csv(directory, self._grains)
 
     @cached_property

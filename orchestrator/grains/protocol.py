@@ -10,21 +10,21 @@ from orchestrator.study.parts import Grain, Protocol
 FloatArray = NDArray[np.float64]
 
 SAMPLING_INTERVAL = 0.5
-"""Time between two looks at the grains, sqrt(d/g')."""
+"""Time between two samples of the grains, sqrt(d/g')."""
 SETTLE = 10.0
-"""Time in which the bed settles before the first hold, sqrt(d/g')."""
+"""Time in which the bed settles before the first load step, sqrt(d/g')."""
 SETTLE_FLOW = math.sqrt(0.5)
-"""Flow of the settling over that of the first hold: about half of its force. Without any, a bed
-at its limiting slope would not come to rest."""
+"""Flow of the settling over that of the first load step: about half of its force. Without any, a
+bed at its limiting slope would not come to rest."""
 START = 0.9
-"""Flow of the first hold over that of the first threshold by the pivot law."""
+"""Flow of the first load step over that of the first threshold by the pivot law."""
 STIR = 0.02
 """A counted grain that is no further from its place lies there, d: it is left out of the dump."""
 AWAY = 10.0
 """A counted grain that has come so far along the bed is gone, d: those that it could still meet
 have left before it."""
 BEYOND = 1.2
-"""The last hold's flow over that at which the pivot law says that enough grains have moved."""
+"""The last load step's flow over that at which the pivot law says that enough grains have moved."""
 
 
 def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
@@ -38,14 +38,14 @@ def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
 
 
 def flows(first: float, last: float, step: float) -> FloatArray:
-    """The flow of the settling, then those of holds that rise by one factor.
+    """The flow of the settling, then those of load steps that rise by one factor.
 
     Parameters
     ----------
     first, last : float
-        Flow of the first hold, and the least that the last one must reach.
+        Flow of the first load step, and the least that the last one must reach.
     step : float
-        Relative rise from one hold to the next.
+        Relative rise from one load step to the next.
     """
     count = 1 + math.ceil(math.log(last / first) / math.log1p(step))
     rising = first * (1 + step) ** np.arange(count)
@@ -53,14 +53,14 @@ def flows(first: float, last: float, step: float) -> FloatArray:
 
 
 def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
-    """How the deck waits at a hold, looks at the grains and goes on to the next.
+    """How the deck waits at a load step, looks at the grains and goes on to the next.
 
     Parameters
     ----------
     protocol : Protocol
         Of the scene.
     enough : int
-        The sequence of holds ends early when no more than this many grains still lie.
+        The sequence of load steps ends early when no more than this many grains still lie.
     """
     return {
         "waiting_time": protocol.waiting_time,
@@ -74,7 +74,7 @@ def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
 
 
 def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
-    """Expected wall time of a deck, s: holds of twice the quiet time, 6e7 grain-steps a second.
+    """Expected wall time of a deck, s: holds of twice the waiting time, 6e7 grain-steps a second.
 
     Both figures are of piles of 80 to 770 counted grains on one core; fixed grains cost little.
     """

@@ -69,7 +69,7 @@ def check(
 
 
 def _judge(energy: FloatArray, where: str) -> None:
-    """See that grains which are all there are at rest; energy in W^2/K at each look."""
+    """See that grains which are all there are at rest; energy in W^2/K at each sample."""
     _, before, _, last = (float(part.mean()) for part in np.array_split(energy, 4))
     if last < NOISE or last < DECAY * before:
         return

@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Values that the holds enclose, arrays of one shape; NaN where a grain never moved.
+    """Values that the load steps enclose, arrays of one shape; NaN where a grain never moved.
 
     Attributes
     ----------
@@ -38,14 +38,14 @@ def of_grains(motion: Motion) -> Thresholds:
 
 @dataclass(frozen=True)
 class Curve:
-    """How a pile answers to the flow; arrays over the holds, shape (levels + 1,).
+    """How a pile answers to the flow; arrays over the load steps, shape (levels + 1,).
 
     Attributes
     ----------
     ustar0 : ndarray
         Undisturbed friction velocity, m/s.
     fraction : ndarray
-        n/N that had moved by the end of the hold.
+        n/N that had moved by the end of the load step.
     mean_tau : ndarray
         Mean signed wall stress over the grains that had moved, Pa; NaN before any had.
     """
@@ -56,7 +56,7 @@ class Curve:
 
 
 def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
-    """The fraction that moved and the mean stress on it, at each hold.
+    """The fraction that moved and the mean stress on it, at each load step.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def of_pile(
         return PileThreshold(fraction, *(math.nan,) * 5)
     half_a_grain = 0.5 / motion.count
     below = _first_level(motion, fraction - half_a_grain) or level
-    # where half a grain more was not reached, the interval is open: it ends at the last hold
+    # where half a grain more was not reached, the interval is open: it ends at the last load step
     above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.low[level] * motion.flow[level])
 

@@ -53,7 +53,7 @@ def draw(results: Results, folder: Folder) -> Iterator[tuple[Figure, bytes]]:
 
 
 def choose(passage: Passage, window: Window) -> NDArray[np.int64]:
-    """The looks that are shown, rising; none where no grain of the window moved."""
+    """The samples that are shown, rising; none where no grain of the window moved."""
     here = passage.exposed[0, :, 0] >= window[0]
     places = passage.exposed[:, here]
     stirred = np.linalg.norm(np.diff(places, axis=0), axis=-1) > STIR
@@ -74,7 +74,9 @@ def _gif(passage: Passage, window: Window, samples: NDArray[np.int64]) -> bytes:
     scene = Scene(passage, window)
     palette = _palette()
     frames = [
-        Image.fromarray(scene.frame(int(sample))).quantize(palette=palette, dither=Image.Dither.NONE)
+        Image.fromarray(scene.frame(int(sample))).quantize(
+            palette=palette, dither=Image.Dither.NONE
+        )
         for sample in samples
     ]
     times = [FRAME_MS] * (len(frames) - 1) + [LAST_MS]
@@ -104,7 +106,7 @@ def _palette() -> Image.Image:
 
 
 class Scene:
-    """Draws the crest at one look after the other: what stands still, once."""
+    """Draws the crest at one sample after the other: what stands still, once."""
 
     def __init__(self, passage: Passage, window: Window) -> None:
         self._passage = passage
@@ -127,7 +129,7 @@ class Scene:
         self._still = self._agg.copy_from_bbox(figure.bbox)
 
     def frame(self, sample: int) -> NDArray[np.uint8]:
-        """The picture at a look, (rows, columns, 3)."""
+        """The picture at a sample, (rows, columns, 3)."""
         found = self._passage.at(sample)
         here, colours = found.mobile & ~found.gone, marks.by_mode(found)
         self._gone.set(offsets=found.start[found.gone], edgecolor=marks.edges(found))
@@ -147,6 +149,6 @@ class Scene:
     def _said(self, found: Snapshot) -> str:
         count = len(self._passage.mode)
         return (
-            f"hold {found.load_step}: $u^\\star_0$ = {found.ustar0:.3f} m/s,  "
+            f"load step {found.load_step}: $u^\\star_0$ = {found.ustar0:.3f} m/s,  "
             f"$n/N$ = {found.moved}/{count} = {found.moved / count:.0%}"
         )

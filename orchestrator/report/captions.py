@@ -7,7 +7,7 @@ import pandas as pd
 
 from orchestrator.grains import motion
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.protocol import LOOK
+from orchestrator.grains.protocol import SAMPLING_INTERVAL
 from orchestrator.physics import curves
 from orchestrator.report import labels, reference, theory
 from orchestrator.report.results import Results, valid
@@ -19,7 +19,7 @@ DRAG_LAW = (
     "(Schiller and Naumann) holds."
 )
 HOLLOW = (
-    "Hollow markers: the forces are those of a closure that does not hold at the scene’s own "
+    "Hollow markers: the forces are those of a force law that does not hold at the scene’s own "
     "single-grain threshold (transition)."
 )
 
@@ -71,16 +71,17 @@ def _values(column: str, piles: Iterable[Pile]) -> str:
 
 
 def hold_protocol(rows: pd.DataFrame) -> str:
-    """How thresholds were found: by the hold protocol where DEM ran, else by what was run."""
+    """How thresholds were found: by the load step protocol where DEM ran, else by what was run."""
     held = rows[rows["answered_method"] == "dem"]
     rest = rows[rows["answered_method"] != "dem"]
     other = f"Without dynamics or holds: {labels.methods(rest)}." if len(rest) else ""
     if held.empty:
         return other
+    criterion = listed(held["answered_displacement_criterion"])
     return (
-        f"Hold protocol: u* is raised in steps of {listed(held['answered_step'], 100)} %, each "
-        f"flow is kept until for {listed(held['answered_quiet'])} √(d/g′) no grain has passed "
-        f"{listed(held['answered_marker'])} d along the bed; such a grain has moved. {other}"
+        f"Holding protocol: u* rises by {listed(held['answered_load_increment'], 100)} % from one "
+        f"load step to the next. A load step ends when no grain has passed {criterion} d along the "
+        f"bed for {listed(held['answered_waiting_time'])} √(d/g′); such a grain has moved. {other}"
     )
 
 
@@ -89,7 +90,8 @@ def grain_dem(points: pd.DataFrame, number: int) -> str:
     return (
         f"After Fig. {number} of the paper. Markers: thresholds of one mobile sphere on its two "
         "fixed neighbours, by LIGGGHTS; lines, band and curves as in the figure before. "
-        f"{hold_protocol(points)} Bars run from the last hold without to the first with motion; "
+        f"{hold_protocol(points)} Bars run from the last load step without to the first with "
+        f"motion; "
         f"most are smaller than the markers. {HOLLOW if not valid(points).all() else ''}"
     )
 
@@ -99,13 +101,14 @@ def accuracy(dem: pd.DataFrame) -> str:
     ratio = dem["ustar_m_s"] / dem["ustar_closed_form_m_s"] - 1
     holds = valid(dem)
     parts = []
-    for chosen, name in ((holds, "where its closure holds"), (~holds, "where it does not")):
+    for chosen, name in ((holds, "where its force law holds"), (~holds, "where it does not")):
         if ratio[chosen].notna().any():
             parts.append(f"{ratio[chosen].abs().max():.2%} {name}")
     return (
         "Friction velocity at the threshold by DEM over that of Eq. 3 or 5 with the same forces. "
-        "Bars: between the holds without and with motion, so a threshold met exactly lies within "
-        f"its bar. {'Panels differ in scale. ' if dem['step'].nunique() > 1 else ''}"
+        "Bars: between the load steps without and with motion, so a threshold met exactly lies "
+        "within "
+        f"its bar. {'Panels differ in scale. ' if dem['load_increment'].nunique() > 1 else ''}"
         f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
         + (HOLLOW if not holds.all() else "")
     )
@@ -128,7 +131,7 @@ def stress(results: Results, piles: list[Pile]) -> str:
 
 def averaged(piles: Iterable[Pile]) -> str:
     """The length of bed that the stress on a grain is averaged over."""
-    return f"max(d, {_values('average', piles)})"
+    return f"max(d, {_values('averaging_length', piles)})"
 
 
 def eq10_over_wall(results: Results, flow_cases: Iterable[str]) -> tuple[float, float]:
@@ -151,7 +154,8 @@ def fractions(rows: pd.DataFrame) -> str:
     """Of n/N against the flow."""
     return (
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
-        "had moved by the end of each hold (one marker), against Re* (left) and τ (right) of the "
+        "had moved by the end of each load step (one marker), against Re* (left) and τ (right) "
+        "of the "
         "mean signed wall stress over the grains that had moved, as in the paper: the mean falls "
         "where the next grains to move feel less. Dashed: forces of Eq. 2. "
         f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
@@ -185,9 +189,9 @@ def low_regime(rows: pd.DataFrame) -> str:
 def flow(piles: list[Pile]) -> str:
     """Of the picture of the flow."""
     return (
-        f"Steady turbulent flow by OpenFOAM ({_values('turbulence', piles)}, rough wall), at the "
-        f"last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other speeds "
-        "are taken to be similar. White: streamlines, the closed ones "
+        f"Steady turbulent flow by OpenFOAM ({_values('turbulence_model', piles)}, rough wall), at "
+        f"the last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other "
+        "speeds are taken to be similar. White: streamlines, the closed ones "
         "around the flow that runs back, at arbitrary spacing. Only the part near "
         "the pile is shown: the lid is at 10 h. To scale."
     )
@@ -208,15 +212,17 @@ def mesh(pile: Pile) -> str:
 def grains(pile: Pile, found: Snapshot, fraction: float) -> str:
     """Of the picture of the grains."""
     return (
-        f"After Fig. 13 of the paper. The first look at which {fraction:.0%} of the N = "
+        f"After Fig. 13 of the paper. The first sample at which {fraction:.0%} of the N = "
         f"{pile.packing.count} exposed windward grains had moved ({found.moved}): hold "
-        f"{found.hold}, u*₀ = {found.ustar0:.3g} m/s, {_forces(pile)} Above, colour is the "
+        f"{found.load_step}, u*₀ = {found.ustar0:.3g} m/s, {_forces(pile)} Above, colour is the "
         "distance from the grain’s place in the packing; a grain counts as moved from "
-        f"{pile.scene.protocol.displacement_criterion:g} d downstream along the bed. Below, colour and symbol are "
+        f"{pile.scene.protocol.displacement_criterion:g} d downstream along the bed. Below, "
+        f"colour and symbol are "
         f"how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which does not "
         "see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that had left "
         "the box, where they lay (without a symbol: not counted as moved). Other mobile grains, "
-        "most of which hardly move, are drawn at the end of the hold. Plain grey: the inside of "
+        "most of which hardly move, are drawn at the end of the load step. Plain grey: the "
+        "inside of "
         "the pile, which touches no mobile grain and is left out of the case."
     )
 
@@ -224,12 +230,15 @@ def grains(pile: Pile, found: Snapshot, fraction: float) -> str:
 def crest(pile: Pile, looks: int) -> str:
     """Of the animation."""
     return (
-        f"Exposed windward grains near the crest, u*₀ rising in holds; {_forces(pile)} Colour and "
-        f"symbol: how a grain moved, from {pile.scene.protocol.displacement_criterion:g} d on: {_modes()} Hollow: "
+        f"Exposed windward grains near the crest, u*₀ rising in load steps; {_forces(pile)} "
+        f"Colour and "
+        f"symbol: how a grain moved, from {pile.scene.protocol.displacement_criterion:g} d on: "
+        f"{_modes()} Hollow: "
         "left the box, where it lay (without a symbol: not counted as moved). The "
-        f"{looks} frames are looks of the deck, {LOOK:g} √(d/g′) apart where none is left out: "
-        "left out are those at which no grain moves near its place, so that grains jump or vanish "
-        "where time was skipped. Other mobile grains are drawn at the end of each hold."
+        f"{looks} frames are samples of the deck, {SAMPLING_INTERVAL:g} √(d/g′) apart where none "
+        "is left out: left out are those at which no grain moves near its place, so that grains "
+        "jump or vanish where time was skipped. Other mobile grains are drawn at the end of each "
+        "load step."
     )
 
 

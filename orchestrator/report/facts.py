@@ -86,7 +86,7 @@ def _case(name: object) -> str:
 
 
 def single_grains(results: Results) -> Sheet | None:
-    """How far DEM is from the closed form, by closure, whether it holds, and protocol."""
+    """How far DEM is from the closed form, by force law, whether it holds, and protocol."""
     found = by_dem(results.joined("single_grain"))
     if found.empty:
         return None
@@ -111,7 +111,7 @@ def single_grains(results: Results) -> Sheet | None:
         )
     head = (
         "forces",
-        "closure holds",
+        "force law holds",
         "protocol",
         "grains",
         "never moved",
@@ -197,8 +197,9 @@ def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
     transition = results.scenes["regime"] == "transition"
     if transition.any():
         found.append(
-            f"Scenes in the transition, where neither closure holds: {int(transition.sum())} of "
-            f"{len(transition)}. Both closures were run unless the study names one; their markers "
+            f"Scenes in the transition, where neither force law holds: {int(transition.sum())} of "
+            f"{len(transition)}. Both force laws were run unless the study names one; their "
+            f"markers "
             "are hollow."
         )
     thresholds = results.joined("pile_threshold")
@@ -239,7 +240,7 @@ def _stray_grains(results: Results) -> list[str]:
     if far.any():
         found.append(
             f"Single grains held more than 1 % from the closed form: {int(far.sum())}, of which "
-            f"{int((far & valid(grains)).sum())} where their closure holds."
+            f"{int((far & valid(grains)).sum())} where their force law holds."
         )
     if silent.any():
         found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
@@ -274,7 +275,7 @@ def checks(results: Results) -> Sheet | None:
         return None
     rows = [
         (
-            f"{one['alpha_deg']:g}°, {one['packing']}, {one['closure']}",
+            f"{one['alpha_deg']:g}°, {one['packing']}, {one['force_law']}",
             f"{1e3 * one['d_m']:g} mm",
             f"{one['fraction']:.0%}",
             f"{one['shields']:.4g}",

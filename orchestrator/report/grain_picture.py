@@ -47,7 +47,7 @@ class Shown:
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """One figure for each slope: of its largest grains, whose closure holds if any does.
+    """One figure for each slope: of its largest grains, whose force law holds if any does.
 
     None where that pile's flow is a theory's, which has no field to show.
     """

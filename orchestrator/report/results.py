@@ -15,7 +15,7 @@ from orchestrator.study.study import Study
 from orchestrator.tables import Tables
 
 RAMP_BELOW = 3.0
-"""Quiet time, sqrt(d/g'), below which a sequence of holds is a ramp."""
+"""Quiet time, sqrt(d/g'), below which a sequence of load steps is a ramp."""
 
 
 @dataclass(frozen=True)
@@ -95,5 +95,5 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def valid(table: pd.DataFrame) -> pd.Series:
-    """Whether the closure of each row holds at its scene's own single-grain threshold."""
+    """Whether the force law of each row holds at its scene's own single-grain threshold."""
     return pd.Series(np.asarray(table["force_law"] == table["regime"]), index=table.index)

@@ -21,7 +21,7 @@ from orchestrator.report.theory import Branch, drag_law_limit
 FloatArray = NDArray[np.float64]
 
 AIR_STYLES = ("-.", "--", (0, (1, 1)))
-RESULT = ("closed form", "points", "points, closure not valid")
+RESULT = ("closed form", "points", "points, force law not valid")
 """Marks of the artists that the limits of the axes must hold."""
 WATER = "water curve"
 
@@ -68,7 +68,7 @@ def label_lowest(axes: Sequence[Axes], label: str) -> None:
 
 
 def shade_transition(ax: Axes) -> None:
-    """Shade where neither closure holds, as far as the axes show it."""
+    """Shade where neither force law holds, as far as the axes show it."""
     left, right = ax.get_xlim()
     ax.set_xlim(left, right)
     left, right = max(left, LOW_BELOW), min(right, HIGH_FROM)
@@ -86,7 +86,7 @@ def mark_drag_law(ax: Axes, limit: float) -> None:
 
 
 def draw_branches(ax: Axes, branches: Sequence[Branch], colour: str) -> None:
-    """Closed-form lines: solid where the closure holds, dotted where neither does."""
+    """Closed-form lines: solid where the force law holds, dotted where neither does."""
     for branch in branches:
         for chosen, look, width in ((branch.valid, "-", 1.1), (branch.transition, ":", 0.9)):
             if chosen.any():
@@ -99,7 +99,7 @@ def draw_points(
 ) -> None:
     """Intervals and the rows' own markers, by the columns of x, y and its ends.
 
-    Hollow where the closure does not hold.
+    Hollow where the force law does not hold.
     """
     rows = rows[rows[columns[1]].notna()]
     x, y, low, high = (rows[column].to_numpy(float) for column in columns)
@@ -166,10 +166,10 @@ def point_entries(rows: pd.DataFrame) -> list[Artist]:
     markers = []
     for law_name in [name for name in LAWS if (rows["force_law"] == name).any()]:
         own = rows[rows["force_law"] == law_name]
-        name = f"{labels.methods(own)}, {labels.value('closure', law_name)}"
+        name = f"{labels.methods(own)}, {labels.value('force_law', law_name)}"
         markers.append((name, own[SHAPE].mode()[0], "0.2"))
     if not valid(rows).all():
-        markers.append(("hollow: closure does not hold", markers[-1][1], "white"))
+        markers.append(("hollow: force law does not hold", markers[-1][1], "white"))
     return [
         Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
         for label, m, face in markers

@@ -127,15 +127,15 @@ def _panel(
 
 
 def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
-    """u* of DEM over that of the closed form, a panel for each step of the holds."""
+    """u* of DEM over that of the closed form, a panel for each increment of the load steps."""
     ratio = dem["ustar_closed_form_m_s"]
     rows = dem.assign(
         value=dem["ustar_m_s"] / ratio,
         low=dem["ustar_low_m_s"] / ratio,
         high=dem["ustar_high_m_s"] / ratio,
     )
-    choices, rows, variants = parted(rows, *SHOWN, "z0_over_d", "step")
-    keys = ["step", *choices]
+    choices, rows, variants = parted(rows, *SHOWN, "z0_over_d", "load_increment")
+    keys = ["load_increment", *choices]
     panels = [part for _, part in split(rows, *keys)]
     figure = style.canvas(2.1 * len(panels) + 1.0)
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]

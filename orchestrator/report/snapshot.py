@@ -1,4 +1,4 @@
-"""The grains of a pile at one look of its deck, and at all of them."""
+"""The grains of a pile at one sample of its deck, and at all of them."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Snapshot:
-    """All n grains of a pile at one look of its deck; lengths in d.
+    """All n grains of a pile at one sample of its deck; lengths in d.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class Snapshot:
         How a counted grain moved, index into `orchestrator.grains.motion.MODES`: 0 while it has
         not, and for all others.
     hold : int
-        Number of the hold.
+        Number of the load step.
     ustar0 : float
-        Undisturbed friction velocity of the hold, m/s.
+        Undisturbed friction velocity of the load step, m/s.
     """
 
     start: FloatArray
@@ -58,18 +58,18 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Passage:
-    """What the grains of a pile did at each of the T looks of its deck; lengths in d.
+    """What the grains of a pile did at each of the T samples of its deck; lengths in d.
 
     Attributes
     ----------
     pile : Pile
         The pile.
     looks : DataFrame
-        The deck's table of looks, T rows.
+        The deck's table of samples, T rows.
     exposed : ndarray, shape (T + 1, N, 2)
         x and z of the counted grains, first after settling; NaN where one is gone.
     rest : ndarray, shape (holds, n, 2)
-        x and z of the mobile grains at the end of each hold, NaN for all others.
+        x and z of the mobile grains at the end of each load step, NaN for all others.
     passed : ndarray of bool, shape (T, N)
         Which counted grains have moved by then.
     mode : ndarray of int, shape (N,)
@@ -84,15 +84,17 @@ class Passage:
     mode: IntArray
 
     def first(self, fraction: float) -> int | None:
-        """The first look at which a fraction of the counted grains had moved, if any."""
+        """The first sample at which a fraction of the counted grains had moved, if any."""
         needed = max(math.ceil(fraction * len(self.mode) - 1e-9), 1)
         enough = np.flatnonzero(self.passed.sum(axis=1) >= needed)
         return int(enough[0]) if len(enough) else None
 
     def at(self, sample: int) -> Snapshot:
-        """The grains at a look: those not counted are known at the end of its hold only."""
+        """The grains at a sample: those not counted are known at the end of its load step only."""
         packing, row = self.pile.packing, self.samples.iloc[sample]
-        now = np.where(packing.mobile[:, None], self.rest[int(row["level"]) - 1], packing.centres)
+        now = np.where(
+            packing.mobile[:, None], self.rest[int(row["load_step"]) - 1], packing.centres
+        )
         now[packing.windward] = self.exposed[sample + 1]
         gone = np.isnan(now[:, 0])
         mode = np.zeros(len(now), np.int64)
@@ -104,7 +106,7 @@ class Passage:
             exposed=packing.windward,
             gone=gone,
             mode=mode,
-            load_step=int(row["level"]),
+            load_step=int(row["load_step"]),
             ustar0=float(row["flow"]),
         )
 
@@ -112,10 +114,10 @@ class Passage:
 def read(pile: Pile, cases: Path) -> Passage:
     """Read the dumps of a finished pile."""
     directory, d = cases / pile.case.name, pile.scene.grain.diameter
-    samples = pd.read_csv(directory / motion.LEVELS)
+    samples = pd.read_csv(directory / motion.SAMPLES)
     counted = np.flatnonzero(pile.packing.windward) + 1
     exposed = np.moveaxis(dump.read_passage(directory, counted, samples)[:2], 0, -1) / d
-    ends = samples.groupby("level")["step"].last().to_numpy(np.int64)
+    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
     bed = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS)
     rest = np.full((len(ends), len(pile.packing.centres), 2), np.nan)
     _place(rest, bed.rows, ends, d)

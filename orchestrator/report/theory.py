@@ -24,16 +24,16 @@ PARTICLE_REYNOLDS_LIMIT = 1000.0
 
 @dataclass(frozen=True)
 class Branch:
-    """One closure's line in the Shields diagram; arrays of one shape, Re* rising.
+    """One force law's line in the Shields diagram; arrays of one shape, Re* rising.
 
     Attributes
     ----------
-    closure : {"low", "high"}
+    force law : {"low", "high"}
         Eq. 3 or Eq. 5.
     reynolds, shields : ndarray
         Re* and tau at the threshold.
     valid, transition : ndarray of bool
-        Where the closure holds; where neither closure does.
+        Where the force law holds; where neither force law does.
     """
 
     law_name: Closure

@@ -24,7 +24,7 @@ def presets() -> Path:
 
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
-    *("log.*", "postProcessing", "polyMesh", "settling.csv", "levels.csv", "*.dump"),
+    *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
 )
 """What a run by hand in the template's own folder leaves there; it is no part of the template."""
 

@@ -49,7 +49,7 @@ KINDS = (STUDY, EXPERIMENT, RESULTS, PACK)
 
 @contextlib.contextmanager
 def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
-    """Make a directory, or take it up again, and hold it while the block runs.
+    """Make a directory, or take it up again, and load step it while the block runs.
 
     Parameters
     ----------

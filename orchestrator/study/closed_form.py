@@ -22,7 +22,7 @@ Force = Callable[[ArrayLike], FloatArray]
 """A force (N) of friction velocities (m/s)."""
 Key = tuple[str, tuple[float, ...]]
 
-PAPER = "auto"
+PAPER = "paper"
 """The paper's rule in a study file: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 _KNOWN: dict[Key, Threshold] = {}
 
@@ -123,5 +123,5 @@ def _under(scene: Scene, names: Iterable[str]) -> Iterator[Scene]:
     """The scene under each of some force laws."""
     parts = {part: getattr(scene, part) for part in Scene.model_fields}
     for name in names:
-        flow = scene.flow.model_copy(update={"force_law": name})
-        yield scene if name == scene.forces.law else Scene(**{**parts, "flow": flow})
+        forces = scene.forces.model_copy(update={"law": name})
+        yield scene if name == scene.forces.law else Scene(**{**parts, "forces": forces})

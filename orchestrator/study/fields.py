@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.info import Info, Scope
-from orchestrator.study.parts import Flow, Fluid, Grain, Part, PileBed, Protocol
+from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
 from orchestrator.study.scene import Scene
 
 PARTS: Mapping[str, type[Part]] = {
@@ -17,6 +17,7 @@ PARTS: Mapping[str, type[Part]] = {
     "grain": Grain,
     "bed": PileBed,
     "flow": Flow,
+    "forces": Forces,
     "protocol": Protocol,
 }
 """The tables of a study file; a bed of one grain has no field that a pile has not."""

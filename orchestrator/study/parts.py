@@ -258,7 +258,9 @@ class Forces(Part):
         ),
     ] = "wall"
     """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
-    averaging_length: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = 1 / 40
+    averaging_length: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = (
+        1 / 40
+    )
     """least length of bed that a grain's stress is averaged on: the crest's own value never
     converges with the mesh"""
     loaded_grains: Annotated[
@@ -315,7 +317,9 @@ class Protocol(Part):
         Info("displacement criterion", unit="d", scope="DEM and peeling", about="answer"),
     ] = 0.3
     """displacement along the bed from which a grain counts as moved"""
-    final_fraction: Annotated[Fraction, Info("last fraction", scope="DEM of piles", about="answer")] = 0.9
+    final_fraction: Annotated[
+        Fraction, Info("last fraction", scope="DEM of piles", about="answer")
+    ] = 0.9
     """fraction of the exposed grains that should have moved by the last load step"""
     fractions: Annotated[
         tuple[Fraction, ...], Info("fractions", "n/N", column="-", scope="piles")

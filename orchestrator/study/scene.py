@@ -12,6 +12,7 @@ from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.parts import (
     Flow,
     Fluid,
+    Forces,
     Grain,
     GrainBed,
     Part,
@@ -37,6 +38,7 @@ class Scene(Part):
     grain: Grain
     bed: Annotated[GrainBed | PileBed, Field(discriminator="kind")]
     flow: Flow = Flow()
+    forces: Forces = Forces()
     protocol: Protocol = Protocol()
 
     @model_validator(mode="after")

@@ -20,6 +20,7 @@ from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.renamed import RENAMED
 from orchestrator.study.scene import Scene, roughness_length
 
 PARTS = tuple(Scene.model_fields)
@@ -61,7 +62,7 @@ class Study:
     title : str
         A line for the page.
     groups : tuple of Group
-        In the file's order; every scene has its closure decided.
+        In the file's order; every scene has its force law decided.
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
     tolerance : float or None
@@ -277,6 +278,9 @@ def _explained(error: ValidationError, where: str) -> InputError:
         del path[1]  # the branch of the union, not a key of the file
     field = ".".join(path)
     given = first.get("input")
+    if first["type"] == "extra_forbidden" and field in RENAMED:
+        new = RENAMED[field]
+        return InputError("a former name", where=f"{where}: {field}", remedy=f"write {new}")
     if first["type"] == "extra_forbidden":
         return unknown_key(path[-1], _fields_beside(path), f"{where}: {field}")
     if first["type"] == "missing":

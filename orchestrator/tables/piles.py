@@ -80,7 +80,7 @@ def grains(answer: Answer) -> pd.DataFrame:
 
 
 def curve(answer: Answer) -> pd.DataFrame:
-    """The fraction of a pile that had moved, and the stress on it, at each hold."""
+    """The fraction of a pile that had moved, and the stress on it, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
     curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
     return pd.DataFrame(
@@ -135,7 +135,7 @@ def _levels(decision: Decision) -> Row:
 
 
 def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
-    """What the holds and the count enclose; at least the known error of the levels."""
+    """What the load steps and the count enclose; at least the known error of the levels."""
     return {
         "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - error))),
         "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + error))),

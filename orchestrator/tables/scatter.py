@@ -12,8 +12,9 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     """Add the scatter over seeds to the thresholds of piles, and widen their intervals by it.
 
     Half the range over the seeds, relative to their mean, is found for each set of piles that
-    differ in the seed alone: random gaps, or twins of a lattice, which differ by round-off. A pile
-    gets the largest one of the same rows, slope, closure and fraction; where the study ran no
+    differ in the seed alone: random gaps, or perturbed replicas of a lattice, which differ by
+    round-off. A pile
+    gets the largest one of the same rows, slope, force law and fraction; where the study ran no
     seeds, none, and its interval stays as it is.
     """
     if thresholds.empty:
@@ -25,7 +26,7 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     )
     table = table.merge(_scatter(table), on=SIMILAR, how="left", validate="many_to_one")
     wider = table["scatter"].fillna(0.0)
-    return table.drop(columns=["level", "twins"]).assign(
+    return table.drop(columns=["level", "replicas"]).assign(
         shields_low=table["shields_low"] * (1 - wider),
         shields_high=table["shields_high"] * (1 + wider),
     )
@@ -38,7 +39,7 @@ def _twins(scenes: pd.DataFrame) -> pd.Series:
 
 def _scatter(table: pd.DataFrame) -> pd.DataFrame:
     known = table[table["shields"].notna()]
-    groups = known.groupby([*SIMILAR, "twins"])["shields"]
+    groups = known.groupby([*SIMILAR, "replicas"])["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
     spread = spread[groups.count() > 1].rename("scatter")

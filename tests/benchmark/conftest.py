@@ -58,7 +58,7 @@ THEORY = """
 [flow]
 model = "hill"
 [forces]
-law = "{closure}"
+law = "{law}"
 [grain]
 diameter = {diameter}
 stiffness = 1e3
@@ -87,11 +87,11 @@ def _theory(folder: Path, **fields: object) -> Path:
 def lift_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
     folder = tmp_path_factory.mktemp("lift-off")
-    return _theory(folder, law_name="low", diameter=5e-4, bed="mobile_layers = 1")
+    return _theory(folder, law="low", diameter=5e-4, bed="mobile_layers = 1")
 
 
 @pytest.fixture(scope="session")
 def level_rows(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A pack of one pile of level rows, which empties in chains."""
     folder = tmp_path_factory.mktemp("level-rows")
-    return _theory(folder, law_name="high", diameter=5e-4, bed='packing = "horizontal"')
+    return _theory(folder, law="high", diameter=5e-4, bed='packing = "horizontal"')

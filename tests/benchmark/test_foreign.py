@@ -62,7 +62,9 @@ def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:
     subprocess.run(["lmp", "-in", "in.bed"], cwd=folder, check=True, capture_output=True)
     frames = (folder / "track.dump").read_text().split("ITEM: TIMESTEP\n")[1:]
     x = [float(frame.split()[-2]) for frame in frames]
-    load_steps = [int(line) for line in (folder / "looks.csv").read_text().split()[1:]]
-    # W/tan(60 degrees) lies between the forces of holds 2 and 3
-    moved = [load_step for load_step, now in zip(load_steps, x[1:], strict=True) if now - x[0] >= 0.3e-3]
+    load_steps = [int(line) for line in (folder / "samples.csv").read_text().split()[1:]]
+    # W/tan(60 degrees) lies between the forces of load steps 2 and 3
+    moved = [
+        load_step for load_step, now in zip(load_steps, x[1:], strict=True) if now - x[0] >= 0.3e-3
+    ]
     assert min(moved) == 3

@@ -95,8 +95,9 @@ WRONG = {
         FORMULA,
         "shields .*: there is no lift",
     ),
-    "the other closure": (
-        OTHER_SCENE.format("'closure': {'low': 'high', 'high': 'low'}[scene['closure']]") + TAIL,
+    "the other force law": (
+        OTHER_SCENE.format("'force_law': {'low': 'high', 'high': 'low'}[scene['force_law']]")
+        + TAIL,
         FORMULA,
         r"the forces are those of Eq\. [24] \(.*\), not of Eq\. [24] \(",
     ),

@@ -26,7 +26,7 @@ def _until(condition: Callable[[], object]) -> None:
 
 def _at_work(cases: Path) -> set[str]:
     """Cases that a solver of LIGGGHTS is in the middle of."""
-    begun = {path.parent.name for path in cases.glob("pile-*/levels.csv")}
+    begun = {path.parent.name for path in cases.glob("pile-*/samples.csv")}
     return begun - {path.parent.name for path in cases.glob("*/done.json")}
 
 

@@ -70,6 +70,7 @@ def _tables_of_a_pile() -> dict[str, dict[str, object]]:
         "protocol": {},
         "fluid": {},
         "flow": {},
+        "forces": {},
     }
 
 
@@ -98,8 +99,8 @@ def test_a_study_beyond_a_limit_is_refused_with_the_map(
     ("part", "field", "value"),
     [
         ("protocol", "waiting_time", 2.0),
-        ("protocol", "step", 0.1),
-        ("flow", "loaded_grains", "all but crest"),
+        ("protocol", "load_increment", 0.1),
+        ("forces", "loaded_grains", "all but crest"),
         ("flow", "convection_scheme", "upwind"),
     ],
 )

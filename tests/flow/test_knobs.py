@@ -46,12 +46,13 @@ def test_a_theory_is_not_refused_for_a_mesh_that_it_has_not(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("loaded_grains", "without"), [("exposed", []), ("all but crest", [-1]), ("all but toe", [0, 1, 2, 3])]
+    ("loaded_grains", "without"),
+    [("exposed", []), ("all but crest", [-1]), ("all but toe", [0, 1, 2, 3])],
 )
 def test_which_grains_carry_the_flows_force(
-    tmp_path: Path, forced: str, without: list[int]
+    tmp_path: Path, loaded_grains: str, without: list[int]
 ) -> None:
-    (pile,) = piles(f'model = "flat"\nforced = "{forced}"\n')
+    (pile,) = piles(f'model = "flat"\n[forces]\nloaded_grains = "{loaded_grains}"\n')
     face = pile.face(tmp_path)
     expected = np.ones(len(face.ids))
     expected[without] = 0
@@ -76,8 +77,15 @@ def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
 
 
 def test_the_solvers_knobs_reach_its_case() -> None:
-    (pile,) = piles('turbulence = "kOmegaSST"\nconvection = "upwind"\ncorrectors = 0\n')
-    assert (pile.flow.turbulence_model, pile.flow.convection_scheme, pile.flow.non_orthogonal_correctors) == (
+    (pile,) = piles(
+        'turbulence_model = "kOmegaSST"\nconvection_scheme = "upwind"\n'
+        "non_orthogonal_correctors = 0\n"
+    )
+    assert (
+        pile.flow.turbulence_model,
+        pile.flow.convection_scheme,
+        pile.flow.non_orthogonal_correctors,
+    ) == (
         "kOmegaSST",
         "upwind",
         0,

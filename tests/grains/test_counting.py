@@ -52,7 +52,7 @@ def _ends(*track: float, falls_out: bool = False) -> tuple[bool, bool, bool]:
         ((0.0, -0.3, -0.1), (False, True, False)),  # it lies further down
         ((0.0, -0.3, 0.3), (True, True, False)),  # and goes after all
         ((0.0, -0.4, GONE), (True, True, True)),  # lift took it, backwards
-        ((0.0, 0.0, GONE), (True, False, True)),  # straight up within one look
+        ((0.0, 0.0, GONE), (True, False, True)),  # straight up within one sample
     ],
 )
 def test_what_a_track_on_a_pile_counts_as(

@@ -60,8 +60,8 @@ def test_grains_at_their_places_need_no_line(tmp_path: Path, grains: deck.GrainT
     short, whole = (_run(tmp_path, stir) for stir in (0.02, 0.0))
     sizes = [(folder / dump.PASSAGE).stat().st_size for folder in (short, whole)]
     assert sizes[0] < sizes[1] / 2
-    samples = pd.read_csv(short / motion.LEVELS)
-    pd.testing.assert_frame_equal(samples, pd.read_csv(whole / motion.LEVELS))
+    samples = pd.read_csv(short / motion.SAMPLES)
+    pd.testing.assert_frame_equal(samples, pd.read_csv(whole / motion.SAMPLES))
     few, all_of_them = (dump.read_track(folder, grains, samples) for folder in (short, whole))
     gone = np.isnan(few.travel)
     np.testing.assert_array_equal(gone, np.isnan(all_of_them.travel))
@@ -80,4 +80,4 @@ def test_a_hold_without_its_grains_at_the_end(tmp_path: Path, grains: deck.Grain
     frames = (folder / dump.BED).read_text().split("ITEM: TIMESTEP")
     (folder / dump.BED).write_text("ITEM: TIMESTEP".join(frames[:-1]))
     with pytest.raises(SolverError, match=r"bed.dump: it is not of these holds"):
-        dump.read_track(folder, grains, pd.read_csv(folder / motion.LEVELS))
+        dump.read_track(folder, grains, pd.read_csv(folder / motion.SAMPLES))

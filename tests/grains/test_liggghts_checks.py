@@ -20,7 +20,7 @@ def _number(said: str, label: str) -> float:
 @pytest.mark.parametrize("damping", [0.05, 0.1, 0.3])
 def test_restitution_of_a_head_on_collision(run_check: Deck, damping: float) -> None:
     # the contact ends where the force does, not the overlap: the phase then is pi - 2 asin(zeta)
-    said = run_check("in.collision", damping=damping, timestep=0.01)
+    said = run_check("in.collision", damping=damping, time_step=0.01)
     phase = math.pi - 2 * math.asin(damping)
     exact = math.exp(-damping / math.sqrt(1 - damping**2) * phase)
     assert _number(said, "restitution") == pytest.approx(exact, rel=0.01)
@@ -44,7 +44,7 @@ def test_sphere_slides_on_a_steep_incline(run_check: Deck, angle: float) -> None
 
 @pytest.mark.parametrize("speed", [1.0, 2.0, 5.0])
 def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
-    said = run_check("in.sliding", speed=speed, timestep=0.02)
+    said = run_check("in.sliding", speed=speed, time_step=0.02)
     assert _number(said, "speed at half the time") == pytest.approx(6 / 7, rel=0.01)
     assert _number(said, "speed when it rolls") == pytest.approx(5 / 7, rel=0.01)
     assert _number(said, "spin when it rolls") == pytest.approx(5 / 7, rel=0.01)
@@ -53,8 +53,8 @@ def test_sliding_start_ends_in_rolling(run_check: Deck, speed: float) -> None:
 @pytest.mark.parametrize("push", [1.5, 2.0, 3.0])
 @pytest.mark.parametrize("displacement_criterion", [0.3, 0.5])
 def test_a_pushed_grain_passes_the_marker_in_time(
-    run_check: Deck, push: float, marker: float
+    run_check: Deck, push: float, displacement_criterion: float
 ) -> None:
-    said = run_check("in.passing", push=push, marker=marker)
-    exact = passing_time(push, marker)
+    said = run_check("in.passing", push=push, displacement_criterion=displacement_criterion)
+    exact = passing_time(push, displacement_criterion)
     assert _number(said, "time of passing") == pytest.approx(exact, rel=0.005)

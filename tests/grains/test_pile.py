@@ -69,7 +69,7 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
 def test_it_empties_from_the_crest_down(slow: Pile, cases: Path) -> None:
     motion, face = Motion.from_csv(cases / slow.case.name), slow.face(cases)
     moved = motion.level > 0
-    # from the crest to the toe no grain moves in an earlier hold than the one above it
+    # from the crest to the toe no grain moves in an earlier load step than the one above it
     downward = np.argsort(-face.arc_length[moved])
     load_steps = motion.level[moved][downward]
     assert load_steps[0] == load_steps.min()

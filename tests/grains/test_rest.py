@@ -33,13 +33,13 @@ def grains() -> GrainTable:
     )
 
 
-def _settled(folder: Path, *, timestep: float, damping: float) -> Path:
+def _settled(folder: Path, *, time_step: float, damping: float) -> Path:
     """The template's pile with a contact law of its own, run to its end."""
     copy = folder / "bed"
     shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
     text = (copy / "parameters.liggghts").read_text()
     for name, value in (
-        ("time_step", timestep),
+        ("time_step", time_step),
         ("damping", damping),
         ("stiffness", STIFFNESS),
     ):
@@ -54,7 +54,7 @@ def _check(directory: Path, grains: GrainTable, *, all_rest: bool = True) -> Non
 
 
 def test_a_bed_comes_to_rest(tmp_path: Path, grains: GrainTable) -> None:
-    found = _settled(tmp_path, timestep=0.3, damping=0.1)
+    found = _settled(tmp_path, time_step=0.3, damping=0.1)
     _check(found, grains)
     energy = rest.read(found)["ke"] / grains.mobile_count / (WEIGHT * DIAMETER) * STIFFNESS
     assert energy.iloc[-5:].mean() < 0.01 * rest.NOISE
@@ -62,7 +62,7 @@ def test_a_bed_comes_to_rest(tmp_path: Path, grains: GrainTable) -> None:
 
 
 def test_a_step_far_too_large_throws_the_grains_out(tmp_path: Path, grains: GrainTable) -> None:
-    found = _settled(tmp_path, timestep=1.2, damping=0.1)
+    found = _settled(tmp_path, time_step=1.2, damping=0.1)
     for all_rest in (True, False):
         with pytest.raises(Exploded, match=r"settling.csv: the bed burst .* protocol.time_step"):
             _check(found, grains, all_rest=all_rest)
@@ -70,15 +70,15 @@ def test_a_step_far_too_large_throws_the_grains_out(tmp_path: Path, grains: Grai
 
 @pytest.mark.parametrize(("time_step", "damping"), [(0.6, 0.1), (0.5, 0.2), (0.4, 0.3)])
 def test_a_step_too_large_keeps_the_grains_moving(
-    tmp_path: Path, grains: GrainTable, timestep: float, damping: float
+    tmp_path: Path, grains: GrainTable, time_step: float, damping: float
 ) -> None:
-    found = _settled(tmp_path, timestep=timestep, damping=damping)
+    found = _settled(tmp_path, time_step=time_step, damping=damping)
     with pytest.raises(Noisy, match="the bed does not come to rest"):
         _check(found, grains)
 
 
 def test_energy_that_grows(tmp_path: Path, grains: GrainTable) -> None:
-    found = _settled(tmp_path, timestep=0.2, damping=0.7)
+    found = _settled(tmp_path, time_step=0.2, damping=0.7)
     # a noisy run goes up and down by chance; made to grow, it is another kind of failure
     table = rest.read(found)
     growing = table["ke"].sort_values().to_numpy() * np.linspace(1, 4, len(table))
@@ -88,7 +88,7 @@ def test_energy_that_grows(tmp_path: Path, grains: GrainTable) -> None:
 
 
 def test_grains_that_are_lost(tmp_path: Path, grains: GrainTable) -> None:
-    found = _settled(tmp_path, timestep=0.3, damping=0.1)
+    found = _settled(tmp_path, time_step=0.3, damping=0.1)
     one_more = np.append(grains.kind, grains.kind.max())
     with pytest.raises(Exploded, match="1 of 47 grains were lost before the flow rose"):
         _check(found, replace(grains, kind=one_more))

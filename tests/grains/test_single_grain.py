@@ -59,7 +59,8 @@ def test_threshold_of_the_pivot_law_in_both_regimes_from_one_run(tmp_path: Path)
 
 
 def test_a_bed_has_no_scale(tmp_path: Path) -> None:
-    # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the hold
+    # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the load
+    # step
     text = """
     forces = { law = "high" }
     protocol = { load_increment = 0.002 }
@@ -118,7 +119,7 @@ def _failure(tmp_path: Path, limit_s: float = 120.0) -> str:
 
 def test_a_solver_that_loses_every_grain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # LIGGGHTS itself ends with 0: a spring that is too stiff for the step throws all grains out
-    script = "sed -i 's/timestep equal 0.2/timestep equal 3.0/' parameters.liggghts"
+    script = "sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts"
     _before_liggghts(tmp_path, monkeypatch, script)
     assert "lost" in _failure(tmp_path)
 
@@ -130,7 +131,7 @@ def test_a_solver_that_refuses_its_input(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_a_solver_that_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # the shell that becomes the solver leaves a child that kills it once it is at work
-    script = "pid=$$\n(until [ -s levels.csv ]; do sleep 0.01; done; kill -KILL $pid) &"
+    script = "pid=$$\n(until [ -s samples.csv ]; do sleep 0.01; done; kill -KILL $pid) &"
     _before_liggghts(tmp_path, monkeypatch, script)
     assert "before its protocol did" in _failure(tmp_path)
 
@@ -153,7 +154,7 @@ def test_tables_cut_short_are_not_trusted(tmp_path: Path, name: str) -> None:
 
 
 def test_a_grain_that_falls_back_and_leaves_has_not_moved(tmp_path: Path) -> None:
-    # at the limiting slope the low closure's lift carries a large grain before its drag holds it
+    # at the limiting slope the low force law's lift carries a large grain before its drag holds it
     text = """
     grain = { diameter = 3e-4 }
     bed = { slope_deg = 30.0 }

@@ -30,7 +30,7 @@ def test_a_grain_that_fell_upstream_has_not_moved() -> None:
 
 
 def test_a_threshold_says_what_share_of_its_grains_lift_carried_off() -> None:
-    carried = np.arange(10) < 4  # all of the first hold, two of the three of the second
+    carried = np.arange(10) < 4  # all of the first load step, two of the three of the second
     motion = Motion(FLOW, LEVEL, NONE, carried, NONE)
     np.testing.assert_array_equal(motion.carried_off, [0, 2, 4, 4, 4])
     shares = [threshold.of_pile(motion, SPEED, n, DENSITY).carried_off for n in (0.1, 0.4, 0.95)]

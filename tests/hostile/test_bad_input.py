@@ -17,7 +17,7 @@ from pydantic import BaseModel
 from orchestrator import cli
 from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.runs import case
-from orchestrator.study.parts import Flow, Fluid, Grain, GrainBed, PileBed, Protocol
+from orchestrator.study.parts import Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.scene import Scene
 
 Words = tuple[int, str]
@@ -69,6 +69,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "grain": Grain,
     "bed": PileBed,
     "flow": Flow,
+    "forces": Forces,
     "protocol": Protocol,
 }
 VALUES = {
@@ -275,7 +276,7 @@ def test_directories_with_any_state(
 @given(state=_state())
 def test_a_case_with_any_marker_is_not_done(shell: Shell, state: object) -> None:
     one = SingleGrainCase(
-        (Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), flow=Flow(law_name="low")),)
+        (Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), forces=Forces(law="low")),)
     )
     directory = shell.folder / one.name
     directory.mkdir(exist_ok=True)
@@ -313,7 +314,8 @@ def test_names_reach_no_shell_and_no_path(shell: Shell, stem: str) -> None:
     groups = "".join(f"[[group]]\nname = {json.dumps(name)}\n" for name in NAMES)
     title = json.dumps("<b>".join(NAMES))
     source.write_text(
-        f"title = {title}\n{GRAIN}[protocol]\nstep = 0.2\nquiet = 3.0\n{groups}", encoding="utf-8"
+        f"title = {title}\n{GRAIN}[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n{groups}",
+        encoding="utf-8",
     )
     code, said = shell.run("study", f"./{source}")
     assert code == 0, said
@@ -356,7 +358,7 @@ def test_real_processes_say_it_in_one_line(tmp_path: Path) -> None:
 
 def test_names_that_are_no_text(tmp_path: Path) -> None:
     source, out = tmp_path / os.fsdecode(b"\xff\xfe.toml"), os.fsdecode(b"out\xff")
-    source.write_text(GRAIN + "[protocol]\nstep = 0.2\nquiet = 3.0\n")
+    source.write_text(GRAIN + "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n")
     ended = _process(tmp_path, "study", str(source), "--out", out)
     assert ended.returncode == 0, ended.stderr
     assert Path(os.fsdecode(ended.stdout.rstrip(b"\n"))) == tmp_path / out / "report.html"

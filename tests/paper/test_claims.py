@@ -74,8 +74,23 @@ def test_pairs_agree_in_all_else() -> None:
 @pytest.mark.parametrize(
     "column",
     [
-        *("flow_model", "turbulence_model", "convection_scheme", "loaded_grains", "averaging_length", "expansion_ratio", "method"),
-        *("first_cell_m", "time_step", "final_fraction", "answered_method", "answered_growth", "flow_level"),
+        *(
+            "flow_model",
+            "turbulence_model",
+            "convection_scheme",
+            "loaded_grains",
+            "averaging_length",
+            "expansion_ratio",
+            "method",
+        ),
+        *(
+            "first_cell_m",
+            "time_step",
+            "final_fraction",
+            "answered_method",
+            "answered_expansion_ratio",
+            "flow_level",
+        ),
     ],
 )
 def test_rows_that_differ_in_anything_else_are_no_pair(column: str) -> None:
@@ -112,7 +127,9 @@ def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Clai
     later = changed(
         results.tables,
         "pile_grain",
-        lambda t: t.assign(moved_in_hold=t["moved_in_load_step"].max() + 1 - t["moved_in_load_step"]),
+        lambda t: t.assign(
+            moved_in_load_step=t["moved_in_load_step"].max() + 1 - t["moved_in_load_step"]
+        ),
     )
     assert later["motion.order"].verdict == "not"
     low = changed(results.tables, "pile_threshold", lambda t: t.assign(shields=1e-9))

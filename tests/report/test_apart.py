@@ -25,7 +25,7 @@ def table() -> pd.DataFrame:
             "force_law": "high",
             "mobile_layers": [1, 2, 1, 1],
             "stiffness": [1e3, 1e3, 1e4, 1e3],
-            "step": [0.02, 0.03, 0.02, 0.02],
+            "load_increment": [0.02, 0.03, 0.02, 0.02],
             "seed": [1, 2, 3, 4],
         }
     )
@@ -56,7 +56,7 @@ def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
 
 
 def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
-    laws = table.assign(law_name=["high", "bridged", "zeng", "low"])
+    laws = table.assign(force_law=["high", "bridged", "zeng", "low"])
     _, rows, _ = apart.parted(laws, *SHOWN, "force_law", "mobile_layers", "stiffness")
     assert rows[SHAPE].tolist() == ["s", "^", "D", "o"]
 
@@ -107,10 +107,10 @@ def test_page_lists_every_parameter(results: Results) -> None:
 
 def test_captions_say_what_the_scene_has(results: Results) -> None:
     (pile,) = results.plan.piles.values()
-    flow = pile.scene.flow.model_copy(
-        update={"turbulence_model": "RNGkEpsilon", "averaging_length": 1 / 20, "speed": 7.0}
-    )
-    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon", "speed": 7.0})
+    forces = pile.scene.forces.model_copy(update={"averaging_length": 1 / 20})
+    changes = {"flow": flow, "forces": forces}
+    other = replace(pile, scene=pile.scene.model_copy(update=changes))
     assert "(k-ε, rough wall)" in captions.flow([pile])
     assert "(RNG k-ε, rough wall), at the last iteration, for U_e = 7 m/s" in captions.flow([other])
     assert f"{captions.averaged([pile])}" == "max(d, h/40)"
@@ -120,7 +120,7 @@ def test_captions_say_what_the_scene_has(results: Results) -> None:
 def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     rows = results.joined("pile_threshold")
     assert "steps of 5 %" in captions.hold_protocol(rows)
-    without = rows.assign(answered_method="pivot", answered_step=None, shape="s")
+    without = rows.assign(answered_method="pivot", answered_load_increment=None, shape="s")
     said = captions.hold_protocol(without)
     assert "Hold protocol" not in said
     assert "pivot" in said

@@ -93,7 +93,7 @@ def passage(results: Results) -> Passage:
 
 def test_grains_have_passed_as_the_tables_say(results: Results, passage: Passage) -> None:
     curve = results.tables["pile_curve"]
-    ends = np.flatnonzero(np.diff(passage.samples["level"], append=0))
+    ends = np.flatnonzero(np.diff(passage.samples["load_step"], append=0))
     assert passage.passed.sum(axis=1)[ends].tolist() == curve["moved"].tolist()[-len(ends) :]
     lost = passage.at(len(passage.samples) - 1)
     table = results.tables["pile_grain"]

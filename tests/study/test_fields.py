@@ -36,7 +36,7 @@ def other_value(one: Quantity, scene: Scene) -> Any:
     value = one.used(scene)
     if isinstance(value, str):
         words = one.info.choices or get_args(fields.declared(one).annotation)
-        return next(word for word in words if word not in (value, "auto"))
+        return next(word for word in words if word not in (value, "paper"))
     return value + 1 if isinstance(value, int) else 0.9 * value
 
 
@@ -85,7 +85,14 @@ def test_a_level_changes_fields_of_the_answer_alone(one: Level, scene: Scene) ->
 def test_what_has_no_effect_is_empty(scene: Scene) -> None:
     flat = changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
     row = fields.asked(flat)
-    empty = ("turbulence_model", "cells_per_face", "solve_u_e_m_s", "stiffness", "waiting_time", "displacement_criterion")
+    empty = (
+        "turbulence_model",
+        "cells_per_face",
+        "solve_u_e_m_s",
+        "stiffness",
+        "waiting_time",
+        "displacement_criterion",
+    )
     assert [row[column] for column in empty] == [None] * len(empty)
     assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
 
@@ -100,8 +107,8 @@ def test_a_row_says_what_was_asked_and_what_answered_it() -> None:
     assert fields.answered(planned.decisions[one.id].scene).items() <= row.items()
     assert row["method"] == "dem"
     assert row["answered_method"] != "dem"
-    assert row["step"] == 0.02
-    assert row["answered_step"] is None
+    assert row["load_increment"] == 0.02
+    assert row["answered_load_increment"] is None
 
 
 def test_what_is_left_open_is_worked_out_in_the_answer(scene: Scene) -> None:
@@ -133,5 +140,5 @@ def test_reference_says_ranges_and_defaults() -> None:
     assert "| > 0 | none: required |" in rows["| `diameter`"]
     assert "| > 0, ≤ 1 | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
     assert '| `"d/30"` | roughness length of the bed' in reference.text()
-    assert '<br>`"RNGkEpsilon"`: RNG k-ε<br>' in rows["| `turbulence`"]
-    assert '<br>`"upwind"`<br>' in rows["| `convection`"]
+    assert '<br>`"RNGkEpsilon"`: RNG k-ε<br>' in rows["| `turbulence_model`"]
+    assert '<br>`"upwind"`<br>' in rows["| `convection_scheme`"]

@@ -11,7 +11,9 @@ from orchestrator.errors import InputError
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
+from orchestrator.study.fields import FIELDS
 from orchestrator.study.parts import Grain, GrainBed, PileBed
+from orchestrator.study.renamed import RENAMED
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 
@@ -32,8 +34,8 @@ def _parse(text: str) -> study.Study:
 def test_axes_span_a_grid_in_the_files_order() -> None:
     found = _parse(
         """
-        [flow]
-        closure = "high"
+        [forces]
+        law = "high"
         [axes]
         "bed.slope_deg" = [0.0, 10.0]
         "grain.diameter" = [1e-3, 2e-3, 3e-3]
@@ -69,6 +71,15 @@ def test_a_law_that_turns_the_grain_is_for_pivots_alone() -> None:
     make_scene(_with_law("zeng", {"grain": fields}), "test")
 
 
+@pytest.mark.parametrize(("former", "present"), RENAMED.items())
+def test_a_former_key_is_refused_with_the_present_one_named(former: str, present: str) -> None:
+    part, _, field = former.partition(".")
+    assert present in {quantity.name for quantity in FIELDS}
+    text = f"[grain]\ndiameter = 1e-3\n[{part}]\n{field} = 1\n"
+    with pytest.raises(InputError, match=rf"{former}: a former name \(write {present}\)"):
+        study.parse(text, name="old", where="test")
+
+
 def test_an_unknown_law_is_named_with_the_known_ones() -> None:
     with pytest.raises(InputError, match=r"unknown force law 'bridge'.*bridged.*profile.*zeng"):
         make_scene(_with_law("bridge", {"grain": {"diameter": 1e-3}}), "test")
@@ -76,7 +87,7 @@ def test_an_unknown_law_is_named_with_the_known_ones() -> None:
 
 def _with_law(law: str, parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     empty: dict[str, dict[str, Any]] = {"fluid": {}, "bed": {}, "protocol": {}}
-    return {**empty, "flow": {"force_law": law}, **parts}
+    return {**empty, "flow": {}, "forces": {"law": law}, **parts}
 
 
 def test_the_transition_is_run_with_both_closures() -> None:
@@ -111,7 +122,10 @@ def test_defaults_are_the_papers() -> None:
     assert (scene.fluid.density, scene.fluid.viscosity, scene.fluid.gravity) == (1.0, 1e-5, 9.81)
     assert (scene.grain.density, scene.grain.friction_angle_deg) == (2500.0, 35.0)
     assert (scene.bed.height, scene.bed.entrainment_angle_deg) == (0.02, 60.0)
-    assert (scene.protocol.displacement_criterion, scene.protocol.fractions) == (0.3, (0.1, 0.3, 0.5, 0.7))
+    assert (scene.protocol.displacement_criterion, scene.protocol.fractions) == (
+        0.3,
+        (0.1, 0.3, 0.5, 0.7),
+    )
 
 
 def test_presets_are_studies() -> None:

@@ -9,7 +9,7 @@ from orchestrator.tables.scatter import with_scatter
 
 def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     # three seeds of one disordered pile, one regular pile of the same slope, one of another, and
-    # two of level rows: a lattice and its twin
+    # two of level rows: a lattice and its replica
     shields = [0.95, 1.0, 1.05, 2.0, 3.0, 1.8, 2.2]
     thresholds = pd.DataFrame(
         {

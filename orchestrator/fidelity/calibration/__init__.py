@@ -101,7 +101,7 @@ def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known
 def measured() -> dict[tuple[str, str, str], dict[float, Known]]:
     """What was measured, by part, level and class of scene, then by fraction."""
     found: dict[tuple[str, str, str], dict[float, Known]] = {}
-    with (FOLDER / "samples.csv").open(encoding="utf-8", newline="") as stream:
+    with (FOLDER / "levels.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):
             key = (row["part"], row["level"], row["scene_class"])
             numbers = (float(row[name]) for name in ("error", "uncertainty", "cost_core_s"))

@@ -22,7 +22,7 @@ BY_SHARE = (
     f"{1 - MOST:.0%} of each; else partly"
 )
 WAITING_TIME = 5.0
-"""Least quiet time of what is a hold rather than a ramp, sqrt(d/g')."""
+"""Least waiting time of what is a load step rather than a ramp, sqrt(d/g')."""
 NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that are answers by whatever method; the others show what DEM alone measures."""
@@ -88,7 +88,7 @@ class Evidence:
 
     @cached_property
     def grains(self) -> pd.DataFrame:
-        """Single grains whose closure holds, of any protocol."""
+        """Single grains whose force law holds, of any protocol."""
         table = self.joined("single_grain")
         return table[valid(table)]
 
@@ -103,7 +103,7 @@ class Evidence:
         return held[combination == combination.mode()[0]]
 
     def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
-        """A table of piles whose closure holds, of one packing and one stress."""
+        """A table of piles whose force law holds, of one packing and one stress."""
         table = self.joined(name)
         return table[valid(table) & (table["packing"] == packing) & (table["stress"] == stress)]
 
@@ -134,12 +134,17 @@ def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = (
     Returns
     -------
     DataFrame
-        A row for each pair: ``closure``, ``low`` and ``high`` of the column, and ``ratio``, the
+        A row for each pair: ``force_law``, ``low`` and ``high`` of the column, and ``ratio``, the
         value at the higher over that at the lower; NaN where one is missing.
     """
     same = others(table, along, *ignore)
     series = table.groupby(same, sort=True, dropna=False).ngroup()
-    columns = {"series": series, "force_law": table["force_law"], "x": table[along], "y": table[value]}
+    columns = {
+        "series": series,
+        "force_law": table["force_law"],
+        "x": table[along],
+        "y": table[value],
+    }
     ordered = pd.DataFrame(columns).sort_values(["series", "x"], kind="stable")
     low, high = ordered.iloc[:-1].reset_index(drop=True), ordered.iloc[1:].reset_index(drop=True)
     beside = (low["series"] == high["series"]) & (high["x"] > low["x"])

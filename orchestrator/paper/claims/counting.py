@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 FINE_M = 5e-4
 """Diameter above which the paper sees wiggles, m."""
 STEEP = 0.2
-"""Wiggles are looked for above this n/N: below it the curve rises too steeply for the holds."""
+"""Wiggles are sought above this n/N: below it the curve rises too steeply for load steps."""
 SMOOTH = np.array([-3, 12, 17, 12, -3]) / 35
 """Weights of five neighbours whose sum is the value of the parabola that fits them best."""
 WINDOW = 0.06
@@ -29,7 +29,8 @@ def wiggles(evidence: Evidence) -> Claim:
         "Wiggles for d > 0.5 mm, ascribed to counting few grains",
         "3.2, Fig. 14",
         tuple(_said(name, own) for name, own in parts if len(own)),
-        "wiggle: rms distance of n/N at a hold from the parabola through its five neighbours, for "
+        "wiggle: rms distance of n/N at a load step from the parabola through its five "
+        "neighbours, for "
         f"n/N ≥ {STEEP:.0%}; reproduced: in at least 95 % of the piles with d > 0.5 mm it is above "
         "the median of the others, and below one grain, 1/N; not: in at most 5 % each; else partly",
         _judged(*(own for _, own in parts)),
@@ -69,7 +70,7 @@ def _wiggle(fraction: FloatArray) -> float:
 
 
 def _pivot(own: pd.DataFrame, stress: FloatArray) -> FloatArray:
-    """The fraction at each hold if a grain goes at one local u*, once those above it are gone.
+    """The fraction at each load step if a grain goes at one local u*, once those above it are gone.
 
     That u* is set so that half of the grains have moved at the same flow as by DEM.
     """

@@ -45,7 +45,7 @@ def conditioning(evidence: Evidence) -> Claim:
     if len(over):
         measured.append(
             f"K d/W from {over.min():.2g} to {over.max():.2g}: u* changes by {spread:.2%} at most, "
-            "the holds’ step included"
+            "the load steps’ step included"
         )
     works = [float(far) < INSENSITIVE] if len(small) else []
     works += [spread < INSENSITIVE] if len(over) else []
@@ -103,7 +103,7 @@ def _paper_springs(evidence: Evidence) -> tuple[str, ...]:
 
 
 def regimes(evidence: Evidence) -> Claim:
-    """How much of the paper's own range the two closures and the drag law cover."""
+    """How much of the paper's own range the two force laws and the drag law cover."""
     scenes = evidence.scenes
     piles = scenes[(scenes["bed"] == "pile") & (scenes["nu_m2_s"] == scenes["nu_m2_s"].min())]
     own = piles.drop_duplicates(["alpha_deg", "d_m", "z0_over_d"])
@@ -117,11 +117,11 @@ def regimes(evidence: Evidence) -> Claim:
         "Two regimes, Eq. 2 and Eq. 4, give drag and lift for the diameters considered",
         "1.1 and 3.1 (the paper leaves 5 < Re* < 30 as a transition)",
         (*measured, *_beyond_drag_law(evidence)),
-        "judged on piles of all the paper’s diameters; reproduced: at least 95 % have a closure "
+        "judged on piles of all the paper’s diameters; reproduced: at least 95 % have a force law "
         "that holds at their own threshold; not: at most 5 %; else partly",
         by_share(own["regime"] != "transition") if _whole_range(own["d_m"]) else "no data",
         "Eq. 2 holds for Re* < 3, Eq. 4 from Re* = 30 on. In air grains of 0.1 to 0.3 mm "
-        "and some of 0.5 mm lie between: their results by either closure bracket nothing and are "
+        "and some of 0.5 mm lie between: their results by either force law bracket nothing and are "
         "drawn hollow. The drag law of Eq. 4 is a fit up to a particle Reynolds number of about "
         "1000.",
         ("extended-shields", "dem-horizontal"),

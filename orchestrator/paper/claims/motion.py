@@ -36,7 +36,8 @@ def order(evidence: Evidence) -> Claim:
         "3.2, Fig. 13",
         (*_order_said(found, "rows along the slope"), *other),
         f"judged on rows along the slope; reproduced: in at least {MOST:.0%} of the piles the "
-        "first hold that moves any grain moves the topmost tenth’s, and the rank correlation of "
+        "first load step that moves any grain moves the topmost tenth’s, and the rank "
+        "correlation of "
         f"place and order is {RANKED:g} or less; not: in at most 5 %; else partly",
         by_share(answers),
         "The stress is largest at the crest and a grain needs its downstream neighbour gone: one "
@@ -71,10 +72,11 @@ def _order_said(found: pd.DataFrame, name: str) -> tuple[str, ...]:
     if found.empty:
         return ()
     return (
-        f"{name}, {len(found)} piles: rank correlation of place (from the toe) and hold of the "
+        f"{name}, {len(found)} piles: rank correlation of place (from the toe) and load step of "
+        f"the "
         f"passage {found['rank'].median():.3f} in the median (worst {found['rank'].max():.3f}); "
-        f"neighbours in order {found['in_order'].median():.1%}, those that go in one hold "
-        "included; the first hold with motion moves "
+        f"neighbours in order {found['in_order'].median():.1%}, those that go in one load step "
+        "included; the first load step with motion moves "
         f"one of the topmost tenth in {int((found['first'] > CREST).sum())} of {len(found)}; "
         f"{found['still'].sum() / found['count'].sum():.0%} of the grains never moved and count as "
         "last",

@@ -107,7 +107,7 @@ def roughness(evidence: Evidence) -> Claim:
 
 
 def curves(evidence: Evidence) -> Iterator[pd.DataFrame]:
-    """Of each pile the holds in which something had moved, in their order."""
+    """Of each pile the load steps in which something had moved, in their order."""
     table = evidence.piles("pile_curve")
     for _, own in split(table, "scene_id"):
         moved = own[own["moved"] > 0].sort_values("load_step")
@@ -116,7 +116,7 @@ def curves(evidence: Evidence) -> Iterator[pd.DataFrame]:
 
 
 def _stress_at(own: pd.DataFrame, fraction: float) -> float:
-    """Shields number at which a fraction had moved, between holds; NaN if it was not reached."""
+    """Shields number at which a fraction had moved, between load steps; NaN if not reached."""
     return float(
         np.interp(fraction, own["fraction_moved"], own["shields"], left=np.nan, right=np.nan)
     )

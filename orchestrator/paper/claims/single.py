@@ -194,7 +194,7 @@ def _held_measured(held: pd.DataFrame) -> tuple[str, ...]:
 def _ramps_measured(ramps: pd.DataFrame) -> tuple[str, ...]:
     texts = [
         f"{_percent(step)}: {_ratio(own).mean() - 1:+.1%}"
-        for (step,), own in split(ramps, "step")
+        for (step,), own in split(ramps, "load_increment")
         if _ratio(own).notna().any()
     ]
     if not texts:
