@@ -2,6 +2,7 @@
 
 import difflib
 import errno
+import os
 import shutil
 import traceback
 from collections.abc import Sequence
@@ -83,15 +84,45 @@ class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error
     exit_code = 130
 
 
+_REMEDIES = {
+    errno.ENOSPC: "make room, then the same command continues",
+    errno.EDQUOT: "make room, then the same command continues",
+    errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
+    errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
+    errno.EMFILE: "raise the limit: ulimit -n 1024",
+    errno.ENFILE: "too many files are open on this machine",
+    errno.ENOMEM: "free memory, or raise its limit: ulimit -v",
+    errno.EAGAIN: "too many processes? See ulimit -u",
+    errno.ENAMETOOLONG: "choose a shorter path",
+}
+
+
 def of_system(error: OSError, where: str = "") -> OrchestratorError:
-    """The message of a failure of the file system; `where` is used if it does not say itself."""
+    """The message of a failure of the file system, at `where` or the file that it tells itself."""
     # shutil collects what went wrong with each file: the first one tells the story
     said = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
     full = error.errno == errno.ENOSPC or "No space left" in (said or "")
+    number = errno.ENOSPC if full else error.errno
     return OrchestratorError(
         "no space is left on the disk" if full else said or str(error),
-        where=where or str(error.filename or ""),
-        remedy="make room, then the same command continues" if full else "see the file system",
+        where=where or _path(error.filename),
+        remedy=_REMEDIES.get(number or 0, "see the file system"),
+    )
+
+
+def _path(name: str | bytes | int | None) -> str:
+    """A file's name as a text; of an open file only its number is known."""
+    return "" if name is None or isinstance(name, int) else os.fsdecode(name)
+
+
+def of_shortage(error: MemoryError | ImportError) -> OrchestratorError:
+    """The message of memory that is not there, or of a library that does not load."""
+    if isinstance(error, ImportError) and "failed to map" not in str(error):
+        return OrchestratorError(
+            f"a library does not load: {error}", remedy="`orchestrator doctor` says what is missing"
+        )
+    return OrchestratorError(
+        "there is not enough memory", remedy="fewer --workers, or a higher limit: ulimit -v"
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.runs import lock
+from orchestrator.runs import lock, resources
 from orchestrator.runs.files import read_json, text_of
 from orchestrator.runs.folder import RECORD, Folder
 
@@ -66,19 +66,21 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
         If the directory holds something else, which is named, or cannot be written, or if a
         link stands where this program writes.
     OrchestratorError
-        If another process holds it.
+        If another process holds it, or the shell's limits are too low for any work.
     """
+    resources.check()
     folder = Folder(root)
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        _check(folder, kind, name)
-    except OSError as error:
-        raise InputError(
-            f"the output directory cannot be used: {error.strerror or error}",
-            where=str(root),
-            remedy="choose another with --out",
-        ) from None
-    with lock.held(folder.path(LOCK)):
+    with contextlib.ExitStack() as stack:
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            _check(folder, kind, name)
+            stack.enter_context(lock.held(folder.path(LOCK)))
+        except OSError as error:
+            raise InputError(
+                f"the output directory cannot be used: {error.strerror or error}",
+                where=str(error.filename or root),
+                remedy="choose another with --out",
+            ) from None
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(LOCK, RECORD, kind.marker, *kind.names)
         if told(root, kind) is None:

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_fault, of_system
+from orchestrator.errors import (
+    Interrupted,
+    OrchestratorError,
+    SolverError,
+    of_fault,
+    of_shortage,
+    of_system,
+)
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process, retry
 from orchestrator.runs.agenda import Agenda
@@ -231,7 +238,9 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
     except OrchestratorError as error:
         return Outcome(case, error=error)
     except OSError as error:
-        return Outcome(case, error=of_system(error, case.name))
+        return Outcome(case, error=of_system(error, "" if error.filename else case.name))
+    except MemoryError as error:
+        return Outcome(case, error=of_shortage(error))
     except pool.lost as error:
         return Outcome(case, error=_loss(error, case.name))
     except Exception as error:  # one case is lost by it, not the study

@@ -88,7 +88,7 @@ def run(
             start_new_session=True,
             pass_fds=fds,
             # OpenFOAM takes its case directory from PWD, not from getcwd
-            env={**os.environ, "PWD": str(cwd), **(env or {})},
+            env={**os.environ, "PATH": _search_path(), "PWD": str(cwd), **(env or {})},
         )
         try:
             cpu_s = _wait(process, started + limit_s, stop)
@@ -104,7 +104,7 @@ def _wait(
 ) -> float | None:
     """Wait for a program's end; its processor time, or None if it had to be killed."""
     # asking again and again whether it has ended would take a core from it, and see it late
-    with _end_of(process) as end:
+    with end_of(process) as end:
         while not end.poll(1000 * POLL_S):
             if stop is not None and stop.is_set():
                 raise Interrupted("stopped", remedy="the same command continues")
@@ -117,7 +117,8 @@ def _wait(
 
 
 @contextlib.contextmanager
-def _end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
+def end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
+    """What becomes ready when a program ends."""
     handle = os.pidfd_open(process.pid)
     end = select.poll()
     end.register(handle, select.POLLIN)
@@ -135,6 +136,11 @@ def end_group(process: "subprocess.Popen[bytes]") -> None:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(GRACE_S)
     process.wait()
+
+
+def _search_path() -> str:
+    """PATH, which means the same in another working directory."""
+    return os.pathsep.join(map(os.path.abspath, os.get_exec_path()))
 
 
 def last_words(log: Path) -> str:

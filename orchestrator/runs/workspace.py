@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator import __version__
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, of_system
 from orchestrator.runs import lock
 from orchestrator.runs.claim import LOCK, STUDY, Kind, claimed
 from orchestrator.runs.files import read_json, text_of
@@ -73,6 +73,7 @@ class Workspace:
         InputError
             If the directory holds no study.
         """
+        _check_readable(self.root / STUDY.marker)
         value: Any = read_json(self.root / STUDY.marker)
         if not _describes(value):
             raise InputError(
@@ -91,12 +92,22 @@ class Workspace:
         try:
             with os.scandir(self.cases) as entries:
                 return sorted(one.name for one in entries if CASE_NAME.fullmatch(one.name))
-        except OSError:
+        except (FileNotFoundError, NotADirectoryError):
             return []
 
     def is_held(self) -> bool:
         """Whether a running process holds the study."""
         return lock.holder(self.root / LOCK) is not None
+
+
+def _check_readable(path: Path) -> None:
+    """See that a file that is there may be read: else it would count as none."""
+    try:
+        path.open("rb").close()
+    except PermissionError as error:
+        raise of_system(error) from None
+    except OSError:
+        pass
 
 
 def _describes(value: Any) -> bool:

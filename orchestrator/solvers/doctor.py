@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import OrchestratorError
+from orchestrator.runs import resources
 from orchestrator.solvers import liggghts, openfoam
 
 LIBRARIES = ("numpy", "pandas", "pyarrow", "meshio", "gmsh", "pyvista", "matplotlib", "pydantic")
@@ -43,6 +44,7 @@ def examine() -> list[Finding]:
         *(_library(name) for name in LIBRARIES),
         *(_tool(name) for name in TOOLS),
         _gmsh(),
+        _limits(),
         _disk(Path.cwd()),
     ]
 
@@ -82,6 +84,11 @@ def _gmsh() -> Finding:
         libraries = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
         return Finding("meshing", False, f"{error}: apt-get install {libraries}")
     return Finding("meshing", True, "gmsh loads")
+
+
+def _limits() -> Finding:
+    low = [str(error) for error in resources.shortages()]
+    return Finding("limits", not low, "; ".join(low) or "enough memory and open files")
 
 
 def _disk(folder: Path) -> Finding:

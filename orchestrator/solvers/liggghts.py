@@ -2,16 +2,16 @@
 
 import os
 import re
-import shutil
-import subprocess
 import warnings
 from functools import cache
 from pathlib import Path
 
 from orchestrator.errors import SolverError
+from orchestrator.runs import program
 
 PROGRAM = "liggghts"
 TRIED = (3, 8)
+INSTALL = "install it: apt-get install --no-install-recommends liggghts"
 ENVIRONMENT = {
     "OMPI_MCA_ess_singleton_isolated": "1",
     "OMPI_MCA_orte_create_session_dirs": "0",
@@ -33,26 +33,15 @@ def version() -> str:
     SolverError
         If it is missing, does not say its version, or is older than any that works.
     """
-    path = shutil.which(PROGRAM)
-    if path is None:
-        raise SolverError(
-            f"the program {PROGRAM} is not on the PATH",
-            remedy="install it: apt-get install --no-install-recommends liggghts",
-        )
-    try:
-        said = subprocess.run(
-            # without the option it leaves a log wherever the user happens to be
-            [path, "-h", "-log", "none"],
-            capture_output=True,
-            text=True,
-            timeout=30,
-            env={**os.environ, **ENVIRONMENT},
-        ).stdout
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise SolverError(f"{path} does not run: {error}", remedy="reinstall liggghts") from None
-    found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said)
+    path = program.find(PROGRAM, remedy=INSTALL)
+    # without the option it leaves a log wherever the user happens to be
+    said = program.ask(path, "-h", "-log", "none", env={**os.environ, **ENVIRONMENT})
+    found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said.text)
     if not found:
-        raise SolverError(f"{path} does not say its version", remedy="reinstall liggghts")
+        raise SolverError(
+            f"{path} does not say that it is a LIGGGHTS: {said.gist}",
+            remedy=f"try `{path} -h` by hand; if it is broken, install it anew",
+        )
     _judge((int(found[1]), int(found[2])), path)
     return ".".join(found.groups())
 
@@ -80,8 +69,9 @@ def check_log(directory: Path, last_words: str = LAST_WORDS) -> None:
     """
     log = directory / "log.liggghts"
     text = log.read_text(errors="replace") if log.is_file() else ""
-    # the message of an error follows a banner of MPI; the deck's own words hold no such line
-    error = re.search(r"^ERROR.*$", text, re.MULTILINE)
+    # the message of an error follows a banner of MPI; the deck's own words hold no such line, and
+    # the linker's are of libraries that were asked for in vain
+    error = re.search(r"^ERROR(?!: ld\.so:).*$", text, re.MULTILINE)
     if error:
         raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
     if last_words not in text:

@@ -2,15 +2,14 @@
 
 import os
 import re
-import shutil
-import subprocess
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Exploded, SolverError, Stalled
+from orchestrator.runs.program import Said, ask, find
 
 if TYPE_CHECKING:
     import pyvista
@@ -21,6 +20,7 @@ TRIED = ("1912",)
 """Versions that the tests ran with."""
 PACKAGE = "openfoam"
 """The Debian package that holds the programs."""
+INSTALL = f"install the Debian package `{PACKAGE}`"
 
 _HOME = "/usr/share/openfoam"
 _STATED = re.compile(r"Using: OpenFOAM-(?:v(?P<named>\d{4})|\S* \((?P<api>\d{4})\))")
@@ -39,38 +39,35 @@ def version() -> str:
     SolverError
         If a program is missing, does not start, or is of a version that the case cannot run with.
     """
-    for program in PROGRAMS:
-        _require(program)
-    stated = _help_text("simpleFoam")
-    match = _STATED.search(stated)
+    paths = [find(name, remedy=INSTALL) for name in PROGRAMS]
+    said = _help(paths[-1], os.environ)
+    match = _STATED.search(said.text)
     if match is None:
-        raise SolverError(
-            "this simpleFoam is not of the openfoam.com line: "
-            + (_line_with("Using:", stated) or "it states no version"),
-            remedy=f"put the one of Debian's package `{PACKAGE}` first in PATH",
-        )
+        raise _stateless(paths[-1], said)
     found = str(match["named"] or match["api"])
     _judge(found)
     return found
 
 
-def _require(program: str) -> None:
-    if shutil.which(program) is None:
-        raise SolverError(
-            f"OpenFOAM's program {program} is not in PATH",
-            remedy=f"install the Debian package `{PACKAGE}`",
-        )
+def _help(path: str, environment: Mapping[str, str]) -> Said:
+    home = environment.get("WM_PROJECT_DIR") or _HOME
+    return ask(path, "-help", env={**environment, "WM_PROJECT_DIR": home})
 
 
-def _help_text(program: str) -> str:
-    environment = {"WM_PROJECT_DIR": _HOME, **os.environ}
-    try:
-        ended = subprocess.run(
-            [program, "-help"], env=environment, capture_output=True, text=True, timeout=60
+def _stateless(path: str, said: Said) -> SolverError:
+    """Why a program states no version that is known."""
+    told = os.environ.get("WM_PROJECT_DIR")
+    rest = {name: value for name, value in os.environ.items() if name != "WM_PROJECT_DIR"}
+    if told and _STATED.search(_help(path, rest).text):
+        return SolverError(
+            f"WM_PROJECT_DIR is {told}, which is not the OpenFOAM of {path}",
+            remedy="unset it, or put the programs of that OpenFOAM first in PATH",
         )
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise SolverError(f"{program} does not start: {error}") from error
-    return ended.stdout + ended.stderr
+    stated = _line_with("Using:", said.text) or said.gist
+    return SolverError(
+        f"{path} is not of the openfoam.com line: {stated}",
+        remedy=f"put the one of Debian's package `{PACKAGE}` first in PATH",
+    )
 
 
 def _judge(found: str) -> None:

@@ -193,3 +193,63 @@ def test_a_holder_on_another_machine_is_believed_while_it_lives(
         assert code == (1 if beats else 0), said
         assert ("process 7 on elsewhere" in said) == beats
         cells.check_finished()
+
+
+LIMITS = {"ulimit -n": "16", "ulimit -v": "600000"}
+
+
+@pytest.mark.parametrize("command", LIMITS)
+def test_a_limit_of_the_shell_that_is_too_low(cells: Bench, ledger: Ledger, command: str) -> None:
+    shell = ("sh", "-c", f'{command} {LIMITS[command]}; exec "$0" "$@"')
+    with ledger.fault(f"{command} {LIMITS[command]}", "begin"):
+        code, said = ended(cells.start(under=shell))
+        assert (code, said.count("\n")) == (1, 1), said
+        assert command in said
+        assert not cells.out.exists()
+        cells.check_finished()
+
+
+POWERLESS = "-dac_override,-dac_read_search"
+WITHOUT_RIGHTS = ("setpriv", f"--bounding-set={POWERLESS}", f"--inh-caps={POWERLESS}")
+"""Before a command: even root may then do only what owner and mode allow."""
+
+
+@pytest.mark.parametrize("name", ["", "cases", "cells", "tables"])
+def test_a_directory_that_may_not_be_entered(cells: Bench, ledger: Ledger, name: str) -> None:
+    cells.study()
+    (cells.out / "report.json").unlink()
+    (cell,) = case_of(cells.out, "cells")
+    (cell / "done.json").unlink()
+    closed = cell if name == "cells" else cells.out / name
+    with ledger.fault("a directory of mode 000", name or "the study"):
+        closed.chmod(0)
+        code, said = ended(cells.start(under=WITHOUT_RIGHTS))
+        closed.chmod(0o755)
+        assert code in (1, 2, 3), said
+        assert f"{closed}" in said
+        assert "Permission denied" in said
+        cells.check_finished()
+
+
+def test_a_case_that_is_immutable(cells: Bench, ledger: Ledger) -> None:
+    cells.study()
+    (cell,) = case_of(cells.out, "cells")
+    (cell / "done.json").unlink()
+    if os.geteuid() != 0 or subprocess.run(["chattr", "+i", cell], capture_output=True).returncode:
+        pytest.skip("no file can be made immutable here")
+    with ledger.fault("an immutable directory", "grains"):
+        code, said = cells.study()
+        subprocess.run(["chattr", "-i", cell], check=True)
+        assert code == 3, said
+        assert f"{cell.name}" in said
+        assert "Operation not permitted (is it immutable" in said
+        cells.check_finished()
+
+
+def test_what_the_linker_says_is_no_failure(pile: Bench, ledger: Ledger) -> None:
+    with ledger.fault("a library that cannot be preloaded", "flow and grains"):
+        code, said = ended(pile.start(under=("env", "LD_PRELOAD=/nowhere/libnone.so")))
+        assert code == 0, said
+        logs = [path for path in pile.out.glob("cases/*/log.*") if b"ld.so" in path.read_bytes()]
+        assert {"log.liggghts", "log.simpleFoam"} <= {path.name for path in logs}
+        pile.check_finished()
