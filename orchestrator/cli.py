@@ -189,20 +189,20 @@ def _study(options: argparse.Namespace) -> int:
 
 def _ladder(options: argparse.Namespace) -> int:
     from orchestrator import paper
-    from orchestrator.experiments import run
+    from orchestrator.experiments.ladder.run import run
     from orchestrator.study import study
 
     asked = study.load(options.source, [paper.PRESETS])
     out = options.out or Path("results") / "ladder"
-    finished = run.run_ladder(asked, out, workers=options.workers)
+    finished = run(asked, out, workers=options.workers)
     return _end(finished.page, finished.failures)
 
 
 def _stability(options: argparse.Namespace) -> int:
-    from orchestrator.experiments import run
+    from orchestrator.experiments.stability.run import run
 
     out = options.out or Path("results") / "stability"
-    return _end(run.run_stability(out, workers=options.workers).page, {})
+    return _end(run(out, workers=options.workers).page, {})
 
 
 def _report(options: argparse.Namespace) -> int:

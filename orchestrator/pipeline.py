@@ -123,6 +123,8 @@ def complete(
     queue: Queue | None = None,
 ) -> dict[str, OrchestratorError]:
     """Run cases, with a display of how far they are; the failures by the cases' names."""
+    if not todo:
+        return {}
     opened = (
         cluster.pool(queue, space.cases, workers=workers, limit_s=limit_s)
         if queue

@@ -18,7 +18,7 @@ QUIET_ENOUGH = 6.0
 its rate is a part of what is asked."""
 LIFT_OFF = 0.95
 """Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
-piles of the preset `paper` those below 0.93 have thresholds, those above 0.98 none."""
+piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
 
 
 @dataclass(frozen=True)

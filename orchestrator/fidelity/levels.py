@@ -18,7 +18,6 @@ Levels = Mapping[Part, str]
 """Names of levels, by what they answer."""
 Fields = Mapping[str, Any]
 """Values of a scene's fields, named as in a study file."""
-FieldsOf = Callable[[Scene], Fields]
 AS_ASKED = "as asked"
 """Stands for the name of a level where a scene is on none."""
 OCTAVES = 2.0
@@ -35,8 +34,8 @@ class Level:
     ----------
     name, meaning : str
         What tables call it, and what it is.
-    fields : callable
-        The fields of a scene that it sets.
+    sets : mapping or callable
+        The fields that it sets; a callable where they follow from the scene.
     same_model : bool
         Whether it has the reference's model choices; another turbulence model has not.
     most_grains : int or None
@@ -47,7 +46,7 @@ class Level:
 
     name: str
     meaning: str
-    fields: FieldsOf
+    sets: Fields | Callable[[Scene], Fields]
     same_model: bool = True
     most_grains: int | None = None
     on_lattices: bool = False
@@ -56,13 +55,17 @@ class Level:
         """The scene as this level answers it."""
         return changed(scene, self.fields(scene))
 
-    def load_steps(self, scene: Scene) -> bool:
+    def describes(self, scene: Scene) -> bool:
         """Whether the scene is on this level as it is."""
         return all(
             getattr(getattr(scene, part), field) == value
             for key, value in self.fields(scene).items()
             for part, _, field in (key.partition("."),)
         )
+
+    def fields(self, scene: Scene) -> Fields:
+        """The fields that it sets in a scene."""
+        return self.sets(scene) if callable(self.sets) else self.sets
 
 
 def changed(scene: Scene, fields: Fields) -> Scene:
@@ -85,7 +88,7 @@ def level(part: Part, name: str) -> Level:
 def holding(scene: Scene) -> Levels:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
     return {
-        part: next((one.name for one in reversed(listed) if one.load_steps(scene)), AS_ASKED)
+        part: next((one.name for one in reversed(listed) if one.describes(scene)), AS_ASKED)
         for part, listed in LEVELS.items()
     }
 
@@ -101,19 +104,18 @@ def paper_stiffness(scene: Scene) -> float:
     return 1e6 * scene.grain.diameter / scene.weight
 
 
-def _set(fields: Fields) -> FieldsOf:
-    return lambda scene: fields
+def _dem(name: str, layers: int, rules: Fields, **options: Any) -> Level:
+    """DEM of some mobile layers; options as for `Level`."""
+    which = "every grain mobile" if layers == FULL else f"{layers} mobile layers"
+    which = which.removesuffix("s") if layers == 1 else which
+    meaning = f"DEM, {which}, load steps {100 * rules['protocol.load_increment']:g} % apart"
+    sets = {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
+    return Level(name, **{"meaning": meaning, "sets": sets, **options})
 
 
-def _dem(layers: int, rules: Fields, **others: float) -> Fields:
-    protocol = {f"protocol.{name}": value for name, value in others.items()}
-    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules, **protocol}
-
-
-def _solve(cells: int, growth: float, **others: str) -> Fields:
-    model = {f"flow.{name}": value for name, value in others.items()}
+def _solve(cells: int, growth: float) -> Fields:
     mesh = {"flow.cells_per_face": cells, "flow.expansion_ratio": growth}
-    return {"flow.model": "solve", "flow.roughness": None, **mesh, **model}
+    return {"flow.model": "solve", "flow.roughness": None, **mesh}
 
 
 def _shared(scene: Scene) -> Fields:
@@ -129,98 +131,74 @@ def _own_speed(scene: Scene) -> Fields:
     assert isinstance(scene.bed, PileBed)
     ustar = float(closed_form(scene).friction_velocity)
     speed = ustar / 0.41 * math.log1p(10 * scene.bed.height / scene.bed.roughness)
-    return {**_solve(40, 1.1), "flow.speed": float(f"{speed:.6g}")}
+    return {**STANDARD, "flow.speed": float(f"{speed:.6g}")}
 
 
 def _paper_stiffness(scene: Scene) -> Fields:
-    return {**_dem(1, FAST), "grain.stiffness": paper_stiffness(scene)}
+    one_layer = {"bed.mobile_layers": 1, "protocol.method": "dem"}
+    return {**one_layer, **FAST, "grain.stiffness": paper_stiffness(scene)}
 
 
-FAST: Fields = {
-    "grain.stiffness": 1e3,
-    "protocol.time_step": 0.3,
-    "protocol.waiting_time": 6.0,
-    "protocol.load_increment": 0.03,
-}
-SLOW: Fields = {
-    "grain.stiffness": 1e4,
-    "protocol.time_step": 0.2,
-    "protocol.waiting_time": 10.0,
-    "protocol.load_increment": 0.01,
-}
-SLOWEST: dict[str, float] = {"waiting_time": 15.0, "load_increment": 0.004}
+def _rules(
+    stiffness: float, time_step: float, waiting_time: float, load_increment: float
+) -> Fields:
+    return {
+        "grain.stiffness": stiffness,
+        "protocol.time_step": time_step,
+        "protocol.waiting_time": waiting_time,
+        "protocol.load_increment": load_increment,
+    }
+
+
+COARSE = _rules(1e3, 0.3, 6.0, 0.06)
+FAST = _rules(1e3, 0.3, 6.0, 0.03)
+SLOW = _rules(1e4, 0.2, 10.0, 0.01)
+SLOWEST = _rules(1e4, 0.2, 15.0, 0.004)
+SOFTEST = _rules(1e3, 0.3, 15.0, 0.004)
+STANDARD = _solve(40, 1.1)
+RNG = {**STANDARD, "flow.turbulence_model": "RNGkEpsilon"}
+REALIZABLE = {**STANDARD, "flow.turbulence_model": "realizableKE"}
 OTHER_MODEL = "standard, with another turbulence model"
 
 FLOW = (
-    Level("flat", "log law on a flat bed: u*_0 everywhere", _set({"flow.model": "flat"})),
-    Level("hill", "linear theory of the flow over a low hill", _set({"flow.model": "hill"})),
+    Level("flat", "log law on a flat bed: u*_0 everywhere", {"flow.model": "flat"}),
+    Level("hill", "linear theory of the flow over a low hill", {"flow.model": "hill"}),
     Level("shared", "coarse; one solve for each octave of z0/h", _shared),
-    Level("coarse", "40 cells on a face, growing by 1.4 away from it", _set(_solve(40, 1.4))),
-    Level("short", "20 cells on a face, growing by 1.1", _set(_solve(20, 1.1))),
-    Level("medium", "40 cells on a face, growing by 1.2", _set(_solve(40, 1.2))),
-    Level("standard", "40 cells on a face, growing by 1.1", _set(_solve(40, 1.1))),
+    Level("coarse", "40 cells on a face, growing by 1.4 away from it", _solve(40, 1.4)),
+    Level("short", "20 cells on a face, growing by 1.1", _solve(20, 1.1)),
+    Level("medium", "40 cells on a face, growing by 1.2", _solve(40, 1.2)),
+    Level("standard", "40 cells on a face, growing by 1.1", STANDARD),
     Level("own speed", "standard, solved at the scene's own U_e", _own_speed),
-    Level("fine", "80 cells on a face", _set(_solve(80, 1.1))),
-    Level("finest", "160 cells on a face", _set(_solve(160, 1.1)), most_grains=50),
-    Level(
-        "RNG k-epsilon",
-        OTHER_MODEL,
-        _set(_solve(40, 1.1, turbulence_model="RNGkEpsilon")),
-        same_model=False,
-    ),
-    Level(
-        "realizable k-eps.",
-        OTHER_MODEL,
-        _set(_solve(40, 1.1, turbulence_model="realizableKE")),
-        same_model=False,
-    ),
+    Level("fine", "80 cells on a face", _solve(80, 1.1)),
+    Level("finest", "160 cells on a face", _solve(160, 1.1), most_grains=50),
+    Level("RNG k-epsilon", OTHER_MODEL, RNG, same_model=False),
+    Level("realizable k-eps.", OTHER_MODEL, REALIZABLE, same_model=False),
 )
 """Levels of the flow; they keep the height of the first cell, which is a part of the model."""
 
 GRAINS = (
-    Level(
-        "pivot",
-        "closed form with each grain's own stress",
-        _set({"protocol.method": "pivot"}),
-    ),
+    Level("pivot", "closed form with each grain's own stress", {"protocol.method": "pivot"}),
     Level(
         "peeling",
         "pivot with blocking by neighbours, without dynamics",
-        _set({"protocol.method": "peeling"}),
+        {"protocol.method": "peeling"},
     ),
-    Level(
-        "1 layer, coarse",
-        "DEM, 1 mobile layer, load steps 6 % apart",
-        _set(_dem(1, FAST, load_increment=0.06)),
-    ),
-    Level("1 layer, fast", "DEM, 1 mobile layer, load steps 3 % apart", _set(_dem(1, FAST))),
-    Level("2 layers, fast", "DEM, 2 mobile layers, load steps 3 % apart", _set(_dem(2, FAST))),
-    Level("4 layers, fast", "DEM, 4 mobile layers, load steps 3 % apart", _set(_dem(4, FAST))),
-    Level("1 layer, slow", "DEM, 1 mobile layer, load steps 1 % apart", _set(_dem(1, SLOW))),
-    Level("2 layers, slow", "DEM, 2 mobile layers, load steps 1 % apart", _set(_dem(2, SLOW))),
-    Level("4 layers, slow", "DEM, 4 mobile layers, load steps 1 % apart", _set(_dem(4, SLOW))),
-    Level(
-        "full pile, fast",
-        "DEM, every grain mobile, load steps 3 % apart",
-        _set(_dem(FULL, FAST)),
-        on_lattices=True,
-    ),
+    _dem("1 layer, coarse", 1, COARSE),
+    _dem("1 layer, fast", 1, FAST),
+    _dem("2 layers, fast", 2, FAST),
+    _dem("4 layers, fast", 4, FAST),
+    _dem("1 layer, slow", 1, SLOW),
+    _dem("2 layers, slow", 2, SLOW),
+    _dem("4 layers, slow", 4, SLOW),
+    _dem("full pile, fast", FULL, FAST, on_lattices=True),
     Level(
         "paper's K, fast",
         "DEM, 1 mobile layer, K = 1e6 N/m, load steps 3 % apart",
         _paper_stiffness,
         most_grains=40,
     ),
-    Level(
-        "soft reference",
-        "the reference on softer grains, 4 layers",
-        _set(_dem(4, FAST, **SLOWEST)),
-    ),
-    Level(
-        "reference",
-        "DEM, 3 mobile layers, load steps 0.4 % apart",
-        _set(_dem(3, SLOW, **SLOWEST)),
-    ),
+    _dem("soft reference", 4, SOFTEST, meaning="the reference on softer grains, 4 layers"),
+    _dem("reference", 3, SLOWEST),
 )
 """Levels of the grains."""
 

@@ -155,7 +155,7 @@ def _coarse(scene: Scene) -> str | None:
     step = scene.protocol.load_increment
     if not _pile(scene) or scene.protocol.method != "dem" or step <= COARSE_STEP:
         return None
-    return f"holds {step:.0%} apart leave the threshold that wide an interval"
+    return f"load steps {step:.0%} apart leave the threshold that wide an interval"
 
 
 def _wedged(scene: Scene) -> str | None:
@@ -247,7 +247,7 @@ LIMITS = (
         "quiet-step",
         "protocol.waiting_time",
         _ramp,
-        f"A pile's hold waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
+        f"A pile's load step waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
         "raise it, unless a ramp is what you want",
         refused=False,
     ),

@@ -91,13 +91,15 @@ def test_no_matplotlibrc_of_the_working_directory_does(
 SEALED = """
 import sys
 from pathlib import Path
-import orchestrator.benchmark.runner, orchestrator.experiments.run, orchestrator.pipeline
+import orchestrator.benchmark.runner, orchestrator.pipeline
+import orchestrator.experiments.ladder.run, orchestrator.experiments.stability.run
 assert "matplotlib" not in sys.modules
 from orchestrator.report import settings
 from orchestrator.runs.folder import Folder
 with settings.own():
     from orchestrator.benchmark import page
-    from orchestrator.experiments import pages
+    from orchestrator.experiments.ladder import page as ladder
+    from orchestrator.experiments.stability import page as stability
     from orchestrator.report import style
     figure = style.canvas(1.0)
     figure.subplots().plot([0, 1], label="grains")

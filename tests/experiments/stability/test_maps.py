@@ -8,7 +8,8 @@ import pytest
 
 from orchestrator import pipeline
 from orchestrator.errors import InputError
-from orchestrator.experiments import maps, stability
+from orchestrator.experiments.stability import maps, verdicts
+from orchestrator.experiments.stability.run import planned_for
 from orchestrator.fidelity import calibration, limits
 from orchestrator.runs.claim import EXPERIMENT
 from orchestrator.runs.workspace import Workspace
@@ -50,12 +51,12 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     path = tmp_path / "small.toml"
     path.write_text(SMALL)
     one = maps.load(path)
-    planned = stability.plan([one])
+    planned = planned_for([one])
     space = Workspace(tmp_path / "out")
     with space.held(EXPERIMENT, "stability"):
         pipeline.complete(pipeline.missing(planned, space), space, workers=2, limit_s=120)
-    answers = stability.Answers(planned, space.cases, planned.done(space.cases))
-    good, bad = stability.judge(one, answers).sort_values("x").to_dict("records")
+    answers = verdicts.Answers(planned, space.cases, planned.done(space.cases))
+    good, bad = verdicts.judge(one, answers).table.sort_values("x").to_dict("records")
     assert good["verdict"] == "good"
     assert abs(good["error"]) < 0.05
     assert bad["verdict"] in ("exploded", "noisy")
@@ -127,7 +128,7 @@ def test_the_time_steps_that_are_allowed_were_good_on_the_map() -> None:
 
 def test_what_blows_up_on_the_map_was_noticed_by_the_run_itself() -> None:
     table = pd.read_csv(MAPS)
-    bad = table[table["verdict"].isin(stability.VERDICTS)]
+    bad = table[table["verdict"].isin(verdicts.VERDICTS)]
     assert len(bad) > 20
     assert bad["caught"].all()
 

@@ -14,6 +14,8 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
+from orchestrator.experiments.stability.maps import Map
+from orchestrator.experiments.stability.verdicts import Judged
 from orchestrator.report import style
 from orchestrator.report.style import Look
 
@@ -47,33 +49,9 @@ AROUND, LINE = 0.62, 0.115
 """Height of a map's title and the words on its axis, and of a line of text, inches."""
 
 
-@dataclass(frozen=True)
-class Map:
-    """One map.
-
-    Attributes
-    ----------
-    table : DataFrame
-        A row for each run: x and y, numbers or texts; verdict, a key of `VERDICTS`; caught,
-        whether the tool noticed by itself; error, relative and signed, or NaN; note, which is not
-        drawn.
-    title, x_label, y_label : str
-        Of the map and its axes.
-    question, limit : str
-        What it asks; the limit that was found, or empty.
-    """
-
-    table: pd.DataFrame
-    title: str
-    x_label: str
-    y_label: str
-    question: str
-    limit: str
-
-
-def draw(shown: Map) -> Canvas:
+def draw(judged: Judged) -> Canvas:
     """One map in a figure of its own; of several runs in one place the worst is shown."""
-    cells = Cells(shown)
+    cells = Cells(judged)
     figure = style.canvas(_height([cells], ALONE) + 0.5)
     ax = figure.subplots()
     rows, columns = cells.shape
@@ -83,9 +61,9 @@ def draw(shown: Map) -> Canvas:
     return figure
 
 
-def sheet(maps: Sequence[Map]) -> Canvas:
+def sheet(judged: Sequence[Judged]) -> Canvas:
     """Many maps as small multiples, in their order."""
-    listed = [Cells(shown) for shown in maps]
+    listed = [Cells(one) for one in judged]
     lines = [listed[first : first + PER_ROW] for first in range(0, len(listed), PER_ROW)]
     figure = style.canvas(sum(_height(line, ON_SHEET) for line in lines) + 0.6)
     ratios = [max(cells.shape[0] for cells in line) for line in lines]
@@ -110,16 +88,16 @@ def _height(line: "Sequence[Cells]", size: Size) -> float:
 
 def _filled(shown: Map, size: Size) -> tuple[str, str]:
     """The question and the limit, in lines."""
-    limit = f"Limit: {shown.limit}" if shown.limit else ""
+    limit = f"Limit: {' '.join(shown.limits)}" if shown.limits else ""
     return textwrap.fill(shown.question, size.letters), textwrap.fill(limit, size.letters)
 
 
 class Cells:
     """A map's table as a grid: the values of both axes, rising, and what lies at each place."""
 
-    def __init__(self, shown: Map) -> None:
-        self.map = shown
-        known = shown.table.dropna(subset=["x", "y", "verdict"])
+    def __init__(self, judged: Judged) -> None:
+        self.map = judged.map
+        known = judged.table.dropna(subset=["x", "y", "verdict"])
         self.xs, self.ys = _values(known["x"]), _values(known["y"])
         badness = list(VERDICTS)
         order = known["verdict"].map(badness.index).argsort(kind="stable")
@@ -177,7 +155,7 @@ def _panel(ax: Axes, cells: Cells, size: Size) -> None:
     ax.set_yticks(np.arange(len(cells.ys)) + 0.5, [_written(value) for value in cells.ys])
     ax.tick_params(length=0)
     ax.spines[:].set_color("0.75")
-    ax.set(xlabel=cells.map.x_label, ylabel=cells.map.y_label)
+    ax.set(xlabel=cells.map.x.label, ylabel=cells.map.y.label)
     if not (cells.xs and cells.ys):
         ax.text(0.5, 0.5, "nothing was run", ha="center", va="center", **style.NOTE)
     _words(ax, cells.map, size)

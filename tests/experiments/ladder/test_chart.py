@@ -9,10 +9,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
-from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation, Text
 
-from orchestrator.experiments import ladder_figures as ladder
+from orchestrator.experiments.ladder import chart
 from orchestrator.report import style
 from orchestrator.runs.folder import Folder
 
@@ -21,15 +20,15 @@ FLOWS, GRAINS = ("fine", "medium", "coarse"), ("stiff", "soft", "pivot")
 
 @pytest.fixture
 def pairs() -> pd.DataFrame:
-    """Nine pairs of levels of three scenes; errors rise by threes as the cost falls by threes."""
+    """Nine pairs of levels in two packings; errors rise by threes as the cost falls by threes."""
     rows = []
-    for scene, packing in (("15°", "aligned"), ("30°", "aligned"), ("15°", "disordered")):
+    for packing in ("aligned", "disordered"):
         for number, (flow, grain) in enumerate(product(FLOWS, GRAINS)):
-            error = (-1.0) ** number * 1e-3 * 3.0**number * (2 if scene == "30°" else 1)
-            errors = dict(zip((*ladder.ERRORS, "error_curve"), error * np.arange(5), strict=True))
+            error = (-1.0) ** number * 1e-3 * 3.0**number
+            errors = dict(zip(chart.HEADS, error * np.arange(5), strict=True))
             rows.append(
                 {
-                    "scene": scene, "packing": packing, "flow_level": flow, "grain_level": grain,
+                    "packing": packing, "flow_level": flow, "grain_level": grain, "piles": 4,
                     "cost_core_s": 3e3 / 3.0**number, **errors, "reference_error": 0.002,
                     "same_model": flow != "coarse", "pareto": number % 2 == 0,
                 }
@@ -52,26 +51,25 @@ def tags(ax: Axes) -> list[Annotation]:
 
 
 def test_points_are_the_largest_errors(pairs: pd.DataFrame) -> None:
-    figure = ladder.against_cost(pairs)
+    figure = chart.against_cost(pairs)
     for ax, (packing, rows) in zip(figure.axes, pairs.groupby("packing"), strict=True):
         assert ax.get_title("left").startswith(str(packing))
         expected = set(zip(rows["cost_core_s"], 3 * rows["error_30"].abs(), strict=True))
         assert sorted(points(ax)) == [pytest.approx(pair) for pair in sorted(expected)]
         front = [line for line in ax.lines if line.get_gid() == "front"]
-        assert len(front) == rows["scene"].nunique()
-        assert [len(np.asarray(line.get_xdata())) for line in front] == [5] * len(front)
+        assert [len(np.asarray(line.get_xdata())) for line in front] == [5]
     markers = {cost: mark for (cost, _), mark in points(figure.axes[1]).items()}
     signs = [markers[3e3 / 3.0**number][0] for number in range(9)]
-    assert signs == [ladder.HIGH, ladder.LOW] * 4 + [ladder.HIGH]
+    assert signs == [chart.HIGH, chart.LOW] * 4 + [chart.HIGH]
     hollow = [markers[3e3 / 3.0**number][1] == "#ffffff" for number in range(9)]
     assert hollow == [False] * 6 + [True] * 3
 
 
 def test_each_error_has_a_panel_of_its_own(pairs: pd.DataFrame) -> None:
-    figure = ladder.by_fraction(pairs)
+    figure = chart.by_fraction(pairs)
     rows = pairs[pairs["packing"] == "disordered"]
-    for ax, column in zip(figure.axes[5:], ladder.HEADS, strict=True):
-        expected = rows[column].abs().clip(lower=ladder.FLOOR).tolist()
+    for ax, column in zip(figure.axes[5:], chart.HEADS, strict=True):
+        expected = rows[column].abs().clip(lower=chart.FLOOR).tolist()
         assert [y for _, y in sorted(points(ax), reverse=True)] == pytest.approx(expected)
         assert sorted(tag.get_text() for tag in tags(ax)) == list("13579")  # those on the front
 
@@ -92,55 +90,30 @@ def assert_apart(figure: Canvas) -> int:
 
 
 def test_texts_cover_nothing(pairs: pd.DataFrame) -> None:
-    assert assert_apart(ladder.against_cost(pairs)) == 18
+    assert assert_apart(chart.against_cost(pairs)) == 18
     crowd = pairs.assign(cost_core_s=100 + pairs.index.to_numpy() % 9)
-    assert assert_apart(ladder.against_cost(crowd)) == 18
+    assert assert_apart(chart.against_cost(crowd)) == 18
 
 
 def test_what_is_not_known_has_no_place(pairs: pd.DataFrame) -> None:
     one = pairs[pairs["packing"] == "disordered"].reset_index(drop=True)
     one.loc[0, "cost_core_s"] = np.nan
-    one.loc[1, list(ladder.ERRORS)] = np.nan
+    one.loc[1, chart.AT_FRACTIONS] = np.nan
     one.loc[2, "error_70"] = np.nan
-    (ax,) = ladder.against_cost(one).axes
+    (ax,) = chart.against_cost(one).axes
     drawn = points(ax)
     assert len(drawn) == 7
     lacking = one["cost_core_s"].iloc[2], abs(one["error_50"].iloc[2])
-    assert drawn[lacking][0] == ladder.MISSING
+    assert drawn[lacking][0] == chart.MISSING
     said = " ".join(text.get_text() for text in ax.texts)
     assert "cost not measured: fine, stiff" in said
     assert "no fraction reached: fine, soft" in said
 
 
-@pytest.mark.parametrize("draw", [ladder.against_cost, ladder.by_fraction])
+@pytest.mark.parametrize("draw", [chart.against_cost, chart.by_fraction])
 def test_a_ladder_without_pairs_says_so(pairs: pd.DataFrame, draw: type, tmp_path: Path) -> None:
     unknown = pairs.assign(cost_core_s=np.nan)
     for table in (pairs.iloc[:0], unknown):
         figure = draw(table)
-        assert ladder.NOTHING in [text.get_text() for text in figure.axes[0].texts]
+        assert chart.NOTHING in [text.get_text() for text in figure.axes[0].texts]
         assert style.save(figure, Folder(tmp_path), "empty").startswith(b"\x89PNG")
-
-
-def test_bars_are_the_factors_gained() -> None:
-    routes = pd.DataFrame(
-        [("naive", 86400.0, True), ("soft", 864.0, False), ("lost", np.nan, False)],
-        columns=["route", "core_s", "extrapolated"],
-    )
-    (ax,) = ladder.gains(routes).axes
-    naive, soft = (bar for bar in ax.patches if isinstance(bar, Rectangle))
-    assert soft.get_x() + soft.get_width() == pytest.approx(100)
-    assert naive.get_width() == pytest.approx(0)
-    assert [bar.get_hatch() is not None for bar in (naive, soft)] == [True, False]
-    assert [text.get_text().strip() for text in ax.texts] == [
-        "1 × (24 h)", "100 × (14 min)", "not measured",
-    ]  # fmt: skip
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["naive", "soft", "lost"]
-    assert ladder.gains(routes.iloc[:0]).axes[0].texts[0].get_text() == ladder.NOTHING
-
-
-@pytest.mark.parametrize(
-    ("seconds", "written"),
-    [(0.123, "0.12 s"), (89, "89 s"), (5400, "1.5 h"), (2e5, "2.3 days"), (4.1e8, "13 years")],
-)
-def test_a_duration_has_the_unit_that_suits_it(seconds: float, written: str) -> None:
-    assert ladder.duration(seconds) == written

@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from orchestrator.experiments import ranking
-from orchestrator.experiments.ladder import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.experiments.ladder import ranking
+from orchestrator.experiments.ladder.pairs import AGAIN, BESIDE, FINER, REFERENCE
 
 TAU = {"tau_0.1": 1.0, "tau_0.5": 2.0, "curve_0.50": 2.0}
 

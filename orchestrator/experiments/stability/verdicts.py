@@ -12,13 +12,12 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.experiments.maps import Map, Run
-from orchestrator.fidelity.decision import as_asked
+from orchestrator.experiments.stability.maps import Map, Run
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.plan import Plan, of
+from orchestrator.plan import Plan
 from orchestrator.runs import case as case_states
 from orchestrator.study.scene import Scene
 
@@ -69,20 +68,27 @@ class Answers:
         return float(found.value[one.scenes.index(scene)]) ** 2
 
 
-def plan(maps: list[Map]) -> Plan:
-    """The runs of some maps, those that they share once."""
-    decisions = {
-        scene.id: as_asked(scene)
-        for one in maps
-        for run in one.runs
-        for scene in (*run.scenes, *(run.references if one.judge == "pile" else ()))
-    }
-    return of(decisions, "stability")
+@dataclass(frozen=True)
+class Judged:
+    """A map and what its runs came to.
+
+    Attributes
+    ----------
+    map : Map
+        The map.
+    table : DataFrame
+        A row for each place: map, x and y, numbers or texts; verdict, "good", "wrong" or one of
+        `VERDICTS`; caught, whether the run itself noticed; error, relative and signed, or NaN;
+        note, the cause.
+    """
+
+    map: Map
+    table: pd.DataFrame
 
 
-def judge(one: Map, answers: Answers) -> pd.DataFrame:
-    """A row for each place of a map: x, y, verdict, caught, error, note."""
-    return pd.DataFrame(row for run in one.runs for row in _rows(one, run, answers))
+def judge(one: Map, answers: Answers) -> Judged:
+    """Judge every run of a map."""
+    return Judged(one, pd.DataFrame(row for run in one.runs for row in _rows(one, run, answers)))
 
 
 def _rows(one: Map, run: Run, answers: Answers) -> Iterator[Row]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestrator.errors import InputError
+from orchestrator.fidelity import limits
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import PARTS, make_scene
@@ -83,6 +84,11 @@ class Map:
     x: Axis
     y: Axis
     runs: tuple[Run, ...]
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """The limits that were read off it, in sentences."""
+        return tuple(limit.says for limit in limits.of_map(self.name))
 
 
 def load_all() -> list[Map]:

@@ -1,6 +1,6 @@
-"""What a study's speed costs in accuracy: cheaper fidelity levels against the dearest ones."""
+"""The chart of speed against accuracy: cheaper fidelity levels against the dearest ones."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,16 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from orchestrator.experiments.ladder.ranking import ERRORS
 from orchestrator.report import labels, style, tags
 from orchestrator.report.results import split
 from orchestrator.report.style import Look
 from orchestrator.report.tags import Tag
 
-ERRORS = ("error_10", "error_30", "error_50", "error_70")
+*AT_FRACTIONS, OF_CURVE = ERRORS
 HEADS = {
-    **{name: labels.written("fraction", int(name[-2:]) / 100) for name in ERRORS},
-    "error_curve": "whole curve",
+    **{name: labels.written("fraction", int(name[-2:]) / 100) for name in AT_FRACTIONS},
+    OF_CURVE: "whole curve",
 }
 """Columns of errors and the heads of their panels."""
 FLOOR = 1e-3
@@ -28,13 +29,10 @@ TOLERANCES = (0.05, 0.2)
 HIGH, LOW, MISSING = "^", "v", "X"
 """Markers: the threshold is too high, too low; a fraction was not reached."""
 REFERENCE: Look = {"color": "0.88", "lw": 0}
-MEASURED: Look = {"fc": "#0072b2", "ec": "#0072b2", "lw": 0.8}
-EXTRAPOLATED: Look = {"fc": "white", "ec": "#0072b2", "lw": 0.8, "hatch": "////"}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
 PAIR = ["flow_level", "grain_level"]
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
 """How the grains were answered; colours that are told apart by all."""
-UNITS = {"years": 3.156e7, "days": 86400.0, "h": 3600.0, "min": 60.0}
 NOTHING = "no pair of levels has been run"
 
 
@@ -44,14 +42,15 @@ def against_cost(pairs: pd.DataFrame) -> Canvas:
     Parameters
     ----------
     pairs : DataFrame
-        A row for each pair of levels and scene: scene, packing, flow_level, grain_level;
-        cost_core_s, s of one core; error_10 … error_70 and error_curve, relative and signed, of
-        the threshold stress at a fraction and of the whole curve, NaN where it is not reached;
-        reference_error, how well the reference itself is known; same_model, whether the turbulence
-        model is the reference's; pareto, whether no other pair is both cheaper and better.
+        A row for each pair of levels and packing: packing, flow_level, grain_level; piles, how many
+        it was run on; cost_core_s, s of one core; error_10 … error_70 and error_curve, relative and
+        signed, of the threshold stress at a fraction and of the whole curve, NaN where it is not
+        reached; reference_error, how well the reference itself is known; same_model, whether the
+        turbulence model is the reference's; pareto, whether no other pair is both cheaper and
+        better.
     """
     table = _marked(pairs)
-    parts = [_worst(part) for _, part in split(table, "packing")]
+    parts = [_with_largest(part) for _, part in split(table, "packing")]
     figure = style.canvas(2.6 * len(parts) + 0.06 * table["number"].nunique() + 1.0)
     axes = list(figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0])
     for ax, part in zip(axes, parts, strict=False):
@@ -85,7 +84,9 @@ def by_fraction(pairs: pd.DataFrame) -> Canvas:
     grid = figure.subplots(
         max(len(packings), 1), len(HEADS), sharex=True, sharey=True, squeeze=False
     )
-    parts = [_one(part, column) for part in packings for column in HEADS]
+    parts = [
+        part.assign(error=part[column], complete=True) for part in packings for column in HEADS
+    ]
     for ax, part in zip(grid.ravel(), parts, strict=False):
         _points(ax, part)
     for ax, part in zip(grid[:, 0], packings, strict=False):
@@ -102,58 +103,6 @@ def by_fraction(pairs: pd.DataFrame) -> Canvas:
     return figure
 
 
-def gains(routes: pd.DataFrame) -> Canvas:
-    """How many times cheaper each route is than the naive one.
-
-    Parameters
-    ----------
-    routes : DataFrame
-        route, core_s, extrapolated; the first row is the naive route. A NaN was not measured.
-    """
-    figure = style.canvas(0.34 * max(len(routes), 1) + 0.75)
-    ax = figure.subplots()
-    if routes.empty:
-        _empty(ax)
-        return figure
-    factor = float(routes["core_s"].iloc[0]) / routes["core_s"].to_numpy(float)
-    ax.set(xscale="log", xlabel="times cheaper than the naive route")
-    for y, (row, gain) in enumerate(zip(_each(routes), factor, strict=True)):
-        _bar(ax, y, float(gain), float(row.core_s), bool(row.extrapolated))
-    ax.set_yticks(range(len(routes)), routes["route"])
-    ax.invert_yaxis()
-    known = factor[np.isfinite(factor)]
-    # the texts beyond the bars need a third of the width
-    ax.set_xlim(min(0.8, *known), max(10.0, *known) ** 1.5)
-    ax.spines[["top", "right"]].set_visible(False)
-    if routes["extrapolated"].any():
-        style.legends(figure, [], [Patch(label="extrapolated, not run", **EXTRAPOLATED)])
-    return figure
-
-
-def _bar(ax: Axes, y: int, gain: float, cost: float, extrapolated: bool) -> None:
-    if not np.isfinite(gain):
-        ax.text(1, y, " not measured", va="center", **style.NOTE)
-        return
-    look = EXTRAPOLATED if extrapolated else MEASURED
-    ax.barh(y, gain - 1, left=1, height=0.62, gid="gain", **look)
-    ax.axvline(1, color="0.3", lw=0.6)
-    text = f" {_rounded(gain)} × ({duration(cost)})"
-    ax.text(max(gain, 1), y, text, va="center", fontsize=7, gid="gain's text")
-
-
-def duration(seconds: float) -> str:
-    """A time of one core, in the unit that suits it."""
-    for unit, size in UNITS.items():
-        if seconds >= 1.5 * size:
-            return f"{_rounded(seconds / size)} {unit}"
-    return f"{_rounded(seconds)} s"
-
-
-def _rounded(value: float) -> str:
-    """A number to two digits, such as 0.35, 12 or 46 000."""
-    return f"{float(f'{value:.2g}'):,.0f}".replace(",", " ") if value >= 10 else f"{value:.2g}"
-
-
 def _marked(pairs: pd.DataFrame) -> pd.DataFrame:
     """With a number and a name for each pair, in the order in which they come, and its method."""
     parts = [column for column in PAIR if pairs[column].nunique() > 1] or PAIR[-1:]
@@ -164,22 +113,12 @@ def _marked(pairs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _worst(rows: pd.DataFrame) -> pd.DataFrame:
-    """With the error that is largest in size; whether no other scene has a larger one."""
-    errors = rows[list(ERRORS)].to_numpy(float)
-    known = np.isfinite(errors)
-    largest = np.abs(np.where(known, errors, 0)).argmax(axis=1)
-    error = np.take_along_axis(errors, largest[:, None], axis=1)[:, 0]
-    found = rows.assign(error=error, complete=known.all(axis=1))
-    of_pair = found["error"].abs().groupby(found["number"]).transform("max")
-    return found.assign(worst=found["error"].abs() == of_pair)
-
-
-def _one(rows: pd.DataFrame, column: str) -> pd.DataFrame:
-    """With one of the errors as the one to be drawn."""
-    found = rows.assign(error=rows[column], complete=True)
-    of_pair = found["error"].abs().groupby(found["number"]).transform("max")
-    return found.assign(worst=found["error"].abs() == of_pair)
+def _with_largest(rows: pd.DataFrame) -> pd.DataFrame:
+    """With the error that is largest in size, and whether it is that of all fractions."""
+    errors = rows[AT_FRACTIONS]
+    largest = errors.abs().fillna(0).to_numpy().argmax(axis=1)
+    error = errors.to_numpy(float)[np.arange(len(rows)), largest]
+    return rows.assign(error=error, complete=errors.notna().all(axis=1))
 
 
 def _shown(rows: pd.DataFrame) -> pd.DataFrame:
@@ -195,17 +134,10 @@ def _shown(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _points(ax: Axes, rows: pd.DataFrame) -> None:
     shown = _shown(rows)
-    for _, own in split(shown, "number"):
-        ax.plot(own["x"], own["y"], color="0.75", lw=0.6, zorder=1, gid="pair")
-    for (method, marker, same, worst), own in split(
-        shown, "method", "marker", "same_model", "worst"
-    ):
+    for (method, marker, same), own in split(shown, "method", "marker", "same_model"):
         colour = METHODS[str(method)]
         look: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
-        alpha = 1.0 if worst else 0.45
-        ax.plot(
-            own["x"], own["y"], ls="", ms=5, mew=0.9, alpha=alpha, zorder=3, gid="point", **look
-        )
+        ax.plot(own["x"], own["y"], ls="", ms=5, mew=0.9, zorder=3, gid="point", **look)
     reference = float(rows["reference_error"].max())
     if reference > FLOOR:
         ax.axhspan(0, reference, zorder=0, gid="reference", **REFERENCE)
@@ -213,14 +145,13 @@ def _points(ax: Axes, rows: pd.DataFrame) -> None:
 
 def _front(ax: Axes, rows: pd.DataFrame) -> None:
     shown = _shown(rows)
-    for _, own in split(shown[shown["pareto"].astype(bool)], "scene"):
-        front = own.sort_values("x")
-        ax.step(front["x"], front["y"], where="post", **FRONT)
+    front = shown[shown["pareto"].astype(bool)].sort_values("x")
+    ax.step(front["x"], front["y"], where="post", **FRONT)
 
 
 def _title(rows: pd.DataFrame) -> str:
-    scenes = list(dict.fromkeys(rows["scene"]))
-    return f"{rows['packing'].iloc[0]} packing: {'; '.join(scenes)}"
+    packing, piles = rows["packing"].iloc[0], rows["piles"].max()
+    return f"{packing} packing; each pair of levels on at most {piles} piles"
 
 
 def _left_out(ax: Axes, rows: pd.DataFrame) -> None:
@@ -257,11 +188,6 @@ def _scales(axes: Sequence[Axes], last: Sequence[Axes], parts: Sequence[pd.DataF
             ax.text(1, tolerance, text, va="center", transform=place, **style.NOTE)
 
 
-def _each(table: pd.DataFrame) -> Iterator[Any]:
-    """Rows with their columns as attributes."""
-    yield from table.itertuples(index=False)
-
-
 def _empty(ax: Axes) -> None:
     ax.text(0.5, 0.5, NOTHING, ha="center", va="center", transform=ax.transAxes, **style.NOTE)
     ax.set(xticks=[], yticks=[])
@@ -270,8 +196,8 @@ def _empty(ax: Axes) -> None:
 def _write_tags(ax: Axes, rows: pd.DataFrame, size: float, text: Callable[[Any], str]) -> None:
     """Tag each pair that has a text."""
     shown = _shown(rows)
-    worst = shown[shown["worst"]].drop_duplicates("number").sort_values("x")
-    found = [Tag(text(row), row.x, row.y, METHODS[row.method]) for row in _each(worst)]
+    each: Any = shown.sort_values("x").itertuples(index=False)
+    found = [Tag(text(row), row.x, row.y, METHODS[row.method]) for row in each]
     # the long ones first: the short ones fit in between
     written = sorted((tag for tag in found if tag.text), key=lambda tag: -len(tag.text))
     tags.write(ax, written, shown[["x", "y"]].to_numpy(float), size)
@@ -291,10 +217,10 @@ def _method_entries(table: pd.DataFrame) -> list[Artist]:
 
 
 def _key(table: pd.DataFrame) -> list[Artist]:
-    first = table.drop_duplicates("number")
+    rows: Any = table.drop_duplicates("number").itertuples(index=False)
     return [
         Line2D([], [], ls="", marker=f"${r.number}$", ms=5, label=r.name, color=METHODS[r.method])
-        for r in _each(first)
+        for r in rows
     ]
 
 

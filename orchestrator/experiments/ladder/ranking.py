@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.experiments.ladder import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.experiments.ladder.pairs import AGAIN, BESIDE, FINER, REFERENCE
 from orchestrator.fidelity.levels import Part
 from orchestrator.report.results import split
 
 Row = dict[str, Any]
+ERRORS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
 TAU, CURVE = "tau_", "curve_"
 """Beginnings of the columns of thresholds: at the asked fractions, and along the curve."""
 
@@ -24,7 +25,7 @@ def errors(found: pd.DataFrame) -> pd.DataFrame:
     reference itself moved when all of its numbers were changed.
     """
     parts = [_against(own) for _, own in found.groupby("scene_id", sort=False)]
-    return pd.concat(parts, ignore_index=True) if parts else found
+    return pd.concat(parts, ignore_index=True)
 
 
 def _columns(table: pd.DataFrame, start: str) -> list[str]:
@@ -68,6 +69,25 @@ def with_front(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(pareto=[key in front for key in zip(*columns, strict=True)])
 
 
+def together(points: pd.DataFrame) -> pd.DataFrame:
+    """One row for each pair and packing: the mean cost, the largest errors with their signs."""
+    groups = points.groupby(["packing", "flow_level", "grain_level"], sort=False)
+    table = groups[list(ERRORS)].agg(_worst)
+    table = table.assign(
+        piles=groups.size(),
+        cost_core_s=groups["cost_core_s"].mean(),
+        reference_error=groups["reference_error"].max(),
+        same_model=groups["same_model"].first(),
+        pareto=groups["pareto"].first(),
+    )
+    return table.reset_index()
+
+
+def _worst(values: pd.Series) -> float:
+    """The value of the largest size; NaN where a fraction was not reached in one of the scenes."""
+    return math.nan if values.isna().any() else float(max(values, key=abs))
+
+
 def _largest(values: pd.Series) -> float:
     """With a NaN among them it is NaN: a fraction was not reached."""
     return float(values.max(skipna=False))
@@ -88,7 +108,7 @@ def known(found: pd.DataFrame) -> pd.DataFrame:
     """What is known of each level, by class of scene and fraction; `calibration` reads it.
 
     The error is the largest over the scenes, infinite where one of the two did not reach the
-    fraction; the uncertainty is how far the reference itself moved on scenes of that kind.
+    fraction; the uncertainty is how far the reference itself moved on scenes of that class.
     """
     grains = found[(found["flow_level"] == REFERENCE[0]) & (found["asked"] == "dem")]
     flow = found[(found["grain_level"] == BESIDE) & found["same_model"]]
@@ -102,7 +122,8 @@ def known(found: pd.DataFrame) -> pd.DataFrame:
 def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
     for scene_class, alike in table.groupby(f"class_{part}", sort=True):
         by_level = {level: rows.set_index("scene_id") for level, rows in alike.groupby(name)}
-        for level, rows in by_level.items():
+        # without the reference nothing is known of the others
+        for level, rows in by_level.items() if dearest in by_level else ():
             for column in _columns(table, TAU):
                 yield {
                     "part": part,

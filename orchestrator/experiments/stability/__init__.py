@@ -1,0 +1,1 @@
+"""Maps of where each method fails; every cell is a run."""
