@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator import plan, tables
+from orchestrator import pipeline, plan, tables
 from orchestrator.benchmark import exact, measured, ours, pack
 from orchestrator.benchmark.problem import Problem
 from orchestrator.errors import InputError
@@ -42,14 +42,18 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     Raises
     ------
     InputError
-        If a level needs a study, or the study is not finished.
+        If a level needs a study, or the study is not finished or not answered as it asks.
     """
     if source is None:
         return _formulas(root, levels or FORMULAS)
     space = Workspace(source.absolute())
-    about = space.description()
-    asked = study.parse(about["study"], name=about["name"], where=str(source))
-    planned = plan.make(asked)
+    asked, planned = pipeline.reopen(space)
+    if not all(one.is_as_asked for one in planned.decisions.values()):
+        raise InputError(
+            f"its scenes were answered within a tolerance of {asked.tolerance:g}, not as they ask",
+            where=str(source),
+            remedy="run the study without a tolerance into another directory",
+        )
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))
     return pack.write(root, problems, (asked.name, asked.text), case.programs(space.cases))

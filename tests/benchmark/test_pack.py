@@ -162,12 +162,16 @@ def test_a_pack_of_formulas_without_liggghts(
 
 
 def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
+    (tmp_path / "one.toml").write_text("[grain]\ndiameter = 1e-3\n")
+    ended = orchestrator("study", "one.toml", "--tolerance", "0.1", "--out", "tolerant")
+    assert ended.returncode == 0, ended.stderr
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("\\end")
     for arguments, words in (
         (("new", "--level", "3"), ("--level", "--from")),
         (("mine",), ("thesis.tex", "not a benchmark pack")),
         (("new", "--from", "mine"), ("no study",)),
+        (("new", "--from", "tolerant"), ("tolerance of 0.1", "without a tolerance")),
     ):
         ended = orchestrator("benchmark", "export", *arguments)
         assert ended.returncode == 2
