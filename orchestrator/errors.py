@@ -35,12 +35,12 @@ class OrchestratorError(Exception):
         super().__init__(what, where, remedy)
 
     def __str__(self) -> str:
-        place = f"{_line(self.where)}: " if self.where else ""
-        advice = f" ({_line(self.remedy)})" if self.remedy else ""
-        return f"{place}{_line(self.what)}{advice}"
+        place = f"{one_line(self.where)}: " if self.where else ""
+        advice = f" ({one_line(self.remedy)})" if self.remedy else ""
+        return f"{place}{one_line(self.what)}{advice}"
 
 
-def _line(text: str) -> str:
+def one_line(text: str) -> str:
     """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
     cut = text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)

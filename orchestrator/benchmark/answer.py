@@ -2,7 +2,11 @@
 
 import csv
 import difflib
+import errno
 import math
+import os
+import stat
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +17,8 @@ from orchestrator.errors import OrchestratorError
 
 COLUMNS = ("quantity", "at", "value")
 FILE = "answer.csv"
+MOST = 4 * 2**20
+"""Size of an answer, bytes: more numbers than any pack asks."""
 Key = tuple[str, str]
 """Quantity, and the text of its `at` with seven digits."""
 STEPS: Key = ("steps", "")
@@ -61,12 +67,58 @@ def numbers(path: Path) -> dict[Key, float]:
     AnswerError
         If the file is missing or not whole.
     """
-    if not path.is_file():
-        raise AnswerError(f"it wrote no {FILE}")
+    return parsed(content(path))
+
+
+def parsed(text: bytes) -> dict[Key, float]:
+    """The numbers of an answer that was read.
+
+    Raises
+    ------
+    AnswerError
+        If it is not whole.
+    """
     try:
-        return dict(_rows(path.read_text(encoding="utf-8")))
+        return dict(_rows(text.decode()))
     except UnicodeDecodeError:
         raise AnswerError(f"{FILE} is no text") from None
+    except csv.Error as error:
+        raise AnswerError(f"{FILE} is no table: {error}") from None
+
+
+def content(path: Path | str, *, folder: int | None = None) -> bytes:
+    """The bytes of an answer; a program that means harm may have put anything there.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    folder : int, optional
+        An open directory that the path starts from.
+
+    Raises
+    ------
+    AnswerError
+        If there is no file, or it is too large to be an answer.
+    """
+    try:
+        # a pipe must not be waited for, nor a link followed to what another program wrote
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=folder)
+    except FileNotFoundError:
+        raise AnswerError(f"it wrote no {FILE}") from None
+    except OSError as error:
+        why = "it is a link" if error.errno == errno.ELOOP else error.strerror
+        raise AnswerError(f"{FILE} cannot be read: {why}") from None
+    try:
+        state = os.fstat(handle)
+        if not stat.S_ISREG(state.st_mode):
+            raise AnswerError(f"{FILE} is no file")
+        if state.st_size > MOST:
+            size = state.st_size / 2**20
+            raise AnswerError(f"{FILE} has {size:.0f} MiB, more than {MOST // 2**20}")
+        return os.read(handle, MOST)
+    finally:
+        os.close(handle)
 
 
 def _rows(text: str) -> list[tuple[Key, float]]:
@@ -77,10 +129,8 @@ def _rows(text: str) -> list[tuple[Key, float]]:
     rows = [_row(number, row) for number, row in enumerate(csv.reader(lines[1:]), 2) if row]
     if not text.endswith("\n"):
         raise AnswerError(f"{FILE} is cut short: line {len(lines)} has no end")
-    keys = [found for found, _ in rows]
-    twice = (
-        next((k for k in keys if keys.count(k) > 1), None) if len(set(keys)) < len(keys) else None
-    )
+    counts = Counter(found for found, _ in rows)
+    twice = next((one for one, count in counts.items() if count > 1), None)
     if twice:
         raise AnswerError(f"{FILE} answers {_said(twice)} twice")
     return rows
@@ -112,7 +162,9 @@ def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
 
 def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     total = found.get(("count", ""), count)
-    moved = sorted((float(at), n) for (quantity, at), n in found.items() if quantity == "moved")
+    moved = sorted(
+        (float(at), n) for (quantity, at), n in found.items() if quantity == "moved" and at
+    )
     for (_, before), (load_step, n) in pairwise(moved):
         if n < before:
             raise AnswerError(

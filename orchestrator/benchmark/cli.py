@@ -1,12 +1,14 @@
 """The commands of the benchmark: parse, call, print."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
 
 LEVELS = (1, 2, 3, 4, 5)
 LIMIT_S = 600.0
+MEMORY_GIB = 4.0
 
 
 def add(commands: Any) -> None:
@@ -45,7 +47,18 @@ def _add_run(parts: Any) -> None:
         "--out", type=Path, metavar="RESULTS", help="default: results/benchmark-NAME of the pack"
     )
     command.add_argument(
-        "--limit", type=float, default=LIMIT_S, metavar="S", help="for a scene; default %(default)g"
+        "--limit",
+        type=_positive,
+        default=LIMIT_S,
+        metavar="S",
+        help="wall time for a scene; default %(default)g",
+    )
+    command.add_argument(
+        "--memory",
+        type=_positive,
+        default=MEMORY_GIB,
+        metavar="GIB",
+        help="for a scene, all processes of the solver together; default %(default)g",
     )
     _add_choice(command)
     command.set_defaults(run=_run)
@@ -67,7 +80,8 @@ def _add_compare(parts: Any) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="of the page; default: the only RESULTS, or results/benchmark-NAME of the pack",
+        help="of the page; default: the only RESULTS, if run wrote them, or"
+        " results/benchmark-NAME of the pack",
     )
     _add_choice(command)
     command.set_defaults(run=_compare)
@@ -105,23 +119,25 @@ def _export(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     from orchestrator.benchmark import runner
+    from orchestrator.runs.confined import GIB, Limits
 
-    out = options.out or _usual(options.pack)
     choice = runner.Choice(options.level, options.scene)
-    return _end(runner.run(options.pack, options.solver, out, choice, options.limit))
+    limits = Limits(seconds=options.limit, memory=int(options.memory * GIB))
+    return _end(runner.run(options.pack, options.solver, options.out, choice, limits))
 
 
 def _compare(options: argparse.Namespace) -> int:
     from orchestrator.benchmark import runner
 
-    alone = options.results[0] if len(options.results) == 1 else None
-    out = options.out or alone or _usual(options.pack)
     choice = runner.Choice(options.level, options.scene)
-    return _end(runner.compare(options.pack, options.results, out, choice))
+    return _end(runner.compare(options.pack, options.results, options.out, choice))
 
 
-def _usual(pack: Path) -> Path:
-    return Path("results") / f"benchmark-{pack.absolute().name}"
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError("more than 0, and finite")
+    return number
 
 
 def _end(found: Any) -> int:

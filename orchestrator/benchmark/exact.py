@@ -109,13 +109,13 @@ def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
 def checks() -> Iterator[Problem]:
     """Level 2: the contact law, on the reference grain of the decks."""
     for damping in DAMPINGS:
-        yield _collision(damping)
-    for incline in INCLINES_DEG:
-        yield _incline(incline)
+        yield collision(damping)
+    for angle in INCLINES_DEG:
+        yield incline(angle)
     for speed in SPEEDS:
-        yield _sliding(speed)
+        yield sliding(speed)
     for push in PUSHES:
-        yield _passing(push)
+        yield passing(push)
 
 
 def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> dict[str, Any]:
@@ -132,7 +132,8 @@ def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> dict[str, An
     }
 
 
-def _collision(damping: float) -> Problem:
+def collision(damping: float) -> Problem:
+    """Two grains that meet: how fast they part."""
     told = _contact(damping)
     root = np.sqrt(1 - damping**2)
     # the contact ends where the force does, not the overlap
@@ -142,7 +143,8 @@ def _collision(damping: float) -> Problem:
     return Problem(2, f"collision-{damping:g}", "collision", told, {}, asked)
 
 
-def _incline(incline_deg: float) -> Problem:
+def incline(incline_deg: float) -> Problem:
+    """A grain that is let go on a plane: how it speeds up."""
     told = _contact()
     friction = np.tan(np.radians(told["phi_deg"]))
     a = np.radians(incline_deg)
@@ -153,7 +155,8 @@ def _incline(incline_deg: float) -> Problem:
     return Problem(2, f"incline-{incline_deg:g}", "incline", told, {}, asked)
 
 
-def _sliding(speed: float) -> Problem:
+def sliding(speed: float) -> Problem:
+    """A grain that slides until it rolls; `speed` in sqrt(d g')."""
     told = _contact()
     start = speed * UNIT
     friction = float(np.tan(np.radians(told["phi_deg"])))
@@ -167,7 +170,8 @@ def _sliding(speed: float) -> Problem:
     return Problem(2, f"sliding-{speed:g}", "sliding", told, {}, expectations(rows))
 
 
-def _passing(push: float) -> Problem:
+def passing(push: float) -> Problem:
+    """A grain that is pushed over its neighbour; `push` as in `passing_time`."""
     told = _contact(stiffness=PASSING_STIFFNESS)
     beta = np.radians(PASSING_DEG)
     value = passing_time(push, MARKER)

@@ -57,12 +57,20 @@ KINDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "line": (5, (*_FLUID, *_FLOW)),
 }
 """Level of each kind, and the numbers that a scene of it has at least."""
-DRAWN = {
-    "flow": {"ustar_over_ustar0"},
-    "pile": {"moved", "not_moved"},
-    "line": {"moved", "not_moved"},
+_COUNTS = ("moved", "not_moved")
+_BED = (*_COUNTS, "carried_off", "ustar0_m_s", "shields")
+ASKED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "closed-form": (("ustar_m_s", "reynolds", "shields"), ("drag_n", "lift_n")),
+    "collision": (("restitution",), ()),
+    "incline": (("acceleration_over_g",), ()),
+    "sliding": ((), ("speed_over_start", "spin_over_start")),
+    "passing": (("passing_time_over_t",), ()),
+    "pivot": (("ustar_m_s",), ()),
+    "flow": (("windward_mean",), ("ustar_over_ustar0",)),
+    "pile": ((), _BED),
+    "line": (("count",), _BED),
 }
-"""What is asked of a kind as a function of something, at least."""
+"""What is asked of each kind: single numbers, and functions of something."""
 
 Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 SceneName = Annotated[str, Field(max_length=80, pattern=f"^{_SCENE}$")]
@@ -242,11 +250,23 @@ def expected(path: Path, scenes: Mapping[str, Any]) -> pd.DataFrame:
     _check_table(table, path)
     if set(table["scene"]) != set(scenes):
         refuse("its scenes are not those of the manifest", path)
-    asked = table[table["at"] != ""].groupby("scene")["quantity"].agg(set).to_dict()
-    for name, told in scenes.items():
-        if lacking := DRAWN.get(told["kind"], set()) - asked.get(name, set()):
-            refuse(f"it asks {name} for no {min(lacking)}", path)
+    for name, rows in table.groupby("scene"):
+        _check_asked(rows, str(scenes[str(name)]["kind"]), path)
     return table
+
+
+def _check_asked(rows: pd.DataFrame, kind: str, path: Path) -> None:
+    """See that a scene is asked what its kind is, and its counts at the same places."""
+    places = rows.groupby("quantity")["at"].agg(set).to_dict()
+    single, functions = ASKED[kind]
+    for quantity, at in places.items():
+        if not (quantity in single and at == {""}) and not (quantity in functions and "" not in at):
+            refuse(f"{kind} is not asked {quantity} like this", path)
+    lacking = set(_COUNTS) & {*functions} - places.keys()
+    if lacking or not places.get("not_moved", set()) <= places.get("moved", set()):
+        refuse(f"{rows['scene'].iloc[0]} is asked how many have moved, or not, at no place", path)
+    if not places.get("carried_off", set()) <= places.get("not_moved", set()):
+        refuse(f"{rows['scene'].iloc[0]} is asked carried_off where not_moved is not", path)
 
 
 def mobile(path: Path) -> int:

@@ -119,7 +119,7 @@ def _formula(told: Told, wrong: pd.DataFrame) -> str:
     own = wrong[~wrong["quantity"].isin(DERIVED)]
     used = own if len(own) else wrong
     for cause, change in _changes(told):
-        answer = _answer({**told, **change})
+        answer = formulas({**told, **change})
         expected = [answer(q, at) for q, at in zip(used["quantity"], used["at"], strict=True)]
         matters = not np.allclose(used["value"], expected, rtol=EXACT, atol=0)
         if matters and np.allclose(used["found"], expected, rtol=EXACT, atol=0):
@@ -143,7 +143,7 @@ def _changes(told: Told) -> Iterator[tuple[str, Told]]:
         yield f"g is {g:g}, not {told['g_m_s2']:g} m/s2", {"g_m_s2": g}
 
 
-def _answer(told: Told) -> Callable[[str, str], float]:
+def formulas(told: Told) -> Callable[[str, str], float]:
     """The formulas of level 1."""
     law = LAWS[told["force_law"]]
     around = ("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s")

@@ -15,11 +15,12 @@ from orchestrator.benchmark.intake import SCENES
 from orchestrator.benchmark.problem import ASK, SCENE, SCHEMA, Problem, csv
 from orchestrator.errors import InputError
 from orchestrator.runs import claim
-from orchestrator.runs.files import digest_files, text_of
+from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
 
 MANIFEST = "manifest.json"
 EXPECTED = "expected.csv"
 STUDY = "study.toml"
+TIMES = "times.csv"
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,12 @@ class Pack:
     scenes: dict[str, dict[str, Any]]
     expected: pd.DataFrame
     manifest: Mapping[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """One digest of what is asked and expected: not of the times that ours took."""
+        sums = {name: sum for name, sum in self.manifest["sha256"].items() if name != TIMES}
+        return digest_text(canonical_json(sums))
 
     def directory(self, scene: str) -> Path:
         """What the solver of a scene is given."""

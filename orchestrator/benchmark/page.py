@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import pandas as pd
 
@@ -26,19 +25,26 @@ LIMITS = (
 )
 
 
-def write(pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame, file: Path) -> None:
-    """Write the page and its figures; `levels` is the summary."""
+def write(
+    pack: Pack,
+    contenders: Sequence[Contender],
+    levels: pd.DataFrame,
+    folder: Folder,
+    name: str,
+    notes: Sequence[str],
+) -> None:
+    """Put the page and its figures into a directory; `levels` is the summary."""
     names = ", ".join(one.name for one in contenders)
     title = f"Against the pack “{pack.root.name}”: {names}"
-    sections = list(_sections(pack, contenders, levels))
-    programs = pack.manifest.get("programs", {})
-    experiment.write(title, sections, Folder(file.parent), file.name, programs)
+    sections = list(_sections(pack, contenders, levels, notes))
+    experiment.write(title, sections, folder, name, pack.manifest.get("programs", {}))
 
 
 def _sections(
-    pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame
+    pack: Pack, contenders: Sequence[Contender], levels: pd.DataFrame, notes: Sequence[str]
 ) -> Iterator[Section]:
-    yield Section("Levels", _levels(pack, contenders), (), (_sheet(levels),), LIMITS)
+    limits = (*LIMITS, *notes)
+    yield Section("Levels", _levels(pack, contenders), (), (_sheet(levels),), limits)
     failed = _failed(contenders)
     if not failed.empty:
         yield Section("What failed", tables=(_sheet(failed),))

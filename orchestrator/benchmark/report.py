@@ -11,8 +11,8 @@ import pandas as pd
 
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict, failures
-from orchestrator.report import settings
-from orchestrator.runs.files import write_durably
+from orchestrator.report import FIGURES, settings
+from orchestrator.runs.folder import Folder
 
 PAGE = "comparison.html"
 NUMBERS = "comparison.csv"
@@ -38,23 +38,37 @@ class Found:
     page: Path
 
 
-def write(pack: Pack, contenders: Sequence[Contender], root: Path) -> Found:
-    """Write tables, figures and page of a comparison into a directory."""
+def write(
+    pack: Pack, contenders: Sequence[Contender], folder: Folder, notes: Sequence[str]
+) -> Found:
+    """Put tables, figures and page of a comparison into a directory.
+
+    Parameters
+    ----------
+    pack : Pack
+        What was asked.
+    contenders : sequence of Contender
+        The solvers.
+    folder : Folder
+        The directory.
+    notes : sequence of str
+        What is known of how each solver ran, for the page.
+    """
     numbers = pd.concat([one.rows.assign(solver=one.name) for one in contenders])
-    _write(numbers, root / NUMBERS, "%.9g")
-    _write(pd.DataFrame(_verdicts(contenders)), root / VERDICTS, "%.6g")
     levels = summary(contenders)
-    with settings.own():
+    with settings.own(), folder.renewed(NUMBERS, VERDICTS, PAGE, FIGURES):
+        folder.put(NUMBERS, _text(numbers, "%.9g"))
+        folder.put(VERDICTS, _text(pd.DataFrame(_verdicts(contenders)), "%.6g"))
         # the drawing libraries take half a second to import: only who draws waits for them
         from orchestrator.benchmark import page
 
-        page.write(pack, contenders, levels, root / PAGE)
-    return Found(_failures(contenders), levels.to_string(index=False), root / PAGE)
+        page.write(pack, contenders, levels, folder, PAGE, notes)
+    return Found(_failures(contenders), levels.to_string(index=False), folder.root / PAGE)
 
 
-def _write(table: pd.DataFrame, path: Path, digits: str) -> None:
+def _text(table: pd.DataFrame, digits: str) -> str:
     columns = ["solver", *table.columns.drop("solver")]
-    write_durably(path, table[columns].to_csv(index=False, float_format=digits))
+    return table[columns].to_csv(index=False, float_format=digits)
 
 
 def _verdicts(contenders: Sequence[Contender]) -> Iterator[dict[str, Any]]:

@@ -1,23 +1,27 @@
 """A solver on the scenes of a pack: each in a process of its own, watched, ours in turn."""
 
 import fnmatch
-import shlex
-import shutil
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from orchestrator.benchmark import meter, pack, report
+from orchestrator.benchmark import pack, report, variants
 from orchestrator.benchmark.answer import FILE
-from orchestrator.benchmark.ours import Ours
+from orchestrator.benchmark.ours import Ours, Took
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.problem import csv
 from orchestrator.benchmark.report import Found
+from orchestrator.benchmark.solver import Solver, split
 from orchestrator.benchmark.verdict import OURS, USED, compared
+from orchestrator.benchmark.watch import Watch
 from orchestrator.errors import InputError
-from orchestrator.runs import process
-from orchestrator.runs.files import digest_files, read_json, write_json
+from orchestrator.runs import claim, confined
+from orchestrator.runs.confined import Limits, Used
+from orchestrator.runs.files import text_of
+from orchestrator.runs.folder import Folder
 
 LOG = "log.txt"
 
@@ -51,7 +55,7 @@ class Choice:
         return named and (not self.levels or level in self.levels)
 
 
-def compare(root: Path, results: Sequence[Path], out: Path, choice: Choice) -> Found:
+def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choice) -> Found:
     """Compare answers that are there with a pack; write one page of all solvers.
 
     Parameters
@@ -60,8 +64,8 @@ def compare(root: Path, results: Sequence[Path], out: Path, choice: Choice) -> F
         The pack.
     results : sequence of Path
         A directory for each solver, which is named by it: ``RESULTS/SCENE/answer.csv``.
-    out : Path
-        Where page and tables go.
+    out : Path or None
+        Where page and tables go; by default where `run` left the only results, else `usual`.
     choice : Choice
         Which scenes.
 
@@ -76,8 +80,30 @@ def compare(root: Path, results: Sequence[Path], out: Path, choice: Choice) -> F
         if not one.is_dir():
             raise InputError("there is no such directory", where=str(one), remedy="name another")
     _check_names([one.absolute().name for one in results])
-    _claim(out.absolute(), chosen)
-    return report.write(chosen, [compared(chosen, names, one) for one in results], out)
+    made = [_made(one) for one in results]
+    alone = results[0] if len(results) == 1 and made[0] else usual(root)
+    place = out or alone
+    same = place.absolute() == results[0].absolute() and bool(made[0])
+    kind = claim.RESULTS if same else claim.COMPARISON
+    name = made[0]["name"] if same else chosen.root.name
+    contenders = [compared(chosen, names, one) for one in results]
+    notes = [
+        _note(one.name, told.get("hidden")) for one, told in zip(contenders, made, strict=True)
+    ]
+    _check_apart(place.absolute(), chosen)
+    with claim.claimed(place, kind, name) as folder:
+        return report.write(chosen, contenders, folder, notes)
+
+
+def _made(results: Path) -> dict[str, Any]:
+    """What `run` noted in its results; nothing of those that something else made."""
+    told = claim.told(results, claim.RESULTS)
+    return told if told and told["kind"] == claim.RESULTS.word else {}
+
+
+def usual(root: Path) -> Path:
+    """Where results go if nobody says where."""
+    return Path("results") / f"benchmark-{root.absolute().name}"
 
 
 def _check_names(names: Sequence[str]) -> None:
@@ -91,7 +117,12 @@ def _check_names(names: Sequence[str]) -> None:
         )
 
 
-def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> Found:
+def _check_apart(out: Path, chosen: Pack) -> None:
+    if out == chosen.root or chosen.root in out.parents:
+        raise InputError("the results may not lie in the pack", where=str(out), remedy="use --out")
+
+
+def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limits) -> Found:
     """Run a solver on scenes of a pack, ours in turn, compare, and write the page.
 
     Parameters
@@ -101,12 +132,12 @@ def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> 
     command : str
         The solver's, with ``{case}`` and ``{out}``; it is split as a shell would, but no shell
         reads it.
-    out : Path
-        Where the results go.
+    out : Path or None
+        Where the results go; by default `usual`.
     choice : Choice
         Which scenes.
-    limit_s : float
-        Wall time after which a run counts as hung, s.
+    limits : Limits
+        What the solver may take for a scene.
 
     Raises
     ------
@@ -115,147 +146,119 @@ def run(root: Path, command: str, out: Path, choice: Choice, limit_s: float) -> 
     """
     chosen = pack.read(root.absolute())
     names = choice.of(chosen)
-    words = split(command)
-    out = out.absolute()
+    out = (out or usual(root)).absolute()
     _check_names([out.name])
-    _claim(out, chosen)
-    ours, watch = Ours(chosen, out / OURS / "cases"), _Watch(chosen, out)
-    ours.root.mkdir(parents=True, exist_ok=True)
-    for number, name in enumerate(names, 1):
-        print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
-        watch.forget(out / name / FILE)
-        watch.forget(out / OURS / name / FILE)
-        _attempt(chosen, name, words, out, limit_s, watch)
-        _answer_ours(ours, name, out / OURS / name)
-        watch.keep(out / name / FILE)
-        watch.keep(out / OURS / name / FILE)
-    chosen.verify()
-    return report.write(chosen, [compared(chosen, names, out)], out)
+    _check_apart(out, chosen)
+    solver = Solver(split(command), limits, _secrets(chosen, out))
+    ours = Ours(chosen, out / OURS / "cases")
+    with claim.claimed(out, claim.RESULTS, command) as folder:
+        _check_answers(folder, chosen)
+        note = _note(out.name, confined.hides())
+        print(note, file=sys.stderr, flush=True)
+        watch = Watch(chosen, folder)
+        again = variants.drawn(chosen.scenes, names)
+        for number, name in enumerate(names, 1):
+            print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
+            _attempt(name, solver, folder, watch, again=name in again)
+            _answer_ours(name, ours, folder, watch)
+        chosen.verify()
+        return report.write(chosen, [compared(chosen, names, out)], folder, [note])
 
 
-def split(command: str) -> list[str]:
-    """The words of a command; files that it names keep their meaning in another directory.
+def _secrets(chosen: Pack, out: Path) -> list[Path]:
+    """The pack, the results, and what else holds answers beside them or the working directory."""
+    here = Path.cwd()
+    places = (chosen.root.parent, out.parent, here, here / "results", here / "packs")
+    beside = (path for place in places if place.is_dir() for path in place.iterdir())
+    known = {path.resolve() for path in beside if any(claim.told(path, k) for k in claim.KINDS)}
+    found = known | {chosen.root.resolve(), out.resolve()}
+    # what lies in another is hidden with it
+    return sorted(path for path in found if found.isdisjoint(path.parents))
 
-    Raises
-    ------
-    InputError
-        If it has no ``{case}`` or ``{out}``, or its program is not there.
-    """
-    try:
-        words = shlex.split(command)
-    except ValueError as error:
-        raise InputError(f"the command cannot be read: {error}", where="--solver") from None
-    for part in ("{case}", "{out}"):
-        if not any(part in word for word in words):
-            raise InputError(
-                f"the command has no {part}",
-                where="--solver",
-                remedy="such as 'my-solver {case} {out}'",
-            )
-    if shutil.which(words[0]) is None:
-        raise InputError(
-            f"there is no program {words[0]}", where="--solver", remedy="give its path"
+
+def _note(name: str, hidden: bool | None) -> str:
+    """What is known of what a solver saw while it answered."""
+    if hidden is None:
+        return f"{name}: nothing is known of how its answers were made."
+    if hidden:
+        return (
+            f"{name} ran without sight of the pack, of these results, and of the packs, studies and"
+            " results beside them."
         )
-    return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
+    return (
+        f"{name} could see the pack with its expected answers: this system lets no program run"
+        " without sight of a directory (no user namespaces)."
+    )
 
 
-def _claim(out: Path, chosen: Pack) -> None:
-    if out == chosen.root or chosen.root in out.parents:
-        raise InputError("the results may not lie in the pack", where=str(out), remedy="use --out")
-    out.mkdir(parents=True, exist_ok=True)
+def _check_answers(folder: Folder, chosen: Pack) -> None:
+    """See that a directory holds answers to this pack or none, and say so in its marker."""
+    told = _made(folder.root)
+    if told.get("pack", chosen.digest) != chosen.digest:
+        raise InputError(
+            "the directory holds answers to another pack, or to this one before it was exported"
+            " again",
+            where=str(folder.root),
+            remedy="choose another with --out, or remove it",
+        )
+    about = {**told, "pack": chosen.digest, "hidden": confined.hides()}
+    folder.note(claim.RESULTS.marker, text_of(about))
 
 
-def _attempt(
-    chosen: Pack, name: str, words: Sequence[str], out: Path, limit_s: float, watch: "_Watch"
-) -> None:
+def _attempt(name: str, solver: Solver, folder: Folder, watch: Watch, *, again: bool) -> None:
     """Run the solver on one scene; what it took, or why it failed, is in its directory.
+
+    It may be asked `again`, with other numbers.
 
     Raises
     ------
     InputError
         If it changed the pack.
     """
-    folder = out / name
-    shutil.rmtree(folder, ignore_errors=True)
-    case = folder / "case"
-    shutil.copytree(chosen.directory(name), case)
-    given = [w.replace("{case}", str(case)).replace("{out}", str(folder / FILE)) for w in words]
-    metered = [sys.executable, "-I", "-S", meter.__file__, str(folder / USED), *given]
-    ended = process.run(metered, cwd=folder, log=folder / LOG, limit_s=limit_s)
-    used = read_json(folder / USED) or {"seconds": ended.seconds}
-    error = ""
-    if ended.timed_out:
-        error = f"it did not end within {limit_s:g} s and was killed"
-    elif used.get("returncode") != 0:
-        said = process.last_words(folder / LOG)
-        error = f"it ended with {used.get('returncode')}{said and f': {said}'}"
-    elif _digests(case) != _digests(chosen.directory(name)):
-        error = "it changed the files of its case"
+    place = f"{name}/{FILE}"
+    watch.forget(place)
+    own = folder.clear(name, {FILE, LOG, USED}.__contains__)
+    own.mkdir()
+    solved = solver.solve(watch.pack.directory(name), own / LOG)
+    error = solved.error
+    if solved.answer is not None:
+        watch.keep(place, solved.answer)
+        if again and not error:
+            error = _known_by_heart(watch.pack, name, solver, solved.answer)
     harm, other = watch.harm(), watch.restored()
-    write_json(folder / USED, {**used, "error": harm or other or error})
+    error = harm or other or error
+    folder.note(f"{name}/{USED}", text_of({**_known(solved.used), "error": error}))
     if harm:
-        raise InputError(f"{name}: {harm}", where=str(chosen.root), remedy="export it again")
+        raise InputError(
+            f"{name}: {harm}: the pack is not used further",
+            where=str(watch.pack.root),
+            remedy="export it again",
+        )
 
 
-def _digests(folder: Path) -> dict[str, str]:
-    return digest_files((path for path in folder.rglob("*") if path.is_file()), root=folder)
+def _known_by_heart(chosen: Pack, name: str, solver: Solver, given: bytes) -> str:
+    """Why right answers to a scene are no answers: they are wrong where its numbers differ."""
+    expected = chosen.expected[chosen.expected["scene"] == name]
+    problem = variants.variant(chosen.scenes[name])
+    if problem is None or variants.wrong(
+        expected, given
+    ):  # of what is wrong the verdict tells more
+        return ""
+    with tempfile.TemporaryDirectory() as place:
+        problem.write(Path(place) / "scene")
+        solved = solver.solve(Path(place) / "scene", Path(place) / LOG)
+    wrong = solved.error or variants.wrong(problem.expected, solved.answer or b"")
+    changed = variants.changes(chosen.scenes[name], problem.parameters)
+    return f"it fails the same scene with {changed}: {wrong}" if wrong else ""
 
 
-Mark = tuple[int, int] | None
-"""When a file was written and how long it is; None where there is none."""
-
-
-class _Watch:
-    """The pack, and the answers that are there: no solver may touch them."""
-
-    def __init__(self, chosen: Pack, out: Path) -> None:
-        self.pack = chosen
-        self.given = {path: _mark(path) for path in chosen.files()}
-        self.answers: dict[Path, tuple[Mark, bytes]] = {}
-        for path in (*out.glob(f"*/{FILE}"), *out.glob(f"{OURS}/*/{FILE}")):
-            self.keep(path)
-
-    def keep(self, answer: Path) -> None:
-        """Watch over an answer from now on."""
-        if answer.is_file():
-            self.answers[answer] = _mark(answer), answer.read_bytes()
-
-    def forget(self, answer: Path) -> None:
-        """Let an answer be written anew."""
-        self.answers.pop(answer, None)
-
-    def harm(self) -> str:
-        """How the pack was changed, or nothing."""
-        now = {path: _mark(path) for path in (*self.given, *self.pack.files())}
-        changed = {path for path, _ in set(now.items()) ^ set(self.given.items())}
-        if not changed:
-            return ""
-        first = min(changed).relative_to(self.pack.root)
-        return f"it changed {first} of the pack: the pack is not used further"
-
-    def restored(self) -> str:
-        """Put answers back that were changed; says which, or nothing."""
-        changed = [path for path, (mark, _) in self.answers.items() if _mark(path) != mark]
-        for path in changed:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(self.answers[path][1])
-            self.keep(path)
-        names = ", ".join(path.parent.name for path in changed)
-        return f"it changed the answer of {names}, which was put back" if changed else ""
-
-
-def _mark(path: Path) -> Mark:
-    try:
-        state = path.stat()
-    except OSError:
-        return None
-    return state.st_mtime_ns, state.st_size
-
-
-def _answer_ours(ours: Ours, name: str, folder: Path) -> None:
+def _answer_ours(name: str, ours: Ours, folder: Folder, watch: Watch) -> None:
     table, took = ours.answer(name)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    (folder / FILE).write_text(csv(table), encoding="utf-8")
-    known = {name: value for name, value in asdict(took).items() if value == value}
-    write_json(folder / USED, known)
+    watch.forget(f"{OURS}/{name}/{FILE}")
+    folder.clear(f"{OURS}/{name}", {FILE, USED}.__contains__)
+    watch.keep(f"{OURS}/{name}/{FILE}", csv(table).encode())
+    folder.note(f"{OURS}/{name}/{USED}", text_of(_known(took)))
+
+
+def _known(used: Used | Took) -> dict[str, Any]:
+    return {name: value for name, value in asdict(used).items() if value == value}

@@ -1,6 +1,7 @@
 """Answers against expectations: each number, then each scene."""
 
 import math
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from orchestrator.benchmark import answer
 from orchestrator.benchmark.answer import FILE, STEPS, AnswerError
 from orchestrator.benchmark.mistakes import hint
 from orchestrator.benchmark.pack import Pack
+from orchestrator.errors import InputError, one_line
 from orchestrator.runs.files import read_json
 
 USED = "used.json"
@@ -170,9 +172,9 @@ def compared(pack: Pack, names: Sequence[str], results: Path) -> Contender:
 def _judged(
     told: Mapping[str, Any], expected: pd.DataFrame, folder: Path, ours: Path
 ) -> tuple[Verdict, pd.DataFrame]:
-    used, own_used = (read_json(place / USED) or {} for place in (folder, ours))
+    used, own_used = (_used(place) for place in (folder, ours))
     found, error = _answered(told, expected, folder, str(used.get("error") or ""))
-    own = answer.numbers(ours / FILE) if (ours / FILE).is_file() else {}
+    own = _own(ours / FILE)
     keys = [answer.key(q, at) for q, at in zip(expected["quantity"], expected["at"], strict=True)]
     given = np.array([found.get(key, math.nan) for key in keys])
     rows = expected.assign(
@@ -194,12 +196,27 @@ def _judged(
     return _verdict(told, rows, error, took), rows
 
 
+def _used(folder: Path) -> Mapping[str, Any]:
+    found = read_json(folder / USED)
+    return found if isinstance(found, dict) else {}
+
+
+def _own(path: Path) -> Mapping[answer.Key, float]:
+    """Our answer, where ours ran."""
+    if not os.path.lexists(path):
+        return {}
+    try:
+        return answer.numbers(path)
+    except AnswerError as wrong:
+        raise InputError(wrong.what, where=str(path), remedy="remove it") from None
+
+
 def _answered(
     told: Mapping[str, Any], expected: pd.DataFrame, folder: Path, error: str
 ) -> tuple[dict[answer.Key, float], str]:
     """The numbers that count, and why there are none."""
     if error:
-        return {}, error
+        return {}, one_line(error)  # it repeats what a program printed
     try:
         return answer.read(folder / FILE, expected, told.get("count")), ""
     except AnswerError as wrong:
@@ -259,4 +276,5 @@ def _message(told: Mapping[str, Any], rows: pd.DataFrame, wrong: pd.DataFrame) -
 
 
 def _number(value: Any) -> float:
-    return float(value) if isinstance(value, int | float) else math.nan
+    # whoever made the results: a whole number may be larger than any float
+    return float(value) if isinstance(value, int | float) and abs(value) < 1e300 else math.nan

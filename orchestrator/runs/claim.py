@@ -42,9 +42,16 @@ _CASE = f"cases/*-{'[0-9a-f]' * 12}"
 _OF_A_STUDY = ("cases", "tables", "timings", "figures", "report.html", "report.json", "claims.csv")
 STUDY = Kind("study", "study.json", _OF_A_STUDY, (_CASE,), (f"{_CASE}/case.json",))
 EXPERIMENT = replace(STUDY, word="experiment")
-RESULTS = Kind("benchmark of the solver", "benchmark.json")
+_PAGE = ("figures", "comparison.html", "comparison.csv", "verdicts.csv")
+RESULTS = Kind(
+    "benchmark of the solver",
+    "benchmark.json",
+    (*_PAGE, "ours", "ours/cases"),
+    ("[1-5]-*", "ours/[1-5]-*", f"ours/{_CASE}"),
+)
+COMPARISON = Kind("comparison with the pack", "benchmark.json", _PAGE)
 PACK = Kind("benchmark pack", "manifest.json")
-KINDS = (STUDY, EXPERIMENT, RESULTS, PACK)
+KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 
 
 @contextlib.contextmanager

@@ -64,6 +64,8 @@ class Used:
         Wall and CPU time, s.
     peak_mib : float
         Memory of its largest process.
+    said : str
+        The end of what it printed.
     """
 
     returncode: int | None
@@ -71,6 +73,7 @@ class Used:
     seconds: float
     cpu_s: float = float("nan")
     peak_mib: float = float("nan")
+    said: str = ""
 
 
 def run(
@@ -109,7 +112,8 @@ def hides() -> bool:
 def _run(
     command: Sequence[str], cwd: Path, log: Path, limits: Limits, hide: list[str], *, walled: bool
 ) -> Used:
-    with tempfile.TemporaryFile() as report:
+    # opened first: the program may put something else in the log's place
+    with tempfile.TemporaryFile() as report, log.open("wb+") as printed:
         order = {**asdict(limits), "report": report.fileno(), "hide": hide if walled else []}
         start = [sys.executable, "-I", "-S", keeper.__file__, json.dumps(order)]
         ended = process.run(
@@ -122,10 +126,11 @@ def _run(
         )
         report.seek(0)
         told = report.read()
-    if log.stat().st_size > limits.printed:
-        os.truncate(log, limits.printed)
+        said = process.last_line(printed)
+        if os.fstat(printed.fileno()).st_size > limits.printed:
+            printed.truncate(limits.printed)
     if told and not ended.timed_out:
-        return Used(**json.loads(told))
+        return Used(**json.loads(told), said=said)
     late = f"it did not end within {limits.seconds:g} s and was killed"
-    why = late if ended.timed_out else f"it could not be watched: {process.last_words(log)}"
-    return Used(None, why, ended.seconds)
+    why = late if ended.timed_out else f"it could not be watched: {said}"
+    return Used(None, why, ended.seconds, said=said)

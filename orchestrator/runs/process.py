@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from orchestrator.errors import Interrupted
 
@@ -19,6 +20,8 @@ GRACE_S = 2.0
 POLL_S = 0.1
 LAST_LETTERS = 200
 """Most of a log's last line that a message repeats."""
+TAIL = 2**16
+"""Part of a log in which its last line is looked for, bytes: a log may be of any size."""
 _SET_DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux."""
 
@@ -145,7 +148,18 @@ def _search_path() -> str:
 
 def last_words(log: Path) -> str:
     """The end of the last line of a log; nothing where it holds none."""
-    lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    try:
+        with log.open("rb") as stream:
+            return last_line(stream)
+    except OSError:
+        return ""
+
+
+def last_line(stream: BinaryIO) -> str:
+    """The same of an open log."""
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(0, size - TAIL))
+    lines = stream.read().decode(errors="replace").strip().splitlines()
     return lines[-1][-LAST_LETTERS:] if lines else ""
 
 

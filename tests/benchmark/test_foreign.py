@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.benchmark import runner
 from orchestrator.benchmark.runner import Choice
+from orchestrator.runs.confined import Limits
 from tests.benchmark.conftest import ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -27,7 +28,9 @@ def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, program: str)
         pytest.skip(f"{program} is not installed")
     pivots = "2-[0-9a-f]" + 11 * "[0-9a-f]"
     choice = Choice(patterns=(*CHECKS, pivots, "4-*"))
-    found = runner.run(all_levels, COMMANDS[program], tmp_path / "results", choice, 300.0)
+    found = runner.run(
+        all_levels, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=300.0)
+    )
     assert found.failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
     assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "passing", "pivot", "pile"}
@@ -38,7 +41,9 @@ def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, program: str)
 def test_a_foreign_solver_agrees_on_lift_off(lift_off: Path, tmp_path: Path, program: str) -> None:
     if shutil.which(program) is None:
         pytest.skip(f"{program} is not installed")
-    found = runner.run(lift_off, COMMANDS[program], tmp_path / "results", Choice(), 300.0)
+    found = runner.run(
+        lift_off, COMMANDS[program], tmp_path / "results", Choice(), Limits(seconds=300.0)
+    )
     assert found.failures == []
 
 
@@ -49,7 +54,9 @@ def test_a_foreign_solver_declines_what_it_is_not_for(
     if shutil.which(program) is None:
         pytest.skip(f"{program} is not installed")
     choice = Choice(patterns=(min(path.name for path in (formulas / "scenes").glob("1-*")),))
-    found = runner.run(formulas, COMMANDS[program], tmp_path / "results", choice, 60.0)
+    found = runner.run(
+        formulas, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=60.0)
+    )
     assert all("it ended with 2" in line for line in found.failures)
     assert found.failures
 

@@ -11,6 +11,7 @@ import pytest
 from orchestrator.benchmark import pack, runner, sheets, verdict
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError
+from orchestrator.runs.confined import Limits
 from tests.benchmark.conftest import NATIVE
 from tests.conftest import Command
 from tests.report.test_page import Page
@@ -25,7 +26,7 @@ HIGH = 1.3
 def right(all_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a solver that passes."""
     out = tmp_path_factory.mktemp("results") / "right"
-    assert runner.run(all_levels, COMMAND, out, CHOICE, 60.0).failures == []
+    assert runner.run(all_levels, COMMAND, out, CHOICE, Limits(seconds=60.0)).failures == []
     return out
 
 

@@ -1,0 +1,99 @@
+"""Directories of results: of one solver and one pack, and never through a link."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orchestrator.benchmark import runner
+from orchestrator.benchmark.runner import Choice
+from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.runs import claim
+from tests.benchmark.test_adversary import SMALL, TWO, _run
+from tests.benchmark.test_solvers import TAIL, _program
+
+
+def _refused(formulas: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(OrchestratorError, match=words):
+        runner.run(formulas, command, out, TWO, SMALL)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_results_go_nowhere_else(formulas: Path, finished: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    (mine / "2-incline-5").mkdir(parents=True)
+    (mine / "2-incline-5" / "thesis.tex").write_text("mine\n")
+    _refused(formulas, mine, "something that is not a benchmark.*2-incline-5")
+    study = tmp_path / "study"
+    shutil.copytree(finished, study)
+    _refused(formulas, study, r"holds .*(study|cases)")
+    pack = tmp_path / "pack"
+    shutil.copytree(formulas, pack)
+    _refused(formulas, pack, "holds the benchmark pack")
+    _refused(formulas, formulas / "results", "may not lie in the pack")
+    with pytest.raises(InputError, match="something that is not"):
+        runner.compare(formulas, [mine], mine, TWO)
+    with pytest.raises(InputError, match=r"holds .*(study|cases)"):
+        runner.compare(formulas, [mine], study, TWO)
+
+
+def test_results_of_another_solver_or_pack_stay(
+    formulas: Path, all_levels: Path, tmp_path: Path
+) -> None:
+    _run(formulas, tmp_path, TAIL)
+    results = tmp_path / "results"
+    _refused(formulas, results, "holds the benchmark of the solver .*, not")
+    with pytest.raises(InputError, match="answers to another pack"):
+        _run(all_levels, tmp_path, TAIL)
+    _run(formulas, tmp_path, TAIL)
+    (results / ".lock").unlink()
+    with claim.claimed(results, claim.RESULTS, _program(tmp_path, TAIL)):
+        with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
+            _run(formulas, tmp_path, TAIL)
+        with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
+            runner.compare(formulas, [results], None, TWO)
+
+
+@pytest.mark.filterwarnings("ignore:.*is not what this program wrote")
+def test_files_of_the_user_survive_in_results(formulas: Path, tmp_path: Path) -> None:
+    _run(formulas, tmp_path, TAIL)
+    results = tmp_path / "results"
+    (results / "2-incline-5" / "notes.txt").write_text("mine\n")
+    (results / "figures" / "mine.png").write_text("mine\n")
+    (results / "comparison.csv").unlink()
+    (results / "comparison.csv").write_text("mine\n")
+    _run(formulas, tmp_path, TAIL)
+    kept = {p.name for p in results.rglob("*") if p.is_file() and p.read_bytes() == b"mine\n"}
+    assert kept == {"notes.txt", "mine.png", "comparison.csv"}
+    (results / "figures").rename(tmp_path / "away")
+    (results / "figures").symlink_to(tmp_path / "away")
+    with pytest.raises(InputError, match="figures: it is a link"):
+        _run(formulas, tmp_path, TAIL)
+
+
+def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) -> None:
+    given = tmp_path / "given"
+    _run(formulas, tmp_path, TAIL)
+    shutil.copytree(tmp_path / "results" / "2-incline-5", given / "2-incline-5")
+    before = sorted(given.rglob("*"))
+    found = runner.compare(formulas, [given], tmp_path / "page", Choice(patterns=("2-incline-5",)))
+    assert found.failures == []
+    assert sorted(given.rglob("*")) == before
+    assert "nothing is known of how its answers were made" in found.page.read_text()
+
+
+@pytest.mark.parametrize(
+    "text", ["[]", "{", "3", '{"error": []}', '{"seconds": "x"}', f'{{"seconds": {10**400}}}']
+)
+def test_results_of_a_stranger(formulas: Path, tmp_path: Path, text: str) -> None:
+    given = tmp_path / "given"
+    _run(formulas, tmp_path, TAIL, Choice(patterns=("2-incline-5",)))
+    shutil.copytree(tmp_path / "results", given)
+    for path in given.rglob("used.json"):
+        path.write_text(text)
+    found = runner.compare(formulas, [given], None, Choice(patterns=("2-incline-5",)))
+    assert len(found.failures) <= 1
+    (given / "ours" / "2-incline-5" / "answer.csv").write_text("junk")
+    with pytest.raises(InputError, match=r"ours/2-incline-5/answer\.csv"):
+        runner.compare(formulas, [given], None, Choice(patterns=("2-incline-5",)))
