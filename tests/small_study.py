@@ -10,6 +10,7 @@ from orchestrator.study import study
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
 protocol = {{ load_increment = 0.02, waiting_time = 6.0 }}
+forces = {{ law = "paper" }}
 
 [[group]]
 name = "horizontal"

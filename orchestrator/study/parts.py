@@ -243,7 +243,7 @@ class Forces(Part):
                 **{name: law.label for name, law in LAWS.items()},
             },
         ),
-    ] = "paper"
+    ] = "bridged"
     """drag and lift on an exposed grain"""
     lift_coefficient: Annotated[
         float, Field(ge=0), Info("lift coefficient", "α_s", column="alpha_s")

@@ -119,7 +119,7 @@ def test_captions_say_what_the_scene_has(results: Results) -> None:
 
 def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     rows = results.joined("pile_threshold")
-    assert "steps of 5 %" in captions.hold_protocol(rows)
+    assert "rises by 5 %" in captions.hold_protocol(rows)
     without = rows.assign(answered_method="pivot", answered_load_increment=None, shape="s")
     said = captions.hold_protocol(without)
     assert "Hold protocol" not in said

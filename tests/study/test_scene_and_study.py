@@ -90,15 +90,22 @@ def _with_law(law: str, parts: dict[str, dict[str, Any]]) -> dict[str, dict[str,
     return {**empty, "flow": {}, "forces": {"law": law}, **parts}
 
 
-def test_the_transition_is_run_with_both_closures() -> None:
-    found = _parse("[grain]\ndiameter = 2e-4\n")
+def test_one_law_holds_for_every_reynolds_number_by_default() -> None:
+    found = _parse('[grain]\ndiameter = 2e-4\n[axes]\n"fluid.viscosity" = [1e-3, 1e-5, 1e-6]\n')
+    assert [s.forces.law for s in found.scenes] == ["bridged"] * 3
+    assert [regime_of(s) for s in found.scenes] == ["low", "transition", "high"]
+
+
+def test_by_the_papers_rule_the_transition_is_run_with_both_laws() -> None:
+    found = _parse('[grain]\ndiameter = 2e-4\n[forces]\nlaw = "paper"\n')
     assert [s.forces.law for s in found.scenes] == ["low", "high"]
     assert {regime_of(s) for s in found.scenes} == {"transition"}
 
 
 @pytest.mark.parametrize(("d", "nu", "regime"), [(5e-5, 1e-5, "low"), (1e-3, 1e-5, "high")])
-def test_auto_takes_the_valid_closure(d: float, nu: float, regime: str) -> None:
-    (scene,) = _parse(f"[grain]\ndiameter = {d}\n[fluid]\nviscosity = {nu}\n").scenes
+def test_the_papers_rule_takes_the_law_that_holds(d: float, nu: float, regime: str) -> None:
+    tables = f"[grain]\ndiameter = {d}\n[fluid]\nviscosity = {nu}\n"
+    (scene,) = _parse(tables + '[forces]\nlaw = "paper"\n').scenes
     assert (scene.forces.law, regime_of(scene)) == (regime, regime)
 
 
