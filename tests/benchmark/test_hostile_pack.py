@@ -139,7 +139,7 @@ HARMS: dict[str, Harm] = {
     "lighter than the fluid": lambda root: _edit(
         _scene(root, "formula") / "scene.json", rho_f_kg_m3=1e5
     ),
-    "no force law": lambda root: _edit(_scene(root, "formula") / "scene.json", law_name="Eq. 7"),
+    "no force law": lambda root: _edit(_scene(root, "formula") / "scene.json", force_law="Eq. 7"),
     "a column less": lambda root: _expected(root, "tolerance,", ""),
     "no at": lambda root: _expected(root, ",at,", ",where,"),
     "a value of words": lambda root: _line(root, 3, "many"),
