@@ -2,9 +2,10 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 from orchestrator.fidelity import calibration, levels
 from orchestrator.fidelity.calibration import UNKNOWN, Known
@@ -103,9 +104,9 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
     if why := _asks_for(scene):
         return as_asked(scene, why)
     if not isinstance(scene.bed, PileBed):
-        closed_form = changed(scene, {"protocol.method": "pivot"})
+        exact = changed(scene, {"protocol.method": "pivot"})
         why = "the closed form is exact for a single grain in a held flow"
-        return Decision(scene, closed_form, {}, UNKNOWN, why)
+        return Decision(scene, exact, {}, UNKNOWN, why)
     bound = above or (LIFTED if lifts_off(scene) else NO_BOUND)
     named, why = _cheapest(
         tuple((part, calibration.scene_class(part, scene)) for part in LEVELS),
@@ -148,11 +149,9 @@ def _asks_for(scene: Scene) -> str:
         return f"the study asks for the method {scene.protocol.method}"
     if scene.flow.model != "solve":
         return f"the study asks for the flow model {scene.flow.model}"
-    return (
-        ""
-        if scene.protocol.waiting_time >= QUIET_ENOUGH
-        else "the study asks for a ramp of the flow"
-    )
+    if scene.protocol.waiting_time < QUIET_ENOUGH:
+        return "the study asks for a ramp of the flow"
+    return ""
 
 
 def lifts_off(scene: Scene) -> bool:
@@ -179,18 +178,16 @@ def _cheapest(
     return best.levels, "least known error: none is within the tolerance"
 
 
-@dataclass(frozen=True)
-class _Pair:
+class _Pair(NamedTuple):
     levels: Named
     error: float
     cost_core_s: float
 
 
-def _pairs(
-    classes: Named, fractions: tuple[float, ...], above: Mapping[Part, str]
-) -> Iterator[_Pair]:
-    for names in itertools.product(*(_above(part, above.get(part)) for part, _ in classes)):
-        named = tuple(zip((part for part, _ in classes), names, strict=True))
+def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Iterator[_Pair]:
+    parts = [part for part, _ in classes]
+    for names in itertools.product(*(_above(part, above.get(part)) for part in parts)):
+        named = tuple(zip(parts, names, strict=True))
         found = calibration.known(dict(named), dict(classes), fractions)
         yield _Pair(named, max(one.error for one in found), found[0].cost_core_s)
 

@@ -322,7 +322,9 @@ class Protocol(Part):
     ] = 0.9
     """fraction of the exposed grains that should have moved by the last load step"""
     fractions: Annotated[
-        tuple[Fraction, ...], Info("fractions", "n/N", column="-", scope="piles")
+        tuple[Fraction, ...],
+        Field(min_length=1),
+        Info("fractions", "n/N", column="-", scope="piles"),
     ] = (0.1, 0.3, 0.5, 0.7)
     """fractions of the exposed grains at which the thresholds of a pile are reported"""
     time_step: Annotated[

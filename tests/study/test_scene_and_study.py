@@ -168,6 +168,7 @@ BAD = [
     ("[grain]\ndiameter = 1e-3\n[bed]\nkind = 'dune'\n", "test.toml: bed", "dune"),
     ("[grain]\ndiameter = 1e-3\n[bed]\nheight = 0.02\n", "test.toml: bed.height", "unknown"),
     (PILE + "height = 2e-3\n", "test.toml: bed.height", "raise"),
+    (PILE + "[protocol]\nfractions = []\n", "test.toml: protocol.fractions", "at least 1"),
     ("[axes]\ndiameter = [1e-3]\n", "test.toml: axes.diameter", "grain.diameter"),
     ("[axes]\n'grain.diameter' = 1e-3\n", "test.toml: axes.grain.diameter", "list"),
     ("[axes]\n'grain.diameter' = []\n", "test.toml: axes.grain.diameter", "list"),
