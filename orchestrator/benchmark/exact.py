@@ -40,10 +40,10 @@ MEETING = 0.1
 """Speed of each of two colliding grains, sqrt(d g')."""
 PUSHES = (1.5, 2.0, 3.0)
 """Forces on the grain that passes the criterion, over that at which it begins to roll."""
-PASSING_DEG, MARKER, PASSING_STIFFNESS = 60.0, 0.3, 1e5
-"""Its entrainment angle, its marker (d), and K d/W: springs of 1e4 would start it 1 % early."""
+PASSING_DEG, CRITERION, PASSING_STIFFNESS = 60.0, 0.3, 1e5
+"""Its entrainment angle, its criterion (d), and K d/W: springs of 1e4 would start it 1 % early."""
 LEAST_QUIET = 5.0
-"""Holds shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
+"""Load steps shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
 
 
 def closed_form(scene: Scene) -> Problem:
@@ -63,7 +63,7 @@ def closed_form(scene: Scene) -> Problem:
     rows += [exact(name, float(value), FORMULA) for name, value in thresholds.items()]
     seconds = time.perf_counter() - started
     asked = expectations(rows).assign(ours=lambda table: table["value"])
-    return Problem(1, scene.id, "closed-form", parameters(scene), {}, asked, seconds)
+    return Problem(1, scene.id, "closed-form", parameters(scene, "closed-form"), {}, asked, seconds)
 
 
 def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
@@ -73,8 +73,8 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
     half = float(np.sqrt(1 + scene.protocol.load_increment))
     interval = threshold / half, threshold * half
     asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
-    tables = {"grains": _cell(scene), "load_steps": _holds(scene, threshold)}
-    return Problem(2, scene.id, "pivot", parameters(scene), tables, asked)
+    tables = {"grains": _cell(scene), "load_steps": _load_steps(scene, threshold)}
+    return Problem(2, scene.id, "pivot", parameters(scene, "pivot"), tables, asked)
 
 
 def has_pivot(scene: Scene) -> bool:
@@ -94,7 +94,7 @@ def _three(centres: Any, diameter: float) -> pd.DataFrame:
     return pd.DataFrame({"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": diameter, "kind": kinds})
 
 
-def _holds(scene: Scene, threshold: float) -> pd.DataFrame:
+def _load_steps(scene: Scene, threshold: float) -> pd.DataFrame:
     rising = cells.flows(scene)
     fx, fz = cells.force(scene, rising).T
     load_steps = {
@@ -174,12 +174,12 @@ def passing(push: float) -> Problem:
     """A grain that is pushed over its neighbour; `push` as in `passing_time`."""
     told = _contact(stiffness=PASSING_STIFFNESS)
     beta = np.radians(PASSING_DEG)
-    value = passing_time(push, MARKER)
+    value = passing_time(push, CRITERION)
     asked = expectations([exact("passing_time_over_t", value, CHECK)])
     told |= {
         "alpha_deg": 0.0,
         "beta_deg": PASSING_DEG,
-        "displacement_criterion": MARKER,
+        "displacement_criterion": CRITERION,
         "force_n": push * told["weight_n"] / float(np.tan(beta)),
         "time_step": 0.2,
     }
@@ -188,7 +188,7 @@ def passing(push: float) -> Problem:
     return Problem(2, f"passing-{push:g}", "passing", told, tables, asked)
 
 
-def passing_time(push: float, marker: float, inertia: float = 0.4) -> float:
+def passing_time(push: float, criterion: float, inertia: float = 0.4) -> float:
     """Time, sqrt(d/g'), in which a pushed grain rolls over its neighbour as far as the criterion.
 
     It rolls without slip on a circle of radius d, from rest: the work of the force and of the
@@ -198,7 +198,7 @@ def passing_time(push: float, marker: float, inertia: float = 0.4) -> float:
     ----------
     push : float
         Force along the level bed over that at which the grain begins to roll.
-    marker : float
+    criterion : float
         Displacement along the bed, d; the grain is over its neighbour at cos(beta).
     inertia : float
         Moment of inertia over m r^2.
@@ -206,7 +206,7 @@ def passing_time(push: float, marker: float, inertia: float = 0.4) -> float:
     lean = np.pi / 2 - np.radians(PASSING_DEG)
     force = push * np.tan(lean)
     # the angle from the vertical is lean - u^2: the speed is proportional to u at the start
-    end = np.sqrt(lean - np.arcsin(np.sin(lean) - marker))
+    end = np.sqrt(lean - np.arcsin(np.sin(lean) - criterion))
     nodes, weights = np.polynomial.legendre.leggauss(40)
     u = end * (nodes + 1) / 2
     angle = lean - u**2

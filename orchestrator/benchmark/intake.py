@@ -43,18 +43,18 @@ RANGES: dict[str, Between] = {
 }
 """Of the parameters that are used here, wherever they are given; SI units, angles in degrees."""
 _GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "time_step", "reduced_gravity_m_s2")
-_FLUID = (*_GRAIN, "rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
+_FLUID = ("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
 _FLOW = ("alpha_deg", "h_m", "z0_m", "rho_f_kg_m3", "lid_m", "u_e_m_s", "ustar0_m_s")
 KINDS: dict[str, tuple[int, tuple[str, ...]]] = {
-    "closed-form": (1, _FLUID),
+    "closed-form": (1, ("d_m", "rho_sol_kg_m3", *_FLUID)),
     "collision": (2, (*_GRAIN, "speed_m_s")),
     "incline": (2, (*_GRAIN, "incline_deg")),
     "sliding": (2, (*_GRAIN, "speed_m_s")),
     "passing": (2, (*_GRAIN, "beta_deg", "displacement_criterion", "force_n", "weight_n")),
-    "pivot": (2, _FLUID),
+    "pivot": (2, (*_GRAIN, *_FLUID)),
     "flow": (3, _FLOW),
-    "pile": (4, (*_FLUID, "count")),
-    "line": (5, (*_FLUID, *_FLOW)),
+    "pile": (4, (*_GRAIN, *_FLUID, "count")),
+    "line": (5, (*_GRAIN, *_FLUID, *_FLOW)),
 }
 """Level of each kind, and the numbers that a scene of it has at least."""
 _COUNTS = ("moved", "not_moved")

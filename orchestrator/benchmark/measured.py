@@ -35,7 +35,7 @@ one contact law do so by up to 13 % where a chain of grains goes at once (docs/b
 LEVEL_ROWS = 0.35
 """Of N: level rows are judged until so many have moved. Then a whole step goes at once or not, as
 the least detail decides: runs that differ in the time step, the dashpots or places by 1e-3 d are up
-to 20 % of N and six holds apart (docs/benchmark.md)."""
+to 20 % of N and six load steps apart (docs/benchmark.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
 round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
@@ -114,6 +114,7 @@ def flow_parameters(one: Answered) -> dict[str, Any]:
         "rho_f_kg_m3": one.pile.scene.fluid.density,
         "first_cell_m": case.first_cell_m,
         "cells_per_face": case.cells_per_face,
+        "turbulence_model": case.turbulence,
     }
 
 
@@ -145,7 +146,7 @@ def windward_mean(one: Answered) -> float:
 def pile(one: Answered) -> Problem:
     """Level 4: the grains of a pile under a given stress."""
     scene = one.pile.scene
-    told = parameters(scene) | {"count": one.pile.packing.count} | _lift_off(one)
+    told = parameters(scene, "pile") | {"count": one.pile.packing.count} | _lift_off(one)
     tables = {"grains": _grains(one), "load_steps": load_steps(one)}
     return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
 
@@ -153,7 +154,7 @@ def pile(one: Answered) -> Problem:
 def line(one: Answered) -> Problem:
     """Level 5: flow and grains."""
     scene = one.pile.scene
-    told = parameters(scene) | flow_parameters(one) | _lift_off(one)
+    told = flow_parameters(one) | parameters(scene, "line") | _lift_off(one)
     tables = {"bed": _bed(one.pile.flow), "load_steps": load_steps(one)}
     count = float(one.pile.packing.count)
     counted = exact("count", count, LINE, ours=count)

@@ -28,7 +28,7 @@ FEW = 0.05
 ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians taken for degrees"}
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""
-MARKERS = (0.1, 0.2, 0.5)
+CRITERIA = (0.1, 0.2, 0.5)
 """What the displacement criterion is taken for, d."""
 GRAVITIES = (9.8, 9.80665, 10.0)
 """What g is taken for, m/s2."""
@@ -104,14 +104,14 @@ def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]
 
 
 def _passing(told: Told, bodies: Bodies) -> Iterator[tuple[float, str]]:
-    marker = told["displacement_criterion"]
+    criterion = told["displacement_criterion"]
     push = told["force_n"] * math.tan(math.radians(told["beta_deg"])) / told["weight_n"]
-    right = exact.passing_time(push, marker)
-    for other in MARKERS:
-        cause = f"a grain counts as moved at {other:g} d, not at {marker:g} d"
+    right = exact.passing_time(push, criterion)
+    for other in CRITERIA:
+        cause = f"a grain counts as moved at {other:g} d, not at {criterion:g} d"
         yield exact.passing_time(push, other) / right, cause
     for inertia, cause in (*bodies, (0.0, "there is no friction, or the grain does not turn")):
-        yield exact.passing_time(push, marker, inertia) / right, cause
+        yield exact.passing_time(push, criterion, inertia) / right, cause
 
 
 def _formula(told: Told, wrong: pd.DataFrame) -> str:

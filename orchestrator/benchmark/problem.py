@@ -110,13 +110,36 @@ def expectations(rows: Iterable[Row]) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=list(EXPECTED))
 
 
-def parameters(scene: Scene) -> dict[str, Any]:
-    """What a pack says of a scene, whose force law is decided: every field that has an effect."""
-    told = {k: v for k, v in fields.used(scene).items() if k != "bed" and v is not None}
+_CONTACT = ("phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step")
+_PROTOCOL = ("displacement_criterion", "waiting_time", "load_increment")
+_SOURCE = ("averaging_length", "loaded_grains", "mobile_layers", "turbulence_model")
+_NUMERICS = (
+    "expansion_ratio",
+    "convection_scheme",
+    "non_orthogonal_correctors",
+    "method",
+    "z0_over_d",
+    "bed",
+)
+_SOLVED = ("solve_u_e_m_s", "solve_z0_m", "solve_nu_m2_s", "first_cell_m", "cells_per_face")
+MEANINGLESS: Mapping[str, frozenset[str]] = {
+    "closed-form": frozenset({*_CONTACT, *_PROTOCOL, *_NUMERICS}),
+    "pivot": frozenset(_NUMERICS),
+    "pile": frozenset({*_SOURCE, *_SOLVED, *_NUMERICS}),
+    # its speed at the lid is told as that of level 3
+    "line": frozenset({*_NUMERICS, "solve_u_e_m_s"}),
+}
+"""What of a scene does not matter to who solves it as a kind: all else is told."""
+
+
+def parameters(scene: Scene, kind: str) -> dict[str, Any]:
+    """What a pack says of a scene, whose force law is decided, where it is a problem of a kind."""
     grain = scene.grain
-    return told | mechanics(
+    told = fields.used(scene) | mechanics(
         grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness
     )
+    hidden = MEANINGLESS[kind]
+    return {name: value for name, value in told.items() if value is not None and name not in hidden}
 
 
 def mechanics(

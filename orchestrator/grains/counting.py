@@ -1,6 +1,6 @@
 """The counting rule: which of the counted grains have moved, gone back or been carried off.
 
-Its words are in docs/benchmark.md, "The counting rule"; the deck in.bed holds the same marker to
+Its words are in docs/benchmark.md, "The counting rule"; the deck in.bed holds the same criterion to
 know when a load step may end, and its counts are compared with those of this rule.
 """
 
@@ -21,13 +21,11 @@ class Count:
     Attributes
     ----------
     moved : ndarray of bool, shape (T, N)
-        Displaced downstream by the displacement criterion at a sample, or carried off.
+        Displaced downstream by the criterion at a sample, or carried off.
     fallen : ndarray of bool, shape (T, N)
-        Displaced upstream by the displacement criterion at a sample. Such a grain has not moved,
-        but may yet.
+        Displaced upstream by the criterion at a sample. Such a grain has not moved, but may yet.
     carried : ndarray of bool, shape (T, N)
-        Gone without having been seen beyond the displacement criterion: the flow lifted it off the
-        pile.
+        Gone without having been seen beyond the criterion: the flow lifted it off the pile.
     """
 
     moved: BoolArray
@@ -35,7 +33,7 @@ class Count:
     carried: BoolArray
 
 
-def count(travel: FloatArray, marker: float, *, falls_out: bool) -> Count:
+def count(travel: FloatArray, criterion: float, *, falls_out: bool) -> Count:
     """Apply the rule to the tracks of grains.
 
     Parameters
@@ -43,24 +41,23 @@ def count(travel: FloatArray, marker: float, *, falls_out: bool) -> Count:
     travel : ndarray, shape (T, N)
         Displacement along the bed since the settling, downstream positive, d; NaN for a grain
         that is gone.
-    marker : float
+    criterion : float
         Displacement that counts as motion, d.
     falls_out : bool
-        What it means that a grain is gone which was not seen beyond the displacement criterion:
-        from the two
+        What it means that a grain is gone which was not seen beyond the criterion: from the two
         neighbours of a single grain it fell upstream, for no bed is there to hold it; only lift
         can have taken it from a pile.
     """
-    ahead, back = _ever(travel >= marker), _ever(travel <= -marker)
+    ahead, back = _ever(travel >= criterion), _ever(travel <= -criterion)
     vanished = _ever(np.isnan(travel) & ~ahead)
     if falls_out:
         return Count(ahead, back | vanished, np.zeros_like(vanished))
     return Count(ahead | vanished, back, vanished)
 
 
-def deck_counts(travel: FloatArray, marker: float) -> tuple[IntArray, IntArray]:
+def deck_counts(travel: FloatArray, criterion: float) -> tuple[IntArray, IntArray]:
     """What the deck prints at each sample, shape (T,): grains short of the criterion; fallen."""
-    return (travel < marker).sum(axis=1), (travel <= -marker).sum(axis=1)
+    return (travel < criterion).sum(axis=1), (travel <= -criterion).sum(axis=1)
 
 
 def _ever(happened: BoolArray) -> BoolArray:

@@ -2,18 +2,34 @@
 
 import json
 import math
+import re
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.benchmark import pack
+from orchestrator.benchmark import intake, pack, problem
 from orchestrator.benchmark.export import export
 from orchestrator.benchmark.problem import EXPECTED
 from orchestrator.errors import InputError
+from orchestrator.grains import cells
+from orchestrator.study import study
+from tests.benchmark.conftest import ROOT
 from tests.conftest import Command
+
+DISORDERED = """
+[grain]
+diameter = 1e-3
+[flow]
+[forces]
+law = "high"
+[[group]]
+name = "gaps"
+bed = { kind = "pile", packing = "disordered", slope_deg = 20.0 }
+"""
 
 
 def test_levels_of_a_study(all_levels: Path) -> None:
@@ -42,6 +58,37 @@ def test_a_scene_is_flat_and_asks_what_is_expected(all_levels: Path) -> None:
         assert asked["at"].tolist() == expected["at"].tolist()
 
 
+def _documented() -> set[tuple[str, str]]:
+    """Entry and kind, by the table of docs/benchmark.md."""
+    text = (ROOT / "docs" / "benchmark.md").read_text().partition("## Scenes\n")[2]
+    table = text.partition("**The contact.**")[0]
+    rows = re.findall(r"^\| (`.*?) \| (.*?) \|", table, re.MULTILINE)
+    return {
+        (name, kind)
+        for names, kinds in rows
+        for name in re.findall(r"`(\w+)`", names)
+        for kind in _kinds(kinds)
+    }
+
+
+def _kinds(said: str) -> set[str]:
+    listed = {kind for kind in intake.KINDS if re.search(rf"\b{kind}\b", said)}
+    return set(intake.KINDS) - listed if said.startswith("all") else listed
+
+
+def test_every_entry_of_a_scene_is_documented_and_the_others_are_absent(
+    formulas: Path, all_levels: Path, lift_off: Path
+) -> None:
+    packs = [pack.read(root) for root in (formulas, all_levels, lift_off)]
+    told = [one for found in packs for one in found.scenes.values()]
+    found = {(name, str(one["kind"])) for one in told for name in one}
+    scene = next(iter(study.parse(DISORDERED, name="d", where="d").scenes))
+    for kind in ("pile", "line"):
+        # no pack here has these
+        found |= {(name, kind) for name in (*problem.parameters(scene, kind), "lift_off")}
+    assert found == _documented()
+
+
 def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path, finished: Path) -> None:
     found = pack.read(all_levels)
     name = next(name for name in found.scenes if name.startswith("4-"))
@@ -60,12 +107,36 @@ def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path, finished: 
     assert grains.loc[forced, ["slope_deg", "ustar_over_ustar0"]].notna().all(axis=None)
 
 
+def test_a_pivot_is_the_cell_of_its_case(all_levels: Path, finished: Path) -> None:
+    found = pack.read(all_levels)
+    name = next(name for name, told in found.scenes.items() if told["kind"] == "pivot")
+    weight, d = found.scenes[name]["weight_n"], found.scenes[name]["d_m"]
+    grains = pd.read_csv(found.directory(name) / "grains.csv")
+    load_steps = pd.read_csv(found.directory(name) / "load_steps.csv")
+    (case,) = (finished / "cases").glob("cells-*")
+    rows = (case / "grains.data").read_text().partition("Atoms\n\n")[2].split("\n")
+    deck = pd.DataFrame([row.split() for row in rows if row]).astype(float)
+    for axis, column, place in (("x", "fx_n", 4), ("z", "fz_n", 6)):
+        own, of_deck = grains[f"{axis}_m"], deck[place]
+        assert ((own - own[2]) / d).to_numpy() == pytest.approx((of_deck - of_deck[2]) / 1e-3)
+        sets = (case / f"force.{axis}.txt").read_text().split("\n")[1::2]
+        force = np.array([line.split()[1] for line in sets if line], float)
+        assert (load_steps[column] / weight).to_numpy() == pytest.approx(
+            force / cells.WEIGHT, rel=1e-7
+        )
+    flows = (case / "load_steps.txt").read_text().split()
+    ratio = load_steps["ustar_m_s"] / load_steps["ustar_m_s"].iloc[0]
+    assert ratio.to_numpy() == pytest.approx([float(f) / float(flows[0]) for f in flows])
+
+
 def test_derived_parameters_agree(all_levels: Path) -> None:
     for told in pack.read(all_levels).scenes.values():
         if told["kind"] == "flow":
             continue
         weight = told["mass_kg"] * told["reduced_gravity_m_s2"]
         assert told["weight_n"] == pytest.approx(weight, rel=1e-12)
+        if told["kind"] == "closed-form":
+            continue
         assert told["spring_n_m"] == pytest.approx(told["stiffness"] * weight / told["d_m"])
         unit = math.sqrt(told["d_m"] / told["reduced_gravity_m_s2"])
         assert told["time_unit_s"] == pytest.approx(unit)

@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator import pipeline
+from orchestrator import pipeline, plan
 from orchestrator.grains import counting
+from orchestrator.report import snapshot
 from orchestrator.study import study
+from orchestrator.study.closed_form import closed_form
 
 GONE = np.nan
 LIFT_OFF = """
@@ -89,7 +91,8 @@ def test_the_rule_is_latched_and_nobody_is_both_moved_and_not(
 
 
 def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
-    ended = pipeline.run(study.parse(LIFT_OFF, name="lift", where="lift"), tmp_path, workers=1)
+    asked = study.parse(LIFT_OFF, name="lift", where="lift")
+    ended = pipeline.run(asked, tmp_path, workers=1)
     assert not ended.failures
     curve = pd.read_csv(tmp_path / "tables" / "pile_curve.csv")
     last = curve.iloc[-1]
@@ -101,3 +104,11 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     assert (thresholds["share_carried_off"] > 0.9).all()
     grains = pd.read_csv(tmp_path / "tables" / "pile_grain.csv")
     assert (grains.loc[grains["carried_off"] == 1, "mode"] == "lifted").all()
+    # at the threshold of one grain nothing holds it on the bed
+    (scene,) = asked.scenes
+    alone = closed_form(scene)
+    assert float(alone.lift / alone.drag) > 1 / np.tan(np.radians(20.0))
+    # the pictures count as the tables do
+    (pile,) = plan.make(asked).piles.values()
+    passed = snapshot.read(pile, tmp_path / "cases").passed.sum(axis=1)
+    assert passed[-1] == last["moved"]
