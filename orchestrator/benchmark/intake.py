@@ -205,7 +205,7 @@ def scene(path: Path, name: str) -> dict[str, Any]:
     if level is None or (told.get("level"), name[0]) != (level, str(level)):
         refuse(f"it has no kind that is known of level {name[0]}", path)
     if set(_FLUID) <= {*needed} and told.get("force_law") not in LAWS:
-        refuse("its force law is no force law that is known", path)
+        refuse("its force law is none that is known", path)
     _check_numbers(told, needed, path)
     return told
 

@@ -114,7 +114,7 @@ def flow_parameters(one: Answered) -> dict[str, Any]:
         "rho_f_kg_m3": one.pile.scene.fluid.density,
         "first_cell_m": case.first_cell_m,
         "cells_per_face": case.cells_per_face,
-        "turbulence_model": case.turbulence,
+        "turbulence_model": case.turbulence_model,
     }
 
 

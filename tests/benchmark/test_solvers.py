@@ -67,12 +67,12 @@ solver.KINDS["passing"] = lambda scene, case: right({{**scene, {}}}, case)
 """
 WRONG = {
     "a criterion of 0.5 d": (
-        PASSING.format("'marker': 0.5") + TAIL,
+        PASSING.format("'displacement_criterion': 0.5") + TAIL,
         "2-passing-2",
         "passing_time_over_t .*: a grain counts as moved at 0.5 d, not at 0.3 d",
     ),
     "a criterion of 0.1 d": (
-        PASSING.format("'marker': 0.1") + TAIL,
+        PASSING.format("'displacement_criterion': 0.1") + TAIL,
         "2-passing-1.5",
         "a grain counts as moved at 0.1 d, not at 0.3 d",
     ),
@@ -259,8 +259,8 @@ def all_gone(numbers):
 COUNTED = {
     "dict": "",
     "never_carried": "grains that were carried off are not counted as moved",
-    "forgets": r"moved falls from \d+ to \d+ at hold \d+: a grain that has moved has moved for",
-    "all_gone": r"\d+ grains are carried off at hold \d+, of \d+ that moved",
+    "forgets": r"moved falls from \d+ to \d+ at load step \d+: a grain that has moved has moved for",
+    "all_gone": r"\d+ grains are carried off at load step \d+, of \d+ that moved",
 }
 
 
