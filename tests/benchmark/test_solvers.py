@@ -259,7 +259,7 @@ def all_gone(numbers):
 COUNTED = {
     "dict": "",
     "never_carried": "grains that were carried off are not counted as moved",
-    "forgets": r"moved falls from \d+ to \d+ at load step \d+: a grain that has moved has moved for",
+    "forgets": r"moved falls from \d+ to \d+ at load step \d+: a grain that has moved has moved",
     "all_gone": r"\d+ grains are carried off at load step \d+, of \d+ that moved",
 }
 
