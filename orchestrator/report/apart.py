@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import pandas as pd
 from matplotlib.lines import Line2D
 
+from orchestrator.physics.laws import LAWS
 from orchestrator.report import labels
+from orchestrator.report.laws import PAIR
 from orchestrator.report.style import Sample
 from orchestrator.study import fields
 
 SHAPES = "os^DvP<X>p8hd*"
 """Markers that are told from each other."""
-PAPER = ("low", "high")
-"""Force laws whose first markers are the same in every figure."""
 SHAPE = "shape"
 """The column that holds a row's marker."""
 
@@ -53,7 +53,8 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame, l
     found = varying(table, *shown)
     panels = [column for column in found if fields.COLUMNS[column].info.about == "question"]
     looks = [column for column in found if column not in panels]
-    laws = list(dict.fromkeys([*PAPER, *table["force_law"]]))
+    # without variants there is a marker for every law, the same in all figures
+    laws = [name for name in LAWS if name in {*PAIR, *table["force_law"]} or not looks]
     while looks and _count(table, looks) * len(laws) > len(SHAPES):
         panels.append(looks.pop(0))
     variant = _variant(table, looks)

@@ -1,6 +1,6 @@
 """What must be said under each figure."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,9 @@ from orchestrator.grains import motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.protocol import SAMPLING_INTERVAL
 from orchestrator.physics import curves
-from orchestrator.report import labels, reference, theory
+from orchestrator.physics.measured import MEASURED_SOURCE
+from orchestrator.report import labels, laws, reference
+from orchestrator.report.fits import Fit
 from orchestrator.report.results import Results, valid
 from orchestrator.report.snapshot import Snapshot
 from orchestrator.study import fields
@@ -18,10 +20,9 @@ DRAG_LAW = (
     "Right of the line “drag law ends” V_f d/ν exceeds 1000, up to which the drag law of Eq. 4 "
     "(Schiller and Naumann) holds."
 )
-HOLLOW = (
-    "Hollow markers: the forces are those of a force law that does not hold at the scene’s own "
-    "single-grain threshold (transition)."
-)
+PAIR = "Eq. 2 holds for Re* < 3 and Eq. 4 for Re* ≥ 30; shaded: where neither does"
+OUTSIDE = ", whose Re* can lie outside the shaded range by one of the two"
+HOLLOW = "Hollow markers: the force law does not hold at the scene’s own single-grain threshold."
 
 
 def listed(values: Iterable[float], scale: float = 1) -> str:
@@ -32,15 +33,65 @@ def listed(values: Iterable[float], scale: float = 1) -> str:
 def closed_form(scenes: pd.DataFrame, by: str, number: int) -> str:
     """Of the closed form by entrainment angle or by slope."""
     what = "entrainment angle β" if by == "beta_deg" else "slope α (the flow goes up it)"
-    low, high = theory.sweep(scenes)[[0, -1]] * 1e3
     return (
         f"After Fig. {number} of the paper. Threshold stress of one grain against the friction "
-        f"Reynolds number, by {what}: Eq. 3 for Re* < 3 and Eq. 5 for Re* ≥ 30, with δ = z₀, "
-        f"swept over d = {low:g} … {high:g} mm at ν = {listed(scenes['nu_m2_s'])} m²/s (in this "
-        "diagram ν and the densities only say which part of a line a grain is on). Solid where the "
-        "equation holds, dotted where for the same grain neither does; such a grain’s Re* can lie "
-        f"outside the shaded range by one of the two. {DRAG_LAW} {_references(scenes, by)}"
+        f"Reynolds number, by {what}, with δ = z₀; force laws: {force_laws(scenes)}. "
+        f"{_drag_law(scenes)}In this diagram d, ν and the densities only say which part of a line "
+        "a grain is on. Lines end where their law does; dotted ones go on as far as this study has "
+        f"grains"
+        f"{OUTSIDE if _has_pair(scenes) else ''}. {_references(scenes, by)}"
     )
+
+
+def force_laws(rows: pd.DataFrame) -> str:
+    """The laws of some rows, each with where it ends."""
+    names = [labels.value("force_law", name) for name in laws.drawn(rows["force_law"])]
+    return "; ".join(names) + (f". {PAIR}" if _has_pair(rows) else "")
+
+
+def _drag_law(rows: pd.DataFrame) -> str:
+    return f"{DRAG_LAW} " if _has_pair(rows) else ""
+
+
+def _hollow(rows: pd.DataFrame) -> str:
+    return "" if valid(rows).all() else f"{HOLLOW} "
+
+
+def overview(results: Results, found: Sequence[Fit]) -> str:
+    """Of the one picture of all laws."""
+    flat, piles = results.beds("grain"), results.joined("pile_threshold")
+    heaps = (
+        "Markers: piles, lines join the fractions n/N = "
+        f"{', '.join(f'{f:.0%}' for f in sorted(set(piles['fraction'])))} of one; "
+        f"{labels.methods(piles)}, forces: {force_laws(piles)}, β = "
+        f"{listed(piles['beta_deg'])}°. {low_regime(piles)}"
+        if len(piles)
+        else ""
+    )
+    return (
+        "Threshold stress against the friction Reynolds number: one grain on a flat bed, each "
+        "force law at those β and z₀ of this study at which it is within the measured range over "
+        f"most Re* ({'; '.join(fit.name for fit in found)}). Dotted: beyond the range of the law. "
+        f"{heaps}{_references(flat, 'beta_deg')}"
+    )
+
+
+def by_angle(scenes: pd.DataFrame, points: pd.DataFrame) -> str:
+    """Of the laws side by side, a panel for each entrainment angle."""
+    dem = (
+        f" Markers: DEM of one grain. {hold_protocol(points)} {_hollow(points)}"
+        if len(points)
+        else ""
+    )
+    return (
+        "Threshold stress of one grain on a flat bed against the friction Reynolds number, by "
+        f"force law. Lines are dotted beyond the range of their law.{dem} "
+        f"{_references(scenes, 'beta_deg')}"
+    )
+
+
+def _has_pair(rows: pd.DataFrame) -> bool:
+    return bool(rows["force_law"].isin(laws.PAIR).any())
 
 
 def _references(scenes: pd.DataFrame, by: str) -> str:
@@ -54,7 +105,9 @@ def _references(scenes: pd.DataFrame, by: str) -> str:
     water = (
         "Blue: the spread of published curves for water, between the lowest and the highest "
         "wherever at least two were published for that Re*; thin lines are the curves themselves "
-        f"({'; '.join(curve.name for curve in curves.WATER)}). They are fits, not measured points."
+        f"({'; '.join(curve.name for curve in curves.WATER)}). They are fits, not measured points. "
+        f"Black: {MEASURED_SOURCE}; the median of each range of Re*, and from the tenth to the "
+        "ninetieth percentile."
     )
     brown = (
         " Brown: curves for grains in air, of this study’s grains and gas over the same diameters "
@@ -91,8 +144,7 @@ def grain_dem(points: pd.DataFrame, number: int) -> str:
         f"After Fig. {number} of the paper. Markers: thresholds of one mobile sphere on its two "
         "fixed neighbours, by LIGGGHTS; lines, band and curves as in the figure before. "
         f"{hold_protocol(points)} Bars run from the last load step without to the first with "
-        f"motion; "
-        f"most are smaller than the markers. {HOLLOW if not valid(points).all() else ''}"
+        f"motion; most are smaller than the markers. {_hollow(points)}"
     )
 
 
@@ -101,16 +153,16 @@ def accuracy(dem: pd.DataFrame) -> str:
     ratio = dem["ustar_m_s"] / dem["ustar_closed_form_m_s"] - 1
     holds = valid(dem)
     parts = []
-    for chosen, name in ((holds, "where its force law holds"), (~holds, "where it does not")):
+    for chosen, name in ((holds, "where its law holds"), (~holds, "where it does not")):
         if ratio[chosen].notna().any():
             parts.append(f"{ratio[chosen].abs().max():.2%} {name}")
     return (
-        "Friction velocity at the threshold by DEM over that of Eq. 3 or 5 with the same forces. "
+        "Friction velocity at the threshold by DEM over that of the closed form with the same "
+        f"forces: {force_laws(dem)}. "
         "Bars: between the load steps without and with motion, so a threshold met exactly lies "
-        "within "
-        f"its bar. {'Panels differ in scale. ' if dem['load_increment'].nunique() > 1 else ''}"
-        f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} "
-        + (HOLLOW if not holds.all() else "")
+        "within its bar. "
+        f"{'Panels differ in scale. ' if dem['load_increment'].nunique() > 1 else ''}"
+        f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} {_hollow(dem)}"
     )
 
 
@@ -157,8 +209,8 @@ def fractions(rows: pd.DataFrame) -> str:
         "had moved by the end of each load step (one marker), against Re* (left) and τ (right) "
         "of the "
         "mean signed wall stress over the grains that had moved, as in the paper: the mean falls "
-        "where the next grains to move feel less. Dashed: forces of Eq. 2. "
-        f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
+        "where the next grains to move feel less. "
+        f"Forces: {force_laws(rows)}. {hold_protocol(rows)} {_hollow(rows)}{low_regime(rows)}"
     )
 
 
@@ -169,10 +221,10 @@ def extended(rows: pd.DataFrame) -> str:
         "moved when their fraction first reached n/N; thin lines join piles that differ in d "
         "alone. Bars hold the step between two flows and the count’s resolution of half a grain; "
         "Re* is that of the marker’s stress. A fraction that was not reached has no marker. Black: "
-        "the closed form of one grain at the same slope, entrainment angle and z₀/d, solid where "
-        "it holds. "
-        f"{hold_protocol(rows)} {HOLLOW if not valid(rows).all() else ''} {low_regime(rows)}"
-        f"{DRAG_LAW} {_references(rows, 'alpha_deg')}"
+        "the closed form of one grain at the same slope, entrainment angle and z₀/d; dotted where "
+        f"its force law does not hold. Force laws: {force_laws(rows)}. {_drag_law(rows)}"
+        f"{hold_protocol(rows)} {_hollow(rows)}{low_regime(rows)}"
+        f"{_references(rows, 'alpha_deg')}"
     )
 
 

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 from importlib import metadata
 from platform import python_version
 
+import numpy as np
 import pandas as pd
 
 from orchestrator import __version__
 from orchestrator.fidelity import levels as fidelity
-from orchestrator.report import labels
+from orchestrator.physics.force_law import ForceLaw
+from orchestrator.physics.laws import LAWS
+from orchestrator.report import labels, laws
 from orchestrator.report.apart import varying
 from orchestrator.report.results import Results, by_dem, held, split, valid
 from orchestrator.runs.case import IDENTITY
@@ -63,11 +66,10 @@ def piles(results: Results) -> Sheet | None:
 
 def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
     forces = labels.value("force_law", row["force_law"])
-    holds = row["force_law"] == row["regime"]
     cells = (
         f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
         f"{labels.ratio_of(row['z0_over_d'], 'd')}",
-        f"{forces}, {row['nu_m2_s']:g}" + ("" if holds else "\n(does not hold)"),
+        f"{forces}, {row['nu_m2_s']:g}" + ("" if row["law_holds"] else "\n(does not hold)"),
     )
     chosen = "\n".join(labels.plain(c, row[c]) for c in extra if pd.notna(row[c]))
     return (*cells, chosen) if extra else cells
@@ -100,7 +102,7 @@ def single_grains(results: Results) -> Sheet | None:
         rows.append(
             (
                 equation,
-                "yes" if holds else "no (transition)",
+                "yes" if holds else "no",
                 "holds" if waiting_time else "ramps",
                 str(len(own)),
                 str(int(own["ratio"].isna().sum())),
@@ -111,7 +113,7 @@ def single_grains(results: Results) -> Sheet | None:
         )
     head = (
         "forces",
-        "force law holds",
+        "law holds",
         "protocol",
         "grains",
         "never moved",
@@ -120,6 +122,22 @@ def single_grains(results: Results) -> Sheet | None:
         "median half width of the interval",
     )
     return Sheet(head, tuple(sorted(rows, key=lambda row: row[:3], reverse=True)))
+
+
+def force_laws(results: Results) -> Sheet:
+    """The force laws of the scenes: where each holds, and where it was taken from."""
+    used = [LAWS[name] for name in LAWS if (results.scenes["force_law"] == name).any()]
+    rows = tuple((one.label, _range(one), one.reference) for one in used)
+    return Sheet(("force law", "holds for", "source"), rows)
+
+
+def _range(law: ForceLaw) -> str:
+    low, high = law.reynolds
+    parts = [f"Re* ≥ {low:g}"] if low > 0 else []
+    parts += [f"Re* < {high:g}"] if np.isfinite(high) else []
+    if np.isfinite(law.drag_end):
+        parts.append(f"V d/ν < {law.drag_end:g} (drag: {law.drag_law})")
+    return ", ".join(parts) or "every Re*"
 
 
 def parameters(results: Results) -> Sheet:
@@ -194,19 +212,25 @@ def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
     found = []
     if failures:
         found.append(f"Cases that failed: {len(failures)}. The figures lack them; see below.")
-    transition = results.scenes["regime"] == "transition"
-    if transition.any():
+    outside = ~valid(results.scenes)
+    if outside.any():
         found.append(
-            f"Scenes in the transition, where neither force law holds: {int(transition.sum())} of "
-            f"{len(transition)}. Both force laws were run unless the study names one; their "
-            f"markers "
-            "are hollow."
+            f"Scenes whose force law does not hold at their single-grain threshold: "
+            f"{int(outside.sum())} of {len(outside)}; their markers are hollow. "
+            f"{_of_transition(results.scenes[outside])}"
         )
     thresholds = results.joined("pile_threshold")
     if len(thresholds) and thresholds["shields"].isna().any():
         missing = int(thresholds["shields"].isna().sum())
         found.append(f"Thresholds of piles that were not reached: {missing} of {len(thresholds)}.")
     return [*found, *_upstream(results.joined("pile_curve")), *_stray_grains(results)]
+
+
+def _of_transition(scenes: pd.DataFrame) -> str:
+    """What the paper's rule does between its two laws."""
+    both = scenes["force_law"].isin(laws.PAIR) & (scenes["regime"] == "transition")
+    said = f"{int(both.sum())} of them by Eq. 2 or Eq. 4 where neither holds. "
+    return said if both.any() else ""
 
 
 def _upstream(curve: pd.DataFrame) -> Iterator[str]:
@@ -240,7 +264,7 @@ def _stray_grains(results: Results) -> list[str]:
     if far.any():
         found.append(
             f"Single grains held more than 1 % from the closed form: {int(far.sum())}, of which "
-            f"{int((far & valid(grains)).sum())} where their force law holds."
+            f"{int((far & valid(grains)).sum())} where their law holds."
         )
     if silent.any():
         found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
@@ -275,7 +299,8 @@ def checks(results: Results) -> Sheet | None:
         return None
     rows = [
         (
-            f"{one['alpha_deg']:g}°, {one['packing']}, {one['force_law']}",
+            f"{one['alpha_deg']:g}°, {one['packing']}, "
+            f"{labels.value('force_law', one['force_law'])}",
             f"{1e3 * one['d_m']:g} mm",
             f"{one['fraction']:.0%}",
             f"{one['shields']:.4g}",

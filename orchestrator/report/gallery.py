@@ -11,6 +11,7 @@ from dataclasses import replace
 from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
     animation,
+    compared,
     flow_picture,
     grain_picture,
     mesh_picture,
@@ -88,6 +89,7 @@ def _pictures(results: Results, folder: Folder) -> Iterator[Drawn]:
 
 
 def _single(results: Results, folder: Folder) -> Iterator[Drawn]:
+    yield from _saved(compared.draw(results), folder)
     yield from _saved(single.draw(results), folder)
 
 

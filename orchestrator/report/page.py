@@ -12,7 +12,8 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from orchestrator.report import captions, facts
+from orchestrator.physics.measured import MEASURED_SOURCE
+from orchestrator.report import captions, facts, fits, laws, measured
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
@@ -52,6 +53,9 @@ def render(
         levels=facts.levels(results),
         checks=facts.checks(results),
         remarks=facts.remarks(results, failures),
+        paper_pair=bool(results.scenes["force_law"].isin(laws.PAIR).any()),
+        force_laws=facts.force_laws(results),
+        measured=measured_section(results),
         sections=sections,
         figures=[entry(figure, png) for figure, png in figures],
         failures=failures,
@@ -100,6 +104,20 @@ def links(results: Results) -> dict[str, str]:
     root = results.cases.name
     names = (name for name in results.plan.cases if (results.cases / name).is_dir())
     return {name: quote(f"{root}/{name}/") for name in names}
+
+
+def measured_section(results: Results) -> dict[str, Any] | None:
+    """Force laws against measurements, where a study has single grains on a flat bed."""
+    found = fits.fits(results)
+    if not found:
+        return None
+    return {
+        "source": MEASURED_SOURCE,
+        "factors_from": fits.FACTORS_FROM,
+        "says": measured.sentences(results.beds("grain"), found),
+        "best": measured.sheet(fits.best(found)),
+        "all": measured.sheet(found),
+    }
 
 
 def _flow_facts(results: Results) -> dict[str, Any]:

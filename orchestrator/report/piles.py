@@ -1,13 +1,13 @@
 """Figures of piles: the fraction of grains that moved, and the extended Shields diagram."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.report import captions, labels, shields, style, theory
+from orchestrator.report import captions, labels, laws, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, split, valid
@@ -15,6 +15,9 @@ from orchestrator.report.results import Results, split, valid
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """What figures, panels, axes, colours and markers tell apart."""
+
+MARKERS = 30
+"""Most of a curve: peeling gives one for each grain."""
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -65,7 +68,7 @@ def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
         row[0].set(ylabel="$n/N$", xscale="log", ylim=(0, 1))
     for ax in axes[:, 0]:
         style.plain_ticks(ax.xaxis)
-        shields.shade_transition(ax)
+        shields.shade_transition(ax, rows)
     shields.label_lowest(list(axes[:, 0]), labels.RE_AXIS)
     shields.label_lowest(list(axes[:, 1]), labels.TAU_AXIS)
     used = set(rows["d_m"])
@@ -75,16 +78,15 @@ def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
 
 
 def _curve(ax: Axes, curve: pd.DataFrame, column: str, colour: str) -> None:
-    law_name = str(curve["force_law"].iloc[0])
     face = colour if valid(curve).all() else "white"
     ax.plot(
         curve[column],
         curve["fraction_moved"],
-        "--" if law_name == "low" else "-",
         color=colour,
         lw=0.8,
         ms=3,
         marker=str(curve[SHAPE].iloc[0]),
+        markevery=-(-len(curve) // MARKERS),
         mfc=face,
         mew=0.7,
         gid=str(curve["scene_id"].iloc[0]),
@@ -104,23 +106,34 @@ def _extended(results: Results, rows: pd.DataFrame) -> Canvas:
     for unused in grid[len(panels) :]:
         unused.remove()
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
+    dashes = laws.dashes(rows["force_law"])
     for ax, part in zip(axes, panels, strict=True):
-        references = _panel(ax, results, part, colours)
+        references = _panel(ax, results, part, colours, dashes)
         ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-    ratios = [float(part["z0_over_d"].iloc[0]) for part in panels]
-    shields.prepare(axes, ratios, shields.RESULT[1:], margin=5)
+    # below the first grains lies the threshold of one, which they are held against
+    shields.prepare(axes, panels, (rows["reynolds"].min() / 5, rows["reynolds"].max() * 2))
+    shields.mark_drag_law(axes, panels)
     entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
-    looks = [*shields.line_entries(), *shields.point_entries(rows), *variants, *references]
+    looks = [
+        *shields.line_entries(rows, dashes),
+        *shields.point_entries(rows),
+        *variants,
+        *references,
+    ]
     style.legends(figure, entries, looks)
     return figure
 
 
 def _panel(
-    ax: Axes, results: Results, rows: pd.DataFrame, colours: dict[float, str]
+    ax: Axes,
+    results: Results,
+    rows: pd.DataFrame,
+    colours: dict[float, str],
+    dashes: Mapping[str, laws.Dash],
 ) -> list[Artist]:
     piles = results.scenes[results.scenes["scene_id"].isin(rows["scene_id"])]
     for _, scenes in split(piles, "beta_deg"):
-        shields.draw_branches(ax, theory.branches(scenes), "0.2")
+        shields.draw_branches(ax, theory.branches(scenes), "0.2", dashes)
     for (fraction,), points in split(rows, "fraction"):
         colour = colours[float(str(fraction))]
         for _, series in split(points, "nu_m2_s", "force_law", "regime", SHAPE):

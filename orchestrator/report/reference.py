@@ -51,11 +51,13 @@ def air_lines(
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
 
-    The slope's factor of physics is on u*. Empty where the fluid is no gas.
+    The slope's factor of physics is on u*. Of several gases it is that of the least viscosity;
+    empty where there is none.
     """
-    one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
-    if one["rho_sol_kg_m3"] < GAS_RATIO * one["rho_f_kg_m3"]:
+    scenes = scenes[scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]]
+    if scenes.empty:
         return {}
+    one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
     air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
     d = sweep(scenes)
     factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])

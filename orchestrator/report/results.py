@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from orchestrator.grains.pile import Pile
@@ -96,4 +95,4 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
 
 def valid(table: pd.DataFrame) -> pd.Series:
     """Whether the force law of each row holds at its scene's own single-grain threshold."""
-    return pd.Series(np.asarray(table["force_law"] == table["regime"]), index=table.index)
+    return table["law_holds"].astype(bool)

@@ -1,6 +1,6 @@
 """The Shields diagram: axes, what is known of them, closed-form lines and points with intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,9 +11,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from orchestrator.physics import curves
-from orchestrator.physics.closures import HIGH_FROM, LOW_BELOW
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import labels, reference, style
+from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
+from orchestrator.report import labels, laws, reference, style
 from orchestrator.report.apart import SHAPE
 from orchestrator.report.results import valid
 from orchestrator.report.theory import Branch, drag_law_limit
@@ -21,42 +21,37 @@ from orchestrator.report.theory import Branch, drag_law_limit
 FloatArray = NDArray[np.float64]
 
 AIR_STYLES = ("-.", "--", (0, (1, 1)))
-RESULT = ("closed form", "points", "points, force law not valid")
+RESULT = ("closed form", "points", "points, law does not hold")
 """Marks of the artists that the limits of the axes must hold."""
 WATER = "water curve"
+MEASURED = "measured"
+AIR = "air: "
 
 
 def prepare(
-    axes: Sequence[Axes],
-    z0_over_d: Sequence[float],
-    marks: tuple[str, ...] = RESULT,
-    margin: float = 1.6,
+    axes: Sequence[Axes], panels: Sequence[pd.DataFrame], xlim: tuple[float, float]
 ) -> None:
-    """Logarithmic axes, the transition, and the drag law's limit at each z0/d.
+    """Logarithmic axes of panels; the transition where the rows of one have the paper's laws.
 
-    Call it when all else is drawn; the axes share their limits, which reach from the artists of
-    some marks outwards by a factor.
+    Call it when all else is drawn; the axes share their limits.
     """
-    reynolds = _extent(axes, 0, marks, (0, np.inf))
-    xlim = reynolds[0] / margin, reynolds[1] * 2
-    shields = _extent(axes, 1, (*RESULT, WATER), xlim)
-    for ax, ratio in zip(axes, z0_over_d, strict=True):
+    low, high = _extent(axes, xlim)
+    for ax, rows in zip(axes, panels, strict=True):
         ax.set(xscale="log", yscale="log", ylabel=labels.TAU_AXIS)
-        ax.set(xlim=xlim, ylim=(shields[0] / 1.6, shields[1] * 2.2))
+        ax.set(xlim=xlim, ylim=(low / 1.6, high * 2.2))
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-        shade_transition(ax)
-        mark_drag_law(ax, drag_law_limit(ratio))
+        shade_transition(ax, rows)
     label_lowest(axes, labels.RE_AXIS)
 
 
-def _extent(
-    axes: Sequence[Axes], column: int, marks: tuple[str, ...], xlim: tuple[float, float]
-) -> tuple[float, float]:
+def _extent(axes: Sequence[Axes], xlim: tuple[float, float]) -> tuple[float, float]:
+    """Least and largest tau that is drawn between two Re*, of what the limits must hold."""
+    marks = (*RESULT, WATER, MEASURED)
     lines = [line.get_xydata() for ax in axes for line in ax.lines if line.get_gid() in marks]
     xy = np.concatenate([np.asarray(line, float) for line in lines])
-    inside = xy[(xy[:, 0] >= xlim[0]) & (xy[:, 0] <= xlim[1]), column]
-    return float(np.nanmin(inside)), float(np.nanmax(inside))
+    tau = xy[(xy[:, 0] >= xlim[0]) & (xy[:, 0] <= xlim[1]), 1]
+    return float(np.nanmin(tau)), float(np.nanmax(tau))
 
 
 def label_lowest(axes: Sequence[Axes], label: str) -> None:
@@ -67,28 +62,37 @@ def label_lowest(axes: Sequence[Axes], label: str) -> None:
             ax.set_xlabel(label)
 
 
-def shade_transition(ax: Axes) -> None:
-    """Shade where neither force law holds, as far as the axes show it."""
+def shade_transition(ax: Axes, rows: pd.DataFrame) -> None:
+    """Shade where neither law of the paper holds, as far as the axes show it."""
     left, right = ax.get_xlim()
     ax.set_xlim(left, right)
-    left, right = max(left, LOW_BELOW), min(right, HIGH_FROM)
+    if not rows["force_law"].isin(laws.PAIR).any():
+        return
+    low, high = (LAWS[name].reynolds for name in laws.PAIR)
+    left, right = max(left, low[1]), min(right, high[0])
     if left < right:
         ax.axvspan(left, right, color="0.93", zorder=0, gid="transition")
         if right > 1.5 * left:
             style.note(ax, float(np.sqrt(left * right)), "transition")
 
 
-def mark_drag_law(ax: Axes, limit: float) -> None:
-    """A line where the drag law of Eq. 4 ends, if the axes reach it."""
-    if ax.get_xlim()[1] > limit:
+def mark_drag_law(axes: Sequence[Axes], panels: Sequence[pd.DataFrame]) -> None:
+    """A line where the drag law of Eq. 4 ends, if the axes reach it and that law is drawn."""
+    for ax, rows in zip(axes, panels, strict=True):
+        limit = drag_law_limit(float(rows["z0_over_d"].iloc[0]))
+        if not rows["force_law"].isin(laws.PAIR).any() or ax.get_xlim()[1] <= limit:
+            continue
         ax.axvline(limit, color="0.4", lw=0.7, ls=(0, (4, 2)), zorder=0.5, gid="drag law limit")
         style.upright_note(ax, limit / 1.04, "drag law ends", at="bottom")
 
 
-def draw_branches(ax: Axes, branches: Sequence[Branch], colour: str) -> None:
-    """Closed-form lines: solid where the force law holds, dotted where neither does."""
+def draw_branches(
+    ax: Axes, branches: Sequence[Branch], colour: str, dashes: Mapping[str, laws.Dash]
+) -> None:
+    """Closed-form lines, dashed by law; dotted where it does not hold but the study has grains."""
     for branch in branches:
-        for chosen, look, width in ((branch.valid, "-", 1.1), (branch.transition, ":", 0.9)):
+        own = dashes[branch.law]
+        for chosen, look, width in ((branch.valid, own, 1.1), (branch.continued, ":", 0.9)):
             if chosen.any():
                 x, y = (np.where(chosen, a, np.nan) for a in (branch.reynolds, branch.shields))
                 ax.plot(x, y, ls=look, color=colour, lw=width, gid=RESULT[0])
@@ -130,12 +134,24 @@ def draw_water(ax: Axes) -> list[Artist]:
     return [Patch(label="water: spread of published curves", **look)]
 
 
+def draw_measured(ax: Axes) -> list[Artist]:
+    """Measured medians with their ranges of Re* and of tau; returns their entry for a legend."""
+    bins = BUFFINGTON_MONTGOMERY
+    x, y = [one.middle for one in bins], [one.median for one in bins]
+    look: style.Look = {"color": "black", "lw": 0.7, "zorder": 2.2, "gid": MEASURED}
+    ax.vlines(x, [one.tenth for one in bins], [one.ninetieth for one in bins], **look)
+    ax.hlines(y, [one.low for one in bins], [one.high for one in bins], **look)
+    ax.plot(x, y, "s", ms=3.5, **look)
+    label = "measured: median, 10 to 90 %"
+    return [Line2D([], [], color="black", lw=0.7, marker="s", ms=3.5, label=label)]
+
+
 def draw_air(ax: Axes, scenes: pd.DataFrame) -> list[Artist]:
     """The curves for air over a horizontal bed; returns their entries for a legend."""
     entries: list[Artist] = []
     lines = reference.air_lines(scenes)
     for (name, (x, y)), look in zip(lines.items(), AIR_STYLES, strict=False):
-        ax.plot(x, y, color=style.AIR, ls=look, lw=0.9, zorder=1.5, gid=f"air: {name}")
+        ax.plot(x, y, color=style.AIR, ls=look, lw=0.9, zorder=1.5, gid=AIR + name)
         entries.append(Line2D([], [], color=style.AIR, ls=look, lw=0.9, label=f"air: {name}"))
     return entries
 
@@ -146,19 +162,25 @@ def draw_sloped_air(ax: Axes, scenes: pd.DataFrame, colour: str) -> list[Artist]
     lines = reference.air_lines(scenes, float(scenes["alpha_deg"].iloc[0]))
     if name not in lines:
         return []
-    ax.plot(*lines[name], color=colour, ls="--", lw=0.7, zorder=1.5, gid=f"air: {name}")
+    ax.plot(*lines[name], color=colour, ls="--", lw=0.7, zorder=1.5, gid=AIR + name)
     label = f"air: {name} × slope factor"
     # a colour that means one slope says nothing of the others
     shown = colour if colour == style.AIR else "0.2"
     return [Line2D([], [], color=shown, ls="--", lw=0.7, label=label)]
 
 
-def line_entries() -> list[Artist]:
-    """Legend of the closed form's line styles."""
-    return [
-        Line2D([], [], color="0.2", lw=1.1, label="Eqs. 3, 5 where they hold"),
-        Line2D([], [], color="0.2", lw=0.9, ls=":", label="continued where neither holds"),
+def line_entries(rows: pd.DataFrame, dashes: Mapping[str, laws.Dash]) -> list[Artist]:
+    """Legend of the closed form's line styles, for the laws of some rows."""
+    named = {name: labels.value("force_law", name) for name in dashes if name not in laws.PAIR}
+    pair = {laws.PAIR[0]: "Eqs. 3, 5"} if laws.PAIR[0] in dashes else {}
+    entries: list[Artist] = [
+        Line2D([], [], color="0.2", lw=1.1, ls=dashes[name], label=f"closed form: {label}")
+        for name, label in {**pair, **named}.items()
     ]
+    if not valid(rows).all():
+        dotted = "dotted: the force law does not hold"
+        entries.append(Line2D([], [], color="0.2", lw=0.9, ls=":", label=dotted))
+    return entries
 
 
 def point_entries(rows: pd.DataFrame) -> list[Artist]:
@@ -169,7 +191,7 @@ def point_entries(rows: pd.DataFrame) -> list[Artist]:
         name = f"{labels.methods(own)}, {labels.value('force_law', law_name)}"
         markers.append((name, own[SHAPE].mode()[0], "0.2"))
     if not valid(rows).all():
-        markers.append(("hollow: force law does not hold", markers[-1][1], "white"))
+        markers.append(("hollow: the force law does not hold", markers[-1][1], "white"))
     return [
         Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
         for label, m, face in markers

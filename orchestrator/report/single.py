@@ -1,6 +1,6 @@
 """Figures of single grains: closed form and DEM by entrainment angle and by slope, accuracy."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
-from orchestrator.report import captions, labels, shields, style, theory
+from orchestrator.report import captions, labels, laws, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, by_dem, held, split, valid
@@ -27,7 +27,7 @@ def draw(results: Results) -> Iterator[Figure]:
     dem = by_dem(results.joined("single_grain"))
     dem = dem[held(dem)] if len(dem) else dem
     flat = grains[grains["alpha_deg"] == 0]
-    if len(flat):
+    if len(flat) and not laws.many(flat["force_law"]):
         yield from _pair(results, flat, dem, "beta_deg", "horizontal bed")
     for (beta,), scenes in split(grains, "beta_deg"):
         if (scenes["alpha_deg"] > 0).any():
@@ -69,12 +69,14 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
     panels = [part for _, part in split(scenes, *keys)][::-1]
     figure = style.canvas(2.4 * len(panels) + 1.1)
     axes = list(figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
-    colours = style.palette(by, results.values(by))
+    colours, dashes = style.palette(by, results.values(by)), laws.dashes(scenes["force_law"])
     for ax, part in zip(axes, panels, strict=True):
-        references = _panel(ax, part, points, by, colours)
+        references = _panel(ax, part, points, by, colours, dashes)
         ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-    shields.prepare(axes, [float(part["z0_over_d"].iloc[0]) for part in panels])
-    looks: list[style.Sample] = [*references, *shields.line_entries()]
+    low, high = theory.span(scenes)
+    shields.prepare(axes, panels, (low / 2, high * 2))
+    shields.mark_drag_law(axes, panels)
+    looks: list[style.Sample] = [*references, *shields.line_entries(scenes, dashes)]
     if len(points):
         looks += [*_point_entries(points), *variants]
     style.legends(figure, _colour_entries(scenes, by, colours), looks)
@@ -108,13 +110,18 @@ def _colour_entries(scenes: pd.DataFrame, by: str, colours: dict[float, str]) ->
 
 
 def _panel(
-    ax: Axes, scenes: pd.DataFrame, points: pd.DataFrame, by: str, colours: dict[float, str]
+    ax: Axes,
+    scenes: pd.DataFrame,
+    points: pd.DataFrame,
+    by: str,
+    colours: dict[float, str],
+    dashes: Mapping[str, laws.Dash],
 ) -> list[Artist]:
     """One z0/d; returns the legend's entries of the references."""
     references: list[Artist] = []
     for (value,), series in split(scenes, by):
         colour = colours[float(str(value))]
-        shields.draw_branches(ax, theory.branches(series), colour)
+        shields.draw_branches(ax, theory.branches(series), colour, dashes)
         if len(points):
             own = points[points["scene_id"].isin(series["scene_id"])]
             shields.draw_points(ax, own, colour, DEM)
@@ -122,7 +129,8 @@ def _panel(
         if by == "alpha_deg":
             references = shields.draw_sloped_air(ax, series, colour)
     if by == "beta_deg":
-        references = shields.draw_water(ax) + shields.draw_air(ax, scenes)
+        water = shields.draw_water(ax) + shields.draw_measured(ax)
+        references = water + shields.draw_air(ax, scenes)
     return references
 
 
@@ -146,7 +154,7 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
         ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
     for ax in axes:
         style.plain_ticks(ax.xaxis)
-        shields.shade_transition(ax)
+        shields.shade_transition(ax, rows)
     axes[-1].set_xlabel(labels.RE_AXIS)
     entries = _colour_entries(rows, "alpha_deg", colours)
     style.legends(figure, entries, [*shields.point_entries(rows), *variants])
@@ -160,4 +168,4 @@ def _ratios(ax: Axes, rows: pd.DataFrame, colours: dict[float, str]) -> None:
         own = rows[rows["alpha_deg"] == alpha]
         shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
     reach = 1.6 * float(np.nanmax(np.abs(rows[["value", "low", "high"]] - 1)))
-    ax.set(ylim=(1 - reach, 1 + reach), ylabel=r"$u^\star_{DEM}/u^\star_{Eqs.\,3,\,5}$")
+    ax.set(ylim=(1 - reach, 1 + reach), ylabel=r"$u^\star_{DEM}/u^\star_{closed\;form}$")

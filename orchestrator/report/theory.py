@@ -1,7 +1,7 @@
-"""The closed form as lines: Eqs. 3 and 5 over a sweep of the diameter.
+"""The closed form as lines: the threshold of one grain under a force law, of Re* alone.
 
-In (Re*, tau) both are curves that neither density, viscosity nor gravity changes: these only say
-which part of a curve the grains of a study are on.
+In (Re*, tau) a law is a curve that neither density, viscosity nor gravity changes: these only say
+which part of the curve the grains of a study are on.
 """
 
 from dataclasses import dataclass
@@ -10,47 +10,122 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics import closures
-from orchestrator.physics.closures import Closure, Threshold
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import Threshold, shields_at, threshold
+from orchestrator.report import laws
+from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]
 
 SWEEP_M = (5e-5, 1e-3)
 """Diameters of the paper; a study with others widens the sweep."""
 POINTS = 240
-PARTICLE_REYNOLDS_LIMIT = 1000.0
-"""V_f d/nu up to which the drag law of Eq. 4 (Schiller and Naumann) holds."""
+WIDER = 10.0
+"""Factor on Re* by which lines go on beyond a study's grains: axes cut them."""
+WHOLE = np.geomspace(1e-4, 1e6, 2001)
+"""Re* of any grain."""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """One force law's line in the Shields diagram; arrays of one shape, Re* rising.
+    """One law's line in the Shields diagram; arrays of one shape, Re* rising.
 
     Attributes
     ----------
-    force law : {"low", "high"}
-        Eq. 3 or Eq. 5.
+    law : str
+        Its name.
     reynolds, shields : ndarray
         Re* and tau at the threshold.
-    valid, transition : ndarray of bool
-        Where the force law holds; where neither force law does.
+    valid, continued : ndarray of bool
+        Where the law holds; where it does not, but the study has grains.
     """
 
-    law_name: Closure
+    law: str
     reynolds: FloatArray
     shields: FloatArray
     valid: NDArray[np.bool_]
-    transition: NDArray[np.bool_]
+    continued: NDArray[np.bool_]
 
 
 def branches(scenes: pd.DataFrame) -> list[Branch]:
     """The lines through scenes of one slope, one entrainment angle and one z0/d."""
-    found: list[Branch] = []
-    for _, same in scenes.groupby("alpha_s"):
-        low, high = (_swept(law_name, same) for law_name in closures.CLOSURES)
-        transition = closures.regime(low, high) == "transition"
-        found += [_branch("low", low, transition), _branch("high", high, transition)]
-    return found
+    low, high = span(scenes)
+    reynolds = np.geomspace(low / WIDER, high * WIDER, POINTS)
+    return [
+        branch(law, own, reynolds)
+        for _, own in split(scenes, "alpha_s")
+        for law in laws.drawn(own["force_law"])
+    ]
+
+
+def branch(law: str, scenes: pd.DataFrame, reynolds: FloatArray) -> Branch:
+    """The line of a law at some Re*, for the bed of some scenes."""
+    bed, here = bed_of(scenes), scenes[scenes["force_law"] == law]
+    first, last = span(here) if len(here) else (np.inf, 0.0)
+    valid = load_steps(law, reynolds, bed)
+    near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
+    return Branch(law, reynolds, shields(law, reynolds, bed), valid, near & ~valid)
+
+
+@dataclass(frozen=True)
+class Bed:
+    """All that the closed form depends on beside Re* and the law; angles in degrees."""
+
+    slope_deg: float
+    entrainment_angle_deg: float
+    roughness_ratio: float
+    lift_coefficient: float
+
+
+def bed_of(scenes: pd.DataFrame) -> Bed:
+    """The bed of scenes that share it."""
+    one = scenes.iloc[0]
+    return Bed(*(float(one[c]) for c in ("alpha_deg", "beta_deg", "z0_over_d", "alpha_s")))
+
+
+def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
+    """Tau of one grain on a bed whose threshold is at some Re*."""
+    return shields_at(
+        LAWS[law],
+        reynolds,
+        slope_deg=bed.slope_deg,
+        entrainment_angle_deg=bed.entrainment_angle_deg,
+        roughness_ratio=bed.roughness_ratio,
+        lift_coefficient=bed.lift_coefficient,
+    )
+
+
+def load_steps(law: str, reynolds: FloatArray, bed: Bed) -> NDArray[np.bool_]:
+    """Whether a law holds at some Re*."""
+    return LAWS[law].valid(reynolds, _unit(bed.roughness_ratio, bed.lift_coefficient))
+
+
+def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
+    """In units of d, nu and rho_f the friction velocity is Re*."""
+    return Exposure(1.0, ratio, 1.0, 1.0, lift_coefficient)
+
+
+def span(scenes: pd.DataFrame) -> tuple[float, float]:
+    """Least and largest Re* of scenes at the thresholds of their single grains."""
+    found = [thresholds(own).reynolds for _, own in split(scenes, "force_law")]
+    reynolds = np.concatenate(found)
+    reynolds = reynolds[np.isfinite(reynolds)]
+    return float(reynolds.min()), float(reynolds.max())
+
+
+def thresholds(scenes: pd.DataFrame) -> Threshold:
+    """The closed form of the single grains of rows under one law."""
+    d = scenes["d_m"].to_numpy(float)
+    fluid = scenes["rho_f_kg_m3"], scenes["nu_m2_s"], scenes["alpha_s"]
+    return threshold(
+        LAWS[str(scenes["force_law"].iloc[0])],
+        Exposure(d, scenes["z0_over_d"] * d, *fluid),
+        density=scenes["rho_sol_kg_m3"],
+        slope_deg=scenes["alpha_deg"],
+        entrainment_angle_deg=scenes["beta_deg"],
+        gravity=scenes["g_m_s2"],
+    )
 
 
 def sweep(scenes: pd.DataFrame) -> FloatArray:
@@ -59,30 +134,7 @@ def sweep(scenes: pd.DataFrame) -> FloatArray:
     return np.geomspace(min(SWEEP_M[0], d.min()), max(SWEEP_M[1], d.max()), POINTS)
 
 
-def _swept(law_name: Closure, scenes: pd.DataFrame) -> Threshold:
-    viscosities = np.unique(scenes["nu_m2_s"])
-    d, nu = (grid.ravel() for grid in np.meshgrid(sweep(scenes), viscosities))
-    one = scenes.iloc[0]
-    return closures.threshold(
-        law_name,
-        diameter=d,
-        density=one["rho_sol_kg_m3"],
-        fluid_density=one["rho_f_kg_m3"],
-        viscosity=nu,
-        slope_deg=one["alpha_deg"],
-        entrainment_angle_deg=one["beta_deg"],
-        roughness=one["z0_over_d"] * d,
-        lift_coefficient=one["alpha_s"],
-        gravity=one["g_m_s2"],
-    )
-
-
-def _branch(law_name: Closure, found: Threshold, transition: NDArray[np.bool_]) -> Branch:
-    order = np.argsort(found.reynolds)
-    reynolds, shields = found.reynolds[order], found.shields[order]
-    return Branch(law_name, reynolds, shields, found.valid[order], transition[order])
-
-
-def drag_law_limit(z0_over_d: float) -> float:
-    """Re* at which the particle Reynolds number V_f d/nu reaches the limit of the drag law."""
-    return PARTICLE_REYNOLDS_LIMIT / float(closures.mean_speed_ratio(1.0, z0_over_d))
+def drag_law_limit(z0_over_d: float, law: str = "high") -> float:
+    """Re* at which the particle Reynolds number V d/nu reaches the end of a law's drag."""
+    particle = LAWS[law].particle_reynolds(WHOLE, _unit(z0_over_d))
+    return float(np.exp(np.interp(np.log(LAWS[law].drag_end), np.log(particle), np.log(WHOLE))))

@@ -109,6 +109,11 @@ def regime_of(scene: Scene) -> Regime:
     return cast(Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high"))))
 
 
+def law_holds(scene: Scene) -> bool:
+    """Whether the force law of a resolved scene holds at its own single-grain threshold."""
+    return bool(closed_form(scene).valid)
+
+
 def resolved(scenes: Sequence[Scene]) -> Iterator[Scene]:
     """The scenes with one force law each; by the paper's rule one becomes two in the transition."""
     asking = [scene for scene in scenes if scene.forces.law == PAPER]

@@ -5,6 +5,7 @@ from typing import Any
 
 from orchestrator.plan import Plan
 from orchestrator.study import fields
+from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
@@ -27,6 +28,7 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
                 "group": group.name,
                 **fields.asked(asked),
                 **fields.answered(scene),
+                "law_holds": law_holds(asked),
                 "why": decision.why,
                 "case": runs[-1] if scene.protocol.method == "dem" else None,
                 "flow_case": pile.flow.name if pile and pile.model.cases else None,

@@ -10,9 +10,9 @@ import pytest
 
 from orchestrator.paper import PRESETS, claims
 from orchestrator.paper.claims import base, counting
-from orchestrator.paper.claims.base import Claim, Evidence, Verdict
+from orchestrator.paper.claims.base import Claim, Evidence, Verdict, in_regime
 from orchestrator.physics import curves
-from orchestrator.report.results import Results, valid
+from orchestrator.report.results import Results
 from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene
@@ -211,9 +211,9 @@ def test_wiggles_are_steps_of_the_stress_or_of_the_count() -> None:
 
 def test_transition_is_not_judged(results: Results, judged: dict[str, Claim]) -> None:
     def spoiled(table: pd.DataFrame) -> pd.DataFrame:
-        return table.assign(shields_dem=table["shields_dem"].where(valid(table), 1e9))
+        return table.assign(shields_dem=table["shields_dem"].where(in_regime(table), 1e9))
 
-    assert (~valid(results.tables["single_grain"])).any()
+    assert (~in_regime(results.tables["single_grain"])).any()
     assert changed(results.tables, "single_grain", spoiled) == judged
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import apart, captions, facts, labels, piles, shields
+from orchestrator.physics.laws import LAWS
+from orchestrator.report import apart, captions, facts, labels, laws, piles, shields, style
 from orchestrator.report.apart import SHAPE
 from orchestrator.report.results import Results
 from orchestrator.study import fields
@@ -58,7 +59,9 @@ def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
 def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
     laws = table.assign(force_law=["high", "bridged", "zeng", "low"])
     _, rows, _ = apart.parted(laws, *SHOWN, "force_law", "mobile_layers", "stiffness")
-    assert rows[SHAPE].tolist() == ["s", "^", "D", "o"]
+    assert rows[SHAPE].tolist() == ["s", "^", "<", "o"]
+    every = pd.concat([table.iloc[[0]]] * len(LAWS)).assign(force_law=[*LAWS])
+    assert apart.parted(every, *SHOWN)[1][SHAPE].is_unique
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +125,7 @@ def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     assert "rises by 5 %" in captions.hold_protocol(rows)
     without = rows.assign(answered_method="pivot", answered_load_increment=None, shape="s")
     said = captions.hold_protocol(without)
-    assert "Hold protocol" not in said
+    assert "Holding protocol" not in said
     assert "pivot" in said
     entries = [line.get_label() for line in shields.point_entries(without)]
     assert entries == ["pivot, Eq. 4 (high Re*)"]
@@ -149,3 +152,18 @@ def test_values_with_their_symbols(column: str, value: object, said: str) -> Non
 def test_values_in_mathematics() -> None:
     assert labels.written("nu_m2_s", 1e-5) == "$ν$ = $10^{-5}$ m²/s"
     assert labels.written("alpha_s", 1.6) == "$α_{s}$ = 1.6"
+
+
+def test_each_force_law_has_a_look_of_its_own() -> None:
+    looks = [laws.look(name) for name in LAWS]
+    assert len({str(look) for look in looks}) == len(LAWS)
+    assert not {colour for colour, _ in looks} & {style.WATER, style.AIR}
+
+
+def test_dashes_tell_all_laws_apart_but_the_papers_pair() -> None:
+    found = laws.dashes(LAWS)
+    assert list(found) == list(LAWS)
+    assert found["low"] == found["high"]
+    assert len({str(dash) for dash in found.values()}) == len(LAWS) - 1
+    assert laws.dashes(["bridged"]) == {"bridged": "-"}
+    assert list(laws.dashes(["high"])) == ["low", "high"]

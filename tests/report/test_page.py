@@ -98,7 +98,7 @@ def test_links_lead_to_what_is_there(page: Path, parsed: Page, results: Results)
 def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
     for row in results.tables["pile_threshold"].itertuples():
         assert f"{row.shields:.4f}" in parsed.text
-    assert "in the transition" in parsed.text
+    assert "by Eq. 2 or Eq. 4 where neither holds" in parsed.text
     assert "What this does not say" in parsed.text
     for said in ("liggghts", "openfoam", "matplotlib", "pile.foam", "./Allrun", "columns.csv"):
         assert said in parsed.text

@@ -1,9 +1,11 @@
 """The band for water, the lines for air, and the closed form as lines."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from orchestrator.physics import closures, curves
+from orchestrator.physics.laws import LAWS
 from orchestrator.report import reference, theory
 from orchestrator.report.results import Results
 
@@ -55,26 +57,42 @@ def test_bagnold_ends_where_his_constant_changes(results: Results) -> None:
     assert theta == pytest.approx(0.01)
 
 
-def test_closed_form_lines_are_solid_where_their_equation_holds(results: Results) -> None:
-    grains = results.beds("grain")
-    flat = grains[(grains["alpha_deg"] == 0) & (grains["beta_deg"] == 60)]
-    low, high = theory.branches(flat[flat["z0_over_d"] == 0.1])
+@pytest.fixture
+def bed(results: Results) -> pd.DataFrame:
+    """Grains on one flat bed."""
+    flat = results.beds("grain").query("alpha_deg == 0 and beta_deg == 60")
+    return flat[flat["z0_over_d"] == 0.1]
+
+
+def test_closed_form_lines_are_solid_where_their_equation_holds(bed: pd.DataFrame) -> None:
+    low, high = theory.branches(bed)
+    assert (low.law, high.law) == ("low", "high")
     assert (low.valid == (low.reynolds < closures.LOW_BELOW)).all()
-    assert (high.valid == (high.reynolds >= closures.HIGH_FROM)).all()
-    assert not (low.valid & low.transition).any()
+    inside = high.reynolds < theory.drag_law_limit(0.1)
+    assert (high.valid == ((high.reynolds >= closures.HIGH_FROM) & inside)).all()
+    assert not (low.valid & low.continued).any()
     assert low.valid.any()
-    assert low.transition.any()
+    assert low.continued.any()
 
 
-def test_viscosity_does_not_move_a_line(results: Results) -> None:
-    one = results.beds("grain").query("alpha_deg == 0 and beta_deg == 60 and z0_over_d == 0.1")
-    both = theory.branches(one)[0]
-    thin, thick = (theory.branches(one[one["nu_m2_s"] == nu])[0] for nu in (1e-5, 1e-3))
-    assert len(both.reynolds) == len(thin.reynolds) + len(thick.reynolds)
-    water = theory.branches(one[one["nu_m2_s"] == 1e-3].assign(rho_f_kg_m3=1000.0))[0]
-    shared = (water.reynolds > thick.reynolds[0]) & (water.reynolds < thick.reynolds[-1])
-    expected = np.interp(water.reynolds[shared], thick.reynolds, thick.shields)
-    assert water.shields[shared] == pytest.approx(expected, rel=1e-3)
+@pytest.mark.parametrize("law", LAWS)
+def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
+    scenes = bed.assign(force_law=law)
+    (line,) = [one for one in theory.branches(scenes) if one.law == law]
+    exact = theory.thresholds(scenes)
+    read = np.interp(np.log(exact.reynolds), np.log(line.reynolds), np.log(line.shields))
+    assert np.exp(read) == pytest.approx(exact.shields, rel=1e-3)
+    held = np.interp(exact.reynolds, line.reynolds, line.valid)
+    assert (held == exact.valid)[(held == 0) | (held == 1)].all()
+
+
+def test_the_fluid_does_not_move_a_line(bed: pd.DataFrame) -> None:
+    air = theory.branches(bed)[0]
+    water = theory.branches(bed.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6))[0]
+    read = np.interp(air.reynolds, water.reynolds, water.shields, left=np.nan, right=np.nan)
+    both = np.isfinite(read)
+    assert both.sum() > 100
+    assert air.shields[both] == pytest.approx(read[both], rel=1e-3)
 
 
 @pytest.mark.parametrize(("ratio", "limit"), [(1 / 30, 155.0), (1 / 10, 245.0)])

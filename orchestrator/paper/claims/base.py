@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics.closures import Closure
-from orchestrator.report.results import by_dem, split, valid
+from orchestrator.report.results import by_dem, split
 from orchestrator.study import fields
 from orchestrator.tables import Tables
 
@@ -90,7 +90,7 @@ class Evidence:
     def grains(self) -> pd.DataFrame:
         """Single grains whose force law holds, of any protocol."""
         table = self.joined("single_grain")
-        return table[valid(table)]
+        return table[in_regime(table)]
 
     @cached_property
     def held(self) -> pd.DataFrame:
@@ -105,7 +105,12 @@ class Evidence:
     def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
         """A table of piles whose force law holds, of one packing and one stress."""
         table = self.joined(name)
-        return table[valid(table) & (table["packing"] == packing) & (table["stress"] == stress)]
+        return table[in_regime(table) & (table["packing"] == packing) & (table["stress"] == stress)]
+
+
+def in_regime(table: pd.DataFrame) -> pd.Series:
+    """Whether each row has the forces of its scene's regime, by the paper's rule."""
+    return pd.Series(np.asarray(table["force_law"] == table["regime"]), index=table.index)
 
 
 EMPTY = (

@@ -11,10 +11,11 @@ from orchestrator.paper.claims.base import (
     Verdict,
     by_share,
     combined,
+    in_regime,
     pairs,
 )
 from orchestrator.report import labels
-from orchestrator.report.results import split, valid
+from orchestrator.report.results import split
 from orchestrator.report.theory import drag_law_limit
 
 PAPER_K = 1e6
@@ -150,7 +151,7 @@ def _beyond_drag_law(evidence: Evidence) -> tuple[str, ...]:
 def stress(evidence: Evidence) -> Claim:
     """Eq. 10 against the wall stress, in the thresholds of piles."""
     table = evidence.joined("pile_threshold")
-    both = table[valid(table) & (table["packing"] == "aligned")]
+    both = table[in_regime(table) & (table["packing"] == "aligned")]
     found = _eq10(both)
     measured = tuple(
         f"{NAMES[law_name]}: Eq. 10 changes τ by {own['tau'].median() - 1:+.1%} in the median "
