@@ -9,10 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator import __version__, signals, streams
+from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
 from orchestrator.errors import OrchestratorError, of_shortage, of_system
+from orchestrator.runs import signals, streams
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
 INTERRUPTED = 130
