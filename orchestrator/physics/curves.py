@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.physics.closures import GRAVITY
+from orchestrator.physics.constants import GRAVITY
 
 FloatArray = NDArray[np.float64]
 Formula = Callable[[FloatArray], FloatArray]

@@ -31,5 +31,5 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
     """
     slow, fast = LAWS["low"].covers(low.reynolds), LAWS["high"].covers(high.reynolds)
     if np.any(slow & fast):
-        raise ArithmeticError("both closures are valid for one grain")
+        raise ArithmeticError("both force laws hold for one grain")
     return np.where(slow, "low", np.where(fast, "high", "transition"))

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from orchestrator.grains import deck
 from orchestrator.grains.loading import ForceTable, Loading
-from orchestrator.physics import closures
-from orchestrator.physics.closures import Closure
 from orchestrator.runs import assets
+from tests.physics import closures
+from tests.physics.closures import Closure
 
 WHERE = {"diameter": 1e-3, "roughness": 1e-4, "fluid_density": 1.0, "viscosity": 1e-5}
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))

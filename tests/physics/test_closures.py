@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.physics import closures
-from orchestrator.physics.closures import Closure
+from tests.physics import closures
+from tests.physics.closures import Closure
 
 AIR = {"density": 2500.0, "fluid_density": 1.0}
 # Root of the moment balance (third of Eqs. 1) with the forces as first printed (Eq. 2; Eq. 4 with

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
-from orchestrator.physics import closures
 from orchestrator.physics.exposure import Exposure
 from orchestrator.physics.laws import LAWS, law
 from orchestrator.physics.near_bed import bridge
+from tests.physics import closures
 
 NAMES = (
     "low",

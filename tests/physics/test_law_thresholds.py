@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from orchestrator.physics import closures, curves
+from orchestrator.physics import curves
 from orchestrator.physics.exposure import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.regime import LAWS_OF, regime
@@ -20,6 +20,7 @@ from orchestrator.physics.threshold import (
     threshold,
     weight,
 )
+from tests.physics import closures
 
 few = settings(max_examples=30, deadline=None)
 every_law = pytest.mark.parametrize("name", LAWS)

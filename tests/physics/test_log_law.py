@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from orchestrator.physics import closures
 from orchestrator.physics.log_law import depth_mean_speed, log_law_speed, log_law_ustar
+from tests.physics import closures
 
 speeds = st.floats(1e-3, 50)
 roughness = st.floats(1e-6, 1e-2)

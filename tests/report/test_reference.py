@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics import closures, curves
+from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import reference, theory
 from orchestrator.report.results import Results
+from tests.physics import closures
 
 
 def test_band_holds_every_curve_within_its_range() -> None:

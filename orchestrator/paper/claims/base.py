@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from orchestrator.physics.closures import Closure
 from orchestrator.report.results import by_dem, split
 from orchestrator.study import fields
 from orchestrator.tables import Tables
@@ -23,7 +22,7 @@ BY_SHARE = (
 )
 WAITING_TIME = 5.0
 """Least waiting time of what is a load step rather than a ramp, sqrt(d/g')."""
-NAMES: dict[Closure, str] = {"low": "low regime", "high": "high regime"}
+NAMES: dict[str, str] = {"low": "low regime", "high": "high regime"}
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that are answers by whatever method; the others show what DEM alone measures."""
 BESIDE = ("fraction", "flow_level", "grain_level")

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from orchestrator.paper.claims.base import NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.physics import curves
-from orchestrator.physics.closures import CLOSURES, Closure
 from orchestrator.report import labels, reference
 from orchestrator.report.results import split
 
@@ -58,7 +57,7 @@ def _families(evidence: Evidence, flat: pd.DataFrame) -> dict[str, Lines]:
 def _distances(flat: pd.DataFrame, lines: Lines) -> pd.DataFrame:
     """Mean factor, its sign and the range of Re* of each series, by regime."""
     rows = []
-    for law_name in CLOSURES:
+    for law_name in NAMES:
         part = flat[flat["force_law"] == law_name]
         series = [own for _, own in split(part, "beta_deg", "z0_over_d") if len(own) > 1]
         grid = _common(series)
@@ -99,7 +98,7 @@ def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
     measured = []
     verdicts: list[Verdict] = []
     for family, table in tables.items():
-        for law_name in CLOSURES:
+        for law_name in NAMES:
             own = table[table["force_law"] == law_name]
             if len(own):
                 measured.append(_said(family, law_name, own))
@@ -114,7 +113,7 @@ def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
         "in each regime, against the mean of the logarithms of the water curves that cover an Re*: "
         "reproduced if the best of the study’s β and z₀ is one of those named and within a factor "
         f"{GOOD:g} in the mean; not if neither; partly if one, or if the regimes differ",
-        combined(verdicts) if len(verdicts) == len(CLOSURES) else "no data",
+        combined(verdicts) if len(verdicts) == len(NAMES) else "no data",
         "Eq. 3 tends to a constant for Re* → 0, where the curves of water go on rising: no β fits "
         "both ends. And the grains are in air, the curves of water; against those of air, listed "
         "for comparison, the high regime lies far above (their thresholds are lower in Shields’ "
@@ -134,7 +133,7 @@ def _is_named(ratio: float) -> bool:
     return abs(ratio / Z0_OVER_D - 1) < 1e-3
 
 
-def _said(family: str, law_name: Closure, own: pd.DataFrame) -> str:
+def _said(family: str, law_name: str, own: pd.DataFrame) -> str:
     best = own.iloc[0]
     named = own[own["beta_deg"].between(*BETA) & own["z0_over_d"].map(_is_named)]
     rest = [_fit(row) for at, row in named.sort_values("beta_deg").iterrows() if at != best.name]

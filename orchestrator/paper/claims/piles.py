@@ -19,7 +19,9 @@ from orchestrator.paper.claims.base import (
     pairs,
     up,
 )
-from orchestrator.physics import closures
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import threshold
 from orchestrator.report.results import split
 
 FloatArray = NDArray[np.float64]
@@ -74,18 +76,15 @@ def above_single(evidence: Evidence) -> Claim:
 
 def _one_grain(table: pd.DataFrame) -> pd.Series:
     found = pd.Series(np.nan, index=table.index)
-    for law_name in closures.CLOSURES:
-        own = table[table["force_law"] == law_name]
-        exact = closures.threshold(
-            law_name,
-            diameter=own["d_m"],
+    for law_name, own in table.groupby("force_law"):
+        z0 = own["z0_over_d"] * own["d_m"]
+        grains = Exposure(own["d_m"], z0, own["rho_f_kg_m3"], own["nu_m2_s"], own["alpha_s"])
+        exact = threshold(
+            LAWS[str(law_name)],
+            grains,
             density=own["rho_sol_kg_m3"],
-            fluid_density=own["rho_f_kg_m3"],
-            viscosity=own["nu_m2_s"],
             slope_deg=own["alpha_deg"],
             entrainment_angle_deg=own["beta_deg"],
-            roughness=own["z0_over_d"] * own["d_m"],
-            lift_coefficient=own["alpha_s"],
             gravity=own["g_m_s2"],
         )
         found[own.index] = exact.shields

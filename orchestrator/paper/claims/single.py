@@ -16,7 +16,8 @@ from orchestrator.paper.claims.base import (
     pairs,
     up,
 )
-from orchestrator.physics import closures
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.laws import LAWS
 from orchestrator.report.results import split
 
 NEARLY = 0.05
@@ -25,16 +26,20 @@ SMALL_RE = 0.3
 """Re* up to which tau must be constant for a claim to be partly right: a tenth of the range."""
 
 
+LOW_BELOW = LAWS["low"].reynolds[1]
+"""Re* below which Eqs. 2 and 3 hold."""
+
+
 def constant(evidence: Evidence) -> Claim:
     """Tau at small Re*."""
     grains = evidence.held[evidence.held["shields_dem"].notna()]
     flat = grains[(grains["force_law"] == "low") & (grains["alpha_deg"] == 0)]
     series = [own for _, own in split(flat, "beta_deg", "z0_over_d") if len(own) > 1]
-    falls = [_fall(own, closures.LOW_BELOW) for own in series]
+    falls = [_fall(own, LOW_BELOW) for own in series]
     ends = [_constant_to(own) for own in series]
     verdict: Verdict = "no data"
     if series:
-        whole, part = min(ends) >= closures.LOW_BELOW, min(ends) >= SMALL_RE
+        whole, part = min(ends) >= LOW_BELOW, min(ends) >= SMALL_RE
         verdict = "reproduced" if whole else "partly" if part else "not"
     return Claim(
         "τ is nearly constant for Re* < 3, for lift is negligible there",
@@ -52,9 +57,8 @@ def constant(evidence: Evidence) -> Claim:
 def _lift_part(own: pd.DataFrame) -> float:
     """Moment of lift over that of drag at Re* = 1 in Eq. 3."""
     one = own.iloc[0]
-    unit = {"diameter": 1.0, "roughness": one["z0_over_d"], "fluid_density": 1.0, "viscosity": 1.0}
-    drag = closures.drag("low", **unit)(1.0)
-    lift = closures.lift("low", **unit, lift_coefficient=one["alpha_s"])(1.0)
+    unit, low = Exposure(1.0, one["z0_over_d"], 1.0, 1.0, one["alpha_s"]), LAWS["low"]
+    drag, lift = low.drag(1.0, unit), low.lift(1.0, unit)
     return float(lift / drag / np.tan(np.radians(one["beta_deg"])))
 
 

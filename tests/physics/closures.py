@@ -1,7 +1,7 @@
 """Drag, lift and threshold of one exposed grain: Eqs. 1-5 and 10 of the paper, vectorised.
 
-Every force is a sum of powers of the friction velocity, ``sum_k c_k ustar**p_k``. The decks use
-the same coefficients, so that a grain in a solver feels what the closed form says.
+Every force is a sum of powers of the friction velocity, ``sum_k c_k ustar**p_k``: another way to
+write Eqs. 2 to 5 than that of the package, which the tests hold the package to.
 
 Arguments are arrays or numbers in SI units that broadcast together; angles are in degrees. The
 roughness length z0 stands for the gap delta under the grain as well (delta = z0).
