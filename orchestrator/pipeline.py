@@ -16,7 +16,7 @@ from orchestrator.runs.claim import STUDY, told
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
 from orchestrator.runs.progress import Display
-from orchestrator.runs.workspace import DRAWN, STATE, Workspace
+from orchestrator.runs.workspace import MARKERS, STATE, Workspace
 from orchestrator.study.study import Study, parse
 
 
@@ -202,13 +202,13 @@ def draw(
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-    with space.folder.renewed(*DRAWN):
+    with space.folder.renewed(but=MARKERS):
         tables.write(results, space.folder, "tables")
         tables.write({"timings": times}, space.folder, "timings")
         report.write(study, planned, results, times, causes, space.folder, guests)
     if not failures:
-        drawn = {"of": _origin(study, planned), "sha256": space.folder.written()}
-        space.folder.note(STATE, text_of(drawn))
+        drawn = {"of": _origin(study, planned), "sha256": space.folder.written(MARKERS)}
+        space.folder.put(STATE, text_of(drawn))
 
 
 def _origin(study: Study, planned: Plan) -> str:
@@ -218,5 +218,5 @@ def _origin(study: Study, planned: Plan) -> str:
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:
-    drawn = {"of": _origin(study, planned), "sha256": space.folder.written()}
-    return read_json(space.drawn) == drawn and space.folder.is_whole()
+    drawn = {"of": _origin(study, planned), "sha256": space.folder.written(MARKERS)}
+    return read_json(space.drawn) == drawn and space.folder.is_whole(MARKERS)

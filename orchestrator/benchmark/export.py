@@ -56,7 +56,9 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         )
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))
-    return pack.write(root, problems, (asked.name, asked.text), case.programs(space.cases))
+    return pack.write(
+        root, problems, (asked.name, asked.text), case.programs(space.cases, planned.cases)
+    )
 
 
 def _formulas(root: Path, levels: Sequence[int]) -> int:
@@ -121,10 +123,10 @@ class Finished:
             raise InputError(
                 "the study is not finished", where=str(space.root), remedy="run it to its end"
             )
-        self.tables = tables.read(space.tables)
+        self.tables = tables.read(space.folder, "tables")
         told = self.tables["scenes"]
         self._check_cases(set(told["case"]) | set(told["flow_case"].dropna()), space.root)
-        times = pd.read_csv(space.root / "timings" / "timings.csv")
+        times = tables.read(space.folder, "timings")["timings"]
         self.seconds: dict[str, float] = dict(zip(times["case"], times["solver_s"], strict=True))
 
     def _check_cases(self, told: set[str], root: Path) -> None:

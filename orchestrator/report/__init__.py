@@ -50,6 +50,7 @@ def write(
         from orchestrator.report.results import Results
 
         results = Results(study, plan, tables, folder.root / "cases")
+        folder.make(FIGURES)
         figures = gallery.draw(results, folder)
     names = [figure.name for figure, _ in figures]
     added = [one for one in (guest(study, tables, names) for guest in guests) if one]

@@ -1,6 +1,7 @@
 """A case directory: who it is, what it holds, how far it came. It knows nothing of any solver."""
 
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from fnmatch import fnmatchcase
@@ -23,6 +24,8 @@ from orchestrator.runs.files import (
 )
 from orchestrator.runs.folder import TEMPORARY, Folder
 
+NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
+"""Of a case's directory."""
 IDENTITY = "case.json"
 DONE = "done.json"
 FAILED = "failed.json"
@@ -169,7 +172,7 @@ def failure(directory: Path) -> str | None:
     The word for its end comes first where it says more than that it failed.
     """
     path = directory / FAILED
-    if not path.is_file():
+    if not os.path.isfile(path):  # nor where it cannot be seen
         return None
     state = read_json(path)
     if not isinstance(state, dict):
@@ -243,11 +246,19 @@ def is_whole(case: Case, cases: Path) -> bool:
     return all((cases / case.name / name).is_file() for name in pruned)
 
 
-def programs(cases: Path) -> dict[str, str]:
-    """The programs, with versions, that the cases in a directory were made with."""
+def names_in(cases: Path) -> list[str]:
+    """Names of the directories of cases that are there, whoever asked for them."""
+    try:
+        return sorted(name for name in os.listdir(cases) if NAME.fullmatch(name))
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
+    """The programs, with versions, that some of the cases in a directory were made with."""
     found: dict[str, str] = {}
-    for path in sorted(cases.glob(f"*/{IDENTITY}")):
-        identity = read_json(path)
+    for name in sorted(names):
+        identity = read_json(cases / name / IDENTITY)
         found.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
     return found
 

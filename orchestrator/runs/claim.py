@@ -39,7 +39,7 @@ class Kind:
 
 
 _CASE = f"cases/*-{'[0-9a-f]' * 12}"
-_OF_A_STUDY = ("cases", "tables", "timings", "figures", "report.html", "report.json", "claims.csv")
+_OF_A_STUDY = ("cases", "tables", "timings", "figures", "report.html", "report.json")
 STUDY = Kind("study", "study.json", _OF_A_STUDY, (_CASE,), (f"{_CASE}/case.json",))
 EXPERIMENT = replace(STUDY, word="experiment")
 _PAGE = ("figures", "comparison.html", "comparison.csv", "verdicts.csv")
@@ -91,7 +91,7 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(LOCK, RECORD, kind.marker, *kind.names)
         if told(root, kind) is None:
-            folder.note(kind.marker, text_of({"kind": kind.word, "name": name}))
+            folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
         yield folder
 
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError, OrchestratorError, unknown_key
-from orchestrator.runs import assets, engine, process
-from orchestrator.runs.case import Case, done_state
+from orchestrator.runs import assets, engine, lock, process
+from orchestrator.runs.case import Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 
 SYSTEMS = {
@@ -108,8 +108,8 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
             places=AHEAD * jobs * cores,
             lost=(distributed.KilledWorker,),
         )
-    for lock in cases.glob(".*.lock"):
-        lock.unlink()
+    for name in names_in(cases):
+        (cases / f".{name}.lock").unlink(missing_ok=True)
 
 
 def execute_alone(case: Case, cases: Path, limit_s: float) -> float:
@@ -118,10 +118,10 @@ def execute_alone(case: Case, cases: Path, limit_s: float) -> float:
     A worker that was given up as lost may still be at work on it, and so may be one of an earlier
     study's: until that has ended, this one waits.
     """
-    with (cases / f".{case.name}.lock").open("w") as lock:
+    with lock.open_file(cases / f".{case.name}.lock") as stream:
         # a file system without locks leaves it to the queue to end what it cancelled
         with contextlib.suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            fcntl.flock(stream, fcntl.LOCK_EX)
         state = done_state(case, cases)
         return float(state["wall_s"]) if state else engine.execute(case, cases, limit_s)
 

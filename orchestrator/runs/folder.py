@@ -10,11 +10,11 @@ import itertools
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
-from orchestrator.errors import InputError, of_system
-from orchestrator.runs.files import digest_file, write_durably
+from orchestrator.errors import InputError, OrchestratorError, of_system
+from orchestrator.runs.files import digest_file, opened, write_durably
 
 RECORD = "written.sha256"
 """Digests of the files that were put, as `sha256sum` reads them. A line is added before its file
@@ -23,6 +23,8 @@ KEPT = "kept"
 """Where things are moved that stand in the way and that this program did not write."""
 TEMPORARY = re.compile(r"^\.(.+)\.\d+\.tmp$")
 """What a killed process was about to write, and the name that it was for."""
+
+LINE = re.compile(rb"([0-9a-f]{64})  (.+)")
 
 Ours = Callable[[str], bool]
 """Whether a file is this program's, from its name."""
@@ -53,18 +55,24 @@ class Folder:
         self._write(name, data, self._is_put)
 
     def note(self, name: str, content: str | bytes) -> None:
-        """Write a file whose name is ours whatever it holds: a marker, a state."""
+        """Write a file whose name is ours whatever it holds; it is not among those put."""
         self._write(name, content, lambda _: True)
 
+    def make(self, name: str) -> None:
+        """Make a sub-directory, if it is not there; before processes put files into it at once."""
+        with self._told(name):
+            self._reach(name)
+            self._make(name)
+
     def drop(self, name: str) -> None:
-        """Remove a file whose name is ours, if it is there."""
+        """Remove a file; one that was not put, or has changed since, is kept aside."""
         with self._told(name):
             path = self.path(name)
-            self._make_way(name, lambda _: True)
+            self._make_way(name, self._is_put)
             path.unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Ours | None = None) -> Path:
-        """Remove a sub-directory; what is not ours in it is kept aside as it lies.
+        """Make way for a sub-directory; what is not ours in it is kept aside as it lies.
 
         Parameters
         ----------
@@ -77,11 +85,11 @@ class Folder:
         Returns
         -------
         Path
-            Where it was: nothing is there now.
+            Where it goes: nothing is there now, in a directory that is.
         """
         is_ours = is_ours or (lambda inner: self._is_put(f"{name}/{inner}"))
         with self._told(name):
-            path = self.path(name)
+            path = self._reach(name)
             _sweep(path, is_ours)
             if os.path.lexists(path):
                 self._keep(name)
@@ -93,31 +101,50 @@ class Folder:
         self._add((digest_file(path), path.relative_to(self.root).as_posix()) for path in found)
 
     @contextlib.contextmanager
-    def renewed(self, *places: str) -> Iterator[None]:
-        """Put all files of some names or sub-directories anew; those that were not are removed.
+    def renewed(self, *places: str, but: Sequence[str] = ()) -> Iterator[None]:
+        """Put all files anew within the block, but some; those that were not are removed.
 
+        Where places are named, it is about files of these names and in these sub-directories.
         A file that has changed since it was put stays. If the block ends with an exception,
         nothing is removed.
         """
-        self.note(RECORD, _text(self._lines()))
+        self._record(self._lines())
         before = self._lines()
         yield
         new = self._lines()[len(before) :]
         names = {name for _, name in new}
-        old = {line for line in before if PurePosixPath(line[1]).parts[0] in places}
+        old = {line for line in before if _is_among(line[1], places, but)}
         for digest, name in old:
             if name not in names and self._digest(name) == digest:
                 self.drop(name)
         kept = [line for line in before if line not in old]
-        self.note(RECORD, _text([*kept, *new]))
+        self._record([*kept, *new])
 
-    def written(self) -> dict[str, str]:
-        """Digests of the files that were put, by name; of each the last one."""
-        return {name: digest for digest, name in self._lines()}
+    def read(self, name: str) -> bytes:
+        """Read a file that was put.
 
-    def is_whole(self) -> bool:
-        """Whether every file that was put is there and unchanged."""
-        return all(self._digest(name) == digest for name, digest in self.written().items())
+        Raises
+        ------
+        OrchestratorError
+            If it is not there as it was put.
+        """
+        with self._told(name), opened(self.path(name)) as stream:
+            data = stream.read()
+        if hashlib.sha256(data).hexdigest() != self.written().get(name):
+            raise OrchestratorError(
+                "it is not as it was written",
+                where=str(self.root / name),
+                remedy="`orchestrator report` writes it again",
+            )
+        return data
+
+    def written(self, but: Sequence[str] = ()) -> dict[str, str]:
+        """Digests of all files that were put, but some, by name."""
+        return {name: digest for digest, name in self._lines() if name not in but}
+
+    def is_whole(self, but: Sequence[str] = ()) -> bool:
+        """Whether all files that were put, but some, are unchanged."""
+        return all(self._digest(name) == digest for name, digest in self.written(but).items())
 
     def refuse_links(self, names: Iterable[str]) -> None:
         """See that no link is on the way to any of some names, nor at its end."""
@@ -151,17 +178,26 @@ class Folder:
             for path in (self.root / folder).glob(".*.tmp"):
                 target = TEMPORARY.fullmatch(path.name)
                 if target and folder / target[1] in known and _is_file(path):
-                    self.drop((folder / path.name).as_posix())
+                    path.unlink()
 
     def _write(self, name: str, content: str | bytes, is_ours: Ours) -> None:
         with self._told(name):
-            path = self.path(name)
-            for folder in reversed(PurePosixPath(name).parents[:-1]):
-                if not self.path(str(folder)).is_dir():
-                    self._make_way(str(folder), lambda _: False)
-                    (self.root / folder).mkdir(exist_ok=True)
+            path = self._reach(name)
             self._make_way(name, is_ours)
             write_durably(path, content)
+
+    def _reach(self, name: str) -> Path:
+        """The path of a name, in a directory that is there."""
+        path = self.path(name)
+        for folder in reversed(PurePosixPath(name).parents[:-1]):
+            self._make(str(folder))
+        return path
+
+    def _make(self, name: str) -> None:
+        path = self.root / name
+        if os.path.lexists(path) and not path.is_dir():
+            self._keep(name)
+        path.mkdir(exist_ok=True)
 
     def _make_way(self, name: str, is_ours: Ours) -> None:
         """Move what stands in a place aside, unless it is a file of ours or an empty directory."""
@@ -201,7 +237,7 @@ class Folder:
         """Add to the record as one step: processes may do so side by side."""
         with self._told(RECORD):
             path = self.path(RECORD)
-            if not _is_file(path):
+            if not _is_record(path):
                 self._make_way(RECORD, lambda _: False)
             elif path.stat().st_nlink > 1:  # what is added must not reach its other name
                 write_durably(path, path.read_bytes())
@@ -210,10 +246,11 @@ class Folder:
 
     def _lines(self) -> list[Line]:
         """What the record says, as far as it can be read."""
-        path = self.path(RECORD)
-        text = path.read_bytes() if _is_file(path) else b""
-        found = (re.fullmatch(rb"([0-9a-f]{64})  (.+)", line) for line in text.split(b"\n"))
+        found = map(LINE.fullmatch, _content(self.path(RECORD)))
         return [(line[1].decode(), os.fsdecode(line[2])) for line in found if line]
+
+    def _record(self, lines: Iterable[Line]) -> None:
+        self._write(RECORD, _text(lines), lambda _: _is_record(self.root / RECORD))
 
     @contextlib.contextmanager
     def _told(self, name: str) -> Iterator[None]:
@@ -228,6 +265,19 @@ def _text(lines: Iterable[Line]) -> bytes:
     """Lines of the record, each once; a name that is no line has none."""
     listed = (f"{digest}  {name}" for digest, name in lines if "\n" not in name)
     return b"".join(os.fsencode(line) + b"\n" for line in dict.fromkeys(listed))
+
+
+def _content(record: Path) -> list[bytes]:
+    return record.read_bytes().split(b"\n") if _is_file(record) else []
+
+
+def _is_record(path: Path) -> bool:
+    """Whether a file holds lines of a record and nothing else."""
+    return _is_file(path) and all(not line or LINE.fullmatch(line) for line in _content(path))
+
+
+def _is_among(name: str, places: Sequence[str], but: Sequence[str]) -> bool:
+    return name not in but and (not places or PurePosixPath(name).parts[0] in places)
 
 
 def _places(name: str) -> Iterator[str]:

@@ -91,7 +91,7 @@ def held(path: Path) -> Iterator[None]:
         If another process holds it.
     """
     with contextlib.ExitStack() as stack:
-        stream = stack.enter_context(_open(path))
+        stream = stack.enter_context(open_file(path))
         stack.enter_context(_by_system(stream) if _lock(stream, path) else _by_note(path))
         yield
 
@@ -110,9 +110,20 @@ def holder(path: Path) -> Holder | None:
     return None
 
 
-def _open(path: Path) -> IO[str]:
-    """Open the file itself: no link to one, nor a pipe, which would wait for a reader."""
-    remove_empty_directory(path)
+def open_file(path: Path) -> IO[str]:
+    """Open a lock file itself: no link to one, nor a pipe, which would wait for a reader.
+
+    Raises
+    ------
+    InputError
+        If it is no file.
+    OSError
+        If it is a link, or cannot be opened.
+    """
+    with contextlib.suppress(OSError):
+        remove_empty_directory(path)
+    if path.is_dir():
+        raise InputError("the lock is not a file", where=str(path), remedy="remove it")
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)

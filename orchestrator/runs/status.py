@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.runs.case import DONE, failure, size
+from orchestrator.runs.case import DONE, failure, names_in, size
 from orchestrator.runs.files import read_json, size_of
 from orchestrator.runs.workspace import Workspace
 
@@ -84,7 +84,7 @@ Markers = dict[str, dict[str, Any]]
 
 
 def _markers(space: Workspace) -> Markers:
-    states = ((name, read_json(space.cases / name / DONE)) for name in space.case_names())
+    states = ((name, read_json(space.cases / name / DONE)) for name in names_in(space.cases))
     return {name: state if isinstance(state, dict) else {} for name, state in states}
 
 

@@ -1,7 +1,5 @@
 """A study's directory on disk: what it is called inside, which study it is."""
 
-import os
-import re
 from collections.abc import Container
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -11,15 +9,15 @@ from typing import Any
 from orchestrator import __version__
 from orchestrator.errors import InputError, of_system
 from orchestrator.runs import lock
-from orchestrator.runs.claim import LOCK, STUDY, Kind, claimed
-from orchestrator.runs.files import read_json, text_of
+from orchestrator.runs.case import names_in
+from orchestrator.runs.claim import LOCK, STUDY, Kind, claimed, told
+from orchestrator.runs.files import opened, read_json, text_of
 from orchestrator.runs.folder import Folder
 
-DRAWN = ("tables", "timings", "figures", "report.html", "claims.csv")
-"""What is drawn anew together."""
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
-CASE_NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
+MARKERS = (STUDY.marker, STATE)
+"""What is not drawn anew with tables, figures and page."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,10 @@ class Workspace:
 
         `about` is kept with it.
         """
-        told = {"orchestrator": __version__, "kind": kind.word, "name": name, **about}
-        self.folder.note(kind.marker, text_of({**told, "cases": cases}))
+        whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
+        value = {**whose, **about, "cases": cases}
+        if told(self.root, kind) != value:
+            self.folder.put(kind.marker, text_of(value))
 
     def description(self) -> dict[str, Any]:
         """What `describe` wrote.
@@ -85,15 +85,7 @@ class Workspace:
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """The cases that are there without being asked for: an earlier study file did."""
-        return tuple(name for name in self.case_names() if name not in asked)
-
-    def case_names(self) -> list[str]:
-        """Names of the directories of cases that are there, whoever asked for them."""
-        try:
-            with os.scandir(self.cases) as entries:
-                return sorted(one.name for one in entries if CASE_NAME.fullmatch(one.name))
-        except (FileNotFoundError, NotADirectoryError):
-            return []
+        return tuple(name for name in names_in(self.cases) if name not in asked)
 
     def is_held(self) -> bool:
         """Whether a running process holds the study."""
@@ -103,7 +95,7 @@ class Workspace:
 def _check_readable(path: Path) -> None:
     """See that a file that is there may be read: else it would count as none."""
     try:
-        path.open("rb").close()
+        opened(path).close()
     except PermissionError as error:
         raise of_system(error) from None
     except OSError:

@@ -5,7 +5,9 @@ wherever and whenever it runs. What the runs took is in `timings`.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
-from pathlib import Path
+from fnmatch import fnmatchcase
+from io import BytesIO
+from pathlib import Path, PurePath
 from typing import Any
 
 import pandas as pd
@@ -85,17 +87,17 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
     folder.put(f"{place}/columns.csv", pd.DataFrame(rows).to_csv(index=False))
 
 
-def read(folder: Path) -> Tables:
-    """Read the tables that `write` wrote.
+def read(folder: Folder, place: str) -> Tables:
+    """Read the tables that `write` wrote, and no others.
 
     Raises
     ------
     OrchestratorError
-        If there are none.
+        If there are none, or one has changed since.
     """
-    tables = {path.stem: pd.read_parquet(path) for path in sorted(folder.glob("*.parquet"))}
-    if not tables:
+    names = [name for name in folder.written() if fnmatchcase(name, f"{place}/*.parquet")]
+    if not names:
         raise OrchestratorError(
-            "there are no tables", where=str(folder), remedy="run the study first"
+            "there are no tables", where=str(folder.root / place), remedy="run the study first"
         )
-    return tables
+    return {PurePath(name).stem: pd.read_parquet(BytesIO(folder.read(name))) for name in names}

@@ -49,7 +49,6 @@ OF_A_STUDY = (
     "report.json",
     "report.html",
     "written.sha256",
-    "claims.csv",
     "figures/closed-form-horizontal.png",
     "timings/timings.csv",
     "tables/scenes.csv",

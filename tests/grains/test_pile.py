@@ -105,7 +105,7 @@ def test_every_column_has_a_meaning_and_survives_its_files(
     listed = pd.read_csv(tmp_path / "made" / "columns.csv").set_index("column")
     assert {str(c) for table in made.values() for c in table} == set(listed.index)
     assert listed["meaning"].str.len().min() >= 3
-    for name, table in tables.read(tmp_path / "made").items():
+    for name, table in tables.read(Folder(tmp_path), "made").items():
         pd.testing.assert_frame_equal(table, made[name], check_dtype=False)
 
 

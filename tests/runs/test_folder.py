@@ -114,7 +114,7 @@ def test_files_that_are_not_put_anew_are_removed_if_they_are_ours(folder: Folder
 
 def test_nothing_is_removed_where_drawing_failed(folder: Folder) -> None:
     folder.put("tables/a.csv", "one")
-    with pytest.raises(ValueError, match="for this test"), folder.renewed("tables"):
+    with pytest.raises(ValueError, match="for this test"), folder.renewed():
         raise ValueError("for this test")
     assert folder.is_whole()
 

@@ -10,7 +10,6 @@ from orchestrator.fidelity.levels import FLOW, GRAINS, LEVELS
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
-from orchestrator.runs.case import programs
 from orchestrator.runs.workspace import Workspace
 
 CAPTION = (
@@ -19,7 +18,7 @@ CAPTION = (
 )
 
 
-def write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
+def write(tables: Mapping[str, pd.DataFrame], space: Workspace, solvers: Mapping[str, str]) -> None:
     """Write the page from the tables ``points``, ``levels`` and ``naive``."""
     sections = [
         _accuracy(tables["points"]),
@@ -27,7 +26,7 @@ def write(tables: Mapping[str, pd.DataFrame], space: Workspace) -> None:
         _known(tables["levels"]),
     ]
     title = "Speed against accuracy"
-    experiment.write(title, sections, space.folder, space.page.name, programs(space.cases))
+    experiment.write(title, sections, space.folder, space.page.name, solvers)
 
 
 def _accuracy(points: pd.DataFrame) -> Section:

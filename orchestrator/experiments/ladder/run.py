@@ -14,8 +14,9 @@ from orchestrator.fidelity.decision import Decision
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import settings
+from orchestrator.runs.case import programs
 from orchestrator.runs.claim import EXPERIMENT
-from orchestrator.runs.workspace import DRAWN, Workspace
+from orchestrator.runs.workspace import MARKERS, Workspace
 from orchestrator.study.study import Study
 
 Decisions = Mapping[str, Decision]
@@ -43,11 +44,11 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         todo = pipeline.missing(planned, space)
         failures = pipeline.complete(todo, space, workers=workers, limit_s=study.time_limit_s)
         made = _tables(asked, routes, planned, space.cases)
-        with settings.own(), folder.renewed(*DRAWN):
+        with settings.own(), folder.renewed(but=MARKERS):
             from orchestrator.experiments.ladder import page
 
             tables.write(made, folder)
-            page.write(made, space)
+            page.write(made, space, programs(space.cases, planned.cases))
     return Finished(space.page, len(todo), failures)
 
 

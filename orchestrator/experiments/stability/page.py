@@ -1,13 +1,12 @@
 """The page of the maps: the sheet of all, then each by itself."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from orchestrator.experiments.stability import figures
 from orchestrator.experiments.stability.verdicts import WRONG, Judged
 from orchestrator.report import experiment
 from orchestrator.report.experiment import Section
 from orchestrator.report.figure import Figure
-from orchestrator.runs.case import programs
 from orchestrator.runs.workspace import Workspace
 
 TITLE = "Where each method fails"
@@ -18,11 +17,11 @@ ALL = (
 )
 
 
-def write(judged: Sequence[Judged], space: Workspace) -> None:
+def write(judged: Sequence[Judged], space: Workspace, solvers: Mapping[str, str]) -> None:
     """Write the page."""
     sheet = Figure("maps", TITLE, "", (), figures.sheet(judged))
     sections = [Section("All maps", ALL, (sheet,)), *map(_section, judged)]
-    experiment.write(TITLE, sections, space.folder, space.page.name, programs(space.cases))
+    experiment.write(TITLE, sections, space.folder, space.page.name, solvers)
 
 
 def _section(judged: Judged) -> Section:

@@ -12,8 +12,9 @@ from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import settings
 from orchestrator.runs import case
+from orchestrator.runs.case import programs
 from orchestrator.runs.claim import EXPERIMENT
-from orchestrator.runs.workspace import DRAWN, Workspace
+from orchestrator.runs.workspace import MARKERS, Workspace
 from orchestrator.study.study import TIME_LIMIT_S
 
 
@@ -38,11 +39,11 @@ def run(out: Path, *, workers: int) -> Finished:
         answers = verdicts.Answers(planned, space.cases, planned.done(space.cases))
         judged = [verdicts.judge(one, answers) for one in drawn]
         found = pd.concat([one.table for one in judged], ignore_index=True)
-        with settings.own(), folder.renewed(*DRAWN):
+        with settings.own(), folder.renewed(but=MARKERS):
             from orchestrator.experiments.stability import page
 
             tables.write({"maps": found}, folder)
-            page.write(judged, space)
+            page.write(judged, space, programs(space.cases, planned.cases))
     return Finished(space.page, len(todo), {})
 
 
