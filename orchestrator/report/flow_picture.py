@@ -29,16 +29,16 @@ def draw(results: Results) -> Iterator[Figure]:
     if not piles:
         return
     names = tuple(pile.flow.name for pile in piles)
-    canvas = _frame(piles, results.cases)
+    canvas = _frame(results, piles)
     yield Figure("flow", "Flow over the pile", captions.flow(piles), names, canvas)
 
 
 def chosen(results: Results) -> list[Pile]:
     """A pile for each panel; a flow whose files were pruned has none."""
-    found: dict[tuple[float, float], Pile] = {}
+    found: dict[stress.Kind, Pile] = {}
     for pile in stress.choose(results):
         if is_whole(pile.flow, results.cases):
-            found.setdefault((pile.bed.slope_deg, pile.bed.height), pile)
+            found.setdefault(stress.kind(results, pile), pile)
     return list(found.values())
 
 
@@ -57,12 +57,14 @@ def sampled(pile: Pile, cases: Path, window: Window, unit: float) -> FloatArray:
     return found / pile.scene.flow.speed
 
 
-def _frame(piles: list[Pile], cases: Path) -> Canvas:
+def _frame(results: Results, piles: list[Pile]) -> Canvas:
     window = _window(piles)
     figure = style.canvas(1.5 * len(piles) + 0.8)
     axes = list(figure.subplots(len(piles), 1, sharex=True, squeeze=False)[:, 0])
     for ax, pile in zip(axes, piles, strict=True):
-        image = _panel(ax, pile, window, sampled(pile, cases, window, pile.bed.height))
+        velocity = sampled(pile, results.cases, window, pile.bed.height)
+        image = _panel(ax, pile, window, velocity)
+        ax.set_title(stress.title(results, pile), loc="left")
     axes[-1].set_xlabel("$x/h$ from the windward toe")
     bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
     bar.set_label(r"speed over that at the lid, $|\mathbf{u}|/U_e$")
@@ -78,7 +80,6 @@ def _panel(ax: Axes, pile: Pile, window: Window, velocity: FloatArray) -> AxesIm
     x = [window[0], 0, half, 2 * half, window[1]]
     ax.plot(x, [0, 0, 1, 0, 0], color="0.2", lw=0.8, gid="bed")
     ax.set(ylabel="$z/h$", aspect="equal", xlim=window[:2], ylim=window[2:], yticks=[0, 1, 2, 3])
-    ax.set_title(stress.title(pile), loc="left")
     return image
 
 

@@ -29,7 +29,7 @@ def draw(results: Results) -> Iterator[Figure]:
     """One figure: of the study's least slope, whose mesh stands for all."""
     for pile in flow_picture.chosen(results)[:1]:
         edges = read_edges(results.cases / pile.flow.name) / pile.bed.height
-        canvas = _frame(pile, edges)
+        canvas = _frame(pile, edges, stress.title(results, pile))
         yield Figure("mesh", "Mesh of the flow", captions.mesh(pile), (pile.flow.name,), canvas)
 
 
@@ -44,7 +44,7 @@ def read_edges(case: Path) -> FloatArray:
     return np.asarray(mesh.points[seen][:, :, [0, 2]])
 
 
-def _frame(pile: Pile, edges: FloatArray) -> Canvas:
+def _frame(pile: Pile, edges: FloatArray, title: str) -> Canvas:
     half = 1 / float(np.tan(np.radians(pile.bed.slope_deg)))
     left, right, bottom, top = CREST
     windows = [
@@ -60,7 +60,7 @@ def _frame(pile: Pile, edges: FloatArray) -> Canvas:
     left, right, bottom, top = windows[1]
     box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
     axes[0].add_patch(box)
-    axes[0].set_title(stress.title(pile), loc="left")
+    axes[0].set_title(title, loc="left")
     axes[1].set_title("the crest", loc="left")
     axes[1].set_xlabel("$x/h$ from the windward toe")
     return figure

@@ -59,6 +59,11 @@ class Results:
         """The pile that shows how a scene's grains move: where DEM only checked it, the check."""
         return self.plan.checks.get(scene_id, self.plan.piles[scene_id])
 
+    def asked(self, pile: Pile) -> pd.Series:
+        """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""
+        found = next(asked for asked, one in self.plan.piles.items() if one is pile)
+        return self.scenes[self.scenes["scene_id"] == found].iloc[0]
+
     def has_files(self, pile: Pile) -> bool:
         """Whether a pile was run, and it and its flow still have the files of pictures."""
         return pile.method.cases != () and all(is_whole(one, self.cases) for one in pile.runs)

@@ -17,6 +17,7 @@ from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.report.style import Look
+from orchestrator.study import fields
 
 FloatArray = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ GRAINS: Look = {"color": "#f0a35e", "lw": 3.0}
 REVERSED: Look = {"color": "0.85", "lw": 0}
 BEFORE, BEHIND = 4.0, 10.0
 """Bed shown before the windward and behind the lee toe, h."""
+Kind = tuple[float, float, str]
+SOLVED = [name for name, one in fields.COLUMNS.items() if one.info.scope == "solved flows"]
 NOTABLE_RATIO = 1.5
 """Roughness lengths of one slope that differ by less share their panel's story."""
 
@@ -55,11 +58,11 @@ def draw(results: Results) -> Iterator[Figure]:
 def choose(results: Results) -> list[Pile]:
     """Piles whose flows stand for all.
 
-    Of each slope and height that with the least z0, and that with the largest if it differs much.
+    Of each kind that with the least z0, and that with the largest if it differs much.
     """
-    found: dict[tuple[float, float], list[Pile]] = {}
+    found: dict[Kind, list[Pile]] = {}
     for pile in results.flows.values():
-        found.setdefault((pile.bed.slope_deg, pile.bed.height), []).append(pile)
+        found.setdefault(kind(results, pile), []).append(pile)
     chosen = []
     for _, piles in sorted(found.items(), key=lambda item: item[0]):
         piles.sort(key=lambda pile: pile.bed.roughness)
@@ -67,6 +70,19 @@ def choose(results: Results) -> list[Pile]:
         if piles[-1].bed.roughness > NOTABLE_RATIO * piles[0].bed.roughness:
             chosen.append(piles[-1])
     return chosen
+
+
+def kind(results: Results, pile: Pile) -> Kind:
+    """What tells the flow over a pile from others but for its z0: slope, height, own fields."""
+    row = results.asked(pile)
+    chosen = " ".join(str(row[column]) for column in _own_fields(results))
+    return pile.bed.slope_deg, pile.bed.height, chosen
+
+
+def _own_fields(results: Results) -> list[str]:
+    """The fields of the solved flow that the study varies."""
+    piles = results.beds("pile")
+    return [column for column in SOLVED if piles[column].nunique(dropna=False) > 1]
 
 
 def _panel(panel: SubFigure, results: Results, pile: Pile) -> None:
@@ -85,14 +101,15 @@ def _panel(panel: SubFigure, results: Results, pile: Pile) -> None:
     _mark_corners((top, below), pile)
     toe = 2 / np.tan(np.radians(pile.bed.slope_deg))
     top.set(xlim=(-BEFORE, toe + BEHIND), ylabel=r"$u^\star/u^\star_0$")
-    top.set_title(title(pile), loc="left")
+    top.set_title(title(results, pile), loc="left")
 
 
-def title(pile: Pile) -> str:
+def title(results: Results, pile: Pile) -> str:
     """Heading of a panel with one flow."""
-    alpha = labels.written("alpha_deg", pile.bed.slope_deg)
-    h, z0 = pile.bed.height, pile.bed.roughness
-    return f"{alpha}, $h$ = {labels.millimetres(h)}, $z_0$ = h/{h / z0:.0f}"
+    row, ratio = results.asked(pile), pile.bed.height / pile.bed.roughness
+    own = labels.panel(row, _own_fields(results))
+    said = labels.panel(row, ["alpha_deg", "h_m"]), f"$z_0$ = h/{ratio:.0f}", own
+    return ", ".join(text for text in said if text)
 
 
 def _shade_reversed(ax: Axes, x: FloatArray, ustar: FloatArray) -> None:

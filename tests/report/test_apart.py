@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import apart, captions, facts, labels, laws, piles, shields, style
+from orchestrator.report import apart, captions, facts, labels, laws, piles, shields, stress, style
 from orchestrator.report.apart import SHAPE
 from orchestrator.report.results import Results
 from orchestrator.study import fields
@@ -167,3 +167,24 @@ def test_dashes_tell_all_laws_apart_but_the_papers_pair() -> None:
     assert len({str(dash) for dash in found.values()}) == len(LAWS) - 1
     assert laws.dashes(["bridged"]) == {"bridged": "-"}
     assert list(laws.dashes(["high"])) == ["low", "high"]
+
+
+def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
+    heap = only(results, "pile")
+    ((name, pile),) = heap.plan.piles.items()
+    flow = pile.scene.flow.model_copy(update={"turbulence": "RNGkEpsilon"})
+    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    ours = {"scene_id": "another", "turbulence": "RNGkEpsilon"}
+    scenes, bed = heap.tables["scenes"], heap.tables["wall_stress"]
+    theirs = {"flow_case": other.flow.name}
+    tables = {
+        **heap.tables,
+        "scenes": pd.concat([scenes, scenes.assign(**ours)], ignore_index=True),
+        "wall_stress": pd.concat([bed, bed.assign(**theirs)], ignore_index=True),
+    }
+    plan = replace(heap.plan, piles={name: pile, "another": other})
+    (figure,) = stress.draw(replace(heap, tables=tables, plan=plan))
+    assert figure.canvas is not None
+    titles = [ax.get_title(loc="left") for ax in figure.canvas.axes]
+    assert [title.rpartition(", ")[2] for title in titles if title] == ["RNG k-ε", "k-ε"]
+    assert len(figure.cases) == 2
