@@ -8,8 +8,8 @@ import pandas as pd
 from orchestrator.benchmark import charts, sheets
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, failures
-from orchestrator.report import experiment
-from orchestrator.report.experiment import Section
+from orchestrator.report import document
+from orchestrator.report.document import Section
 from orchestrator.report.facts import Sheet
 from orchestrator.runs.folder import Folder
 
@@ -37,7 +37,7 @@ def write(
     names = ", ".join(one.name for one in contenders)
     title = f"Against the pack “{pack.root.name}”: {names}"
     sections = list(_sections(pack, contenders, levels, notes))
-    experiment.write(title, sections, folder, name, pack.manifest.get("programs", {}))
+    document.write(title, sections, folder, name, pack.manifest.get("programs", {}))
 
 
 def _sections(
@@ -64,7 +64,7 @@ def _sections(
 
 def _sheet(table: pd.DataFrame) -> Sheet:
     # heads are typeset: an underscore of a solver's name would lower what follows
-    return experiment.sheet(table.rename(columns=lambda name: name.replace("_", " ")))
+    return document.sheet(table.rename(columns=lambda name: name.replace("_", " ")))
 
 
 def _levels(pack: Pack, contenders: Sequence[Contender]) -> str:

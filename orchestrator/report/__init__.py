@@ -46,13 +46,13 @@ def write(
     """
     with settings.own():
         # the drawing libraries take half a second to import: only who draws waits for them
-        from orchestrator.report import gallery, page
+        from orchestrator.report import drawing, page
         from orchestrator.report.results import Results
 
         results = Results(study, plan, tables, folder.root / "cases")
         folder.make(FIGURES)
-        figures = gallery.draw(results, folder)
-    names = [figure.name for figure, _ in figures]
+        figures = drawing.draw(results, folder)
+    names = [figure.name for figure in figures]
     added = [one for one in (guest(study, tables, names) for guest in guests) if one]
     for name, text in (item for one in added for item in one.files.items()):
         folder.put(name, text)
@@ -63,11 +63,11 @@ def write(
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
     """The cases whose bulky files the page's pictures are drawn from."""
     with settings.own():
-        from orchestrator.report import flow_picture, grain_picture
+        from orchestrator.report.pictures import flow, grains
         from orchestrator.report.results import Results
 
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:
         return []
-    grains = [one for pile in grain_picture.chosen(results) for one in pile.runs]
-    return [*grains, *(pile.flow for pile in flow_picture.chosen(results))]
+    shown = [one for pile in grains.chosen(results) for one in pile.runs]
+    return [*shown, *(pile.flow for pile in flow.chosen(results))]

@@ -11,9 +11,10 @@ from orchestrator.grains.protocol import SAMPLING_INTERVAL
 from orchestrator.physics import curves
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, laws, reference
+from orchestrator.report.apart import varying
 from orchestrator.report.fits import Fit
+from orchestrator.report.pictures.snapshot import Snapshot
 from orchestrator.report.results import Results, valid
-from orchestrator.report.snapshot import Snapshot
 from orchestrator.study import fields
 
 DRAG_LAW = (
@@ -158,9 +159,8 @@ def accuracy(dem: pd.DataFrame) -> str:
             parts.append(f"{ratio[chosen].abs().max():.2%} {name}")
     return (
         "Friction velocity at the threshold by DEM over that of the closed form with the same "
-        f"forces: {force_laws(dem)}. "
-        "Bars: between the load steps without and with motion, so a threshold met exactly lies "
-        "within its bar. "
+        f"forces: {force_laws(dem)}. Bars: between the load steps without and with motion, so a "
+        "threshold met exactly lies within its bar. "
         f"{'Panels differ in scale. ' if dem['load_increment'].nunique() > 1 else ''}"
         f"Largest deviation: {', '.join(parts)}. {hold_protocol(dem)} {_hollow(dem)}"
     )
@@ -206,10 +206,9 @@ def fractions(rows: pd.DataFrame) -> str:
     """Of n/N against the flow."""
     return (
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
-        "had moved by the end of each load step (one marker), against Re* (left) and τ (right) "
-        "of the "
-        "mean signed wall stress over the grains that had moved, as in the paper: the mean falls "
-        "where the next grains to move feel less. "
+        "had moved by the end of each load step (one marker), against Re* (left) and τ (right) of "
+        "the mean signed wall stress over the grains that had moved, as in the paper: the mean "
+        "falls where the next grains to move feel less. "
         f"Forces: {force_laws(rows)}. {hold_protocol(rows)} {_hollow(rows)}{low_regime(rows)}"
     )
 
@@ -261,43 +260,41 @@ def mesh(pile: Pile) -> str:
     )
 
 
-def grains(pile: Pile, found: Snapshot, fraction: float) -> str:
+def grains(results: Results, pile: Pile, found: Snapshot, fraction: float) -> str:
     """Of the picture of the grains."""
     return (
         f"After Fig. 13 of the paper. The first sample at which {fraction:.0%} of the N = "
-        f"{pile.packing.count} exposed windward grains had moved ({found.moved}): hold "
-        f"{found.load_step}, u*₀ = {found.ustar0:.3g} m/s, {_forces(pile)} Above, colour is the "
-        "distance from the grain’s place in the packing; a grain counts as moved from "
-        f"{pile.scene.protocol.displacement_criterion:g} d downstream along the bed. Below, "
-        f"colour and symbol are "
-        f"how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which does not "
-        "see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that had left "
-        "the box, where they lay (without a symbol: not counted as moved). Other mobile grains, "
-        "most of which hardly move, are drawn at the end of the load step. Plain grey: the "
-        "inside of "
-        "the pile, which touches no mobile grain and is left out of the case."
+        f"{pile.packing.count} exposed windward grains had moved ({found.moved}): load step "
+        f"{found.load_step}, u*₀ = {found.ustar0:.3g} m/s, {_pile(results, pile)} Above, colour is "
+        "the distance from the grain’s place in the packing; a grain counts as moved from "
+        f"{_values('displacement_criterion', [pile])} downstream along the bed. Below, colour and "
+        f"symbol are how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which "
+        "does not see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that "
+        "had left the box, where they lay (without a symbol: not counted as moved). Other mobile "
+        "grains, most of which hardly move, are drawn at the end of the load step. Plain grey: the "
+        "inside of the pile, which touches no mobile grain and is left out of the case."
     )
 
 
-def crest(pile: Pile, looks: int) -> str:
+def crest(results: Results, pile: Pile, frames: int) -> str:
     """Of the animation."""
     return (
-        f"Exposed windward grains near the crest, u*₀ rising in load steps; {_forces(pile)} "
-        f"Colour and "
-        f"symbol: how a grain moved, from {pile.scene.protocol.displacement_criterion:g} d on: "
-        f"{_modes()} Hollow: "
-        "left the box, where it lay (without a symbol: not counted as moved). The "
-        f"{looks} frames are samples of the deck, {SAMPLING_INTERVAL:g} √(d/g′) apart where none "
-        "is left out: left out are those at which no grain moves near its place, so that grains "
-        "jump or vanish where time was skipped. Other mobile grains are drawn at the end of each "
-        "load step."
+        f"Exposed windward grains near the crest, u*₀ rising in load steps; {_pile(results, pile)} "
+        "Colour and symbol: how a grain moved, from "
+        f"{_values('displacement_criterion', [pile])} on: {_modes()} Hollow: left the box, where "
+        f"it lay (without a symbol: not counted as moved). The {frames} frames are samples of the "
+        f"deck, {SAMPLING_INTERVAL:g} √(d/g′) apart. Samples in which no grain moves near its "
+        "place are left out, so that grains jump or vanish there. Other mobile grains are drawn at "
+        "the end of each load step."
     )
 
 
-def _forces(pile: Pile) -> str:
-    ratio = labels.ratio_of(pile.bed.roughness / pile.scene.grain.diameter, "d")
-    rows, forces = (_values(column, [pile]) for column in ("packing", "force_law"))
-    return f"z₀ = {ratio}, {rows}, forces: {forces}."
+def _pile(results: Results, pile: Pile) -> str:
+    """What a pile is beside its slope and diameter, as far as the study's piles differ."""
+    columns = ["z0_over_d", "packing", "force_law"]
+    columns += varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
+    used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
+    return ", ".join(labels.plain(c, value) for c, value in used.items() if value is not None) + "."
 
 
 def _modes() -> str:

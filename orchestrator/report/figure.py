@@ -18,7 +18,9 @@ class Figure:
     cases : tuple of str
         Directories of the cases behind it.
     canvas : matplotlib.figure.Figure or None
-        The drawing; None once its files are written.
+        The drawing; None once its files are written, and of an animation.
+    image : bytes
+        The picture that the page shows, PNG or GIF, once it is made.
     """
 
     name: str
@@ -26,3 +28,4 @@ class Figure:
     caption: str
     cases: tuple[str, ...]
     canvas: Canvas | None
+    image: bytes = b""

@@ -22,7 +22,7 @@ FOLDER = Path(__file__).parent
 
 def render(
     results: Results,
-    figures: Sequence[tuple[Figure, bytes]],
+    figures: Sequence[Figure],
     timings: pd.DataFrame,
     failures: Mapping[str, str],
     sections: Sequence[Markup] = (),
@@ -33,8 +33,8 @@ def render(
     ----------
     results : Results
         What the study gave.
-    figures : sequence of (Figure, bytes)
-        The figures with their images, PNG or GIF.
+    figures : sequence of Figure
+        With their images.
     timings : DataFrame
         Wall times of the finished cases.
     failures : mapping of str to str
@@ -57,7 +57,7 @@ def render(
         force_laws=facts.force_laws(results),
         measured=measured_section(results),
         sections=sections,
-        figures=[entry(figure, png) for figure, png in figures],
+        figures=[entry(figure) for figure in figures],
         failures=failures,
         links=links(results),
         tables=list(results.tables),
@@ -92,9 +92,9 @@ def typeset(text: str) -> Markup:
     return Markup(re.sub(r"(?<=\w)_([A-Za-z]+)", r"<sub>\1</sub>", str(escape(text))))
 
 
-def entry(figure: Figure, png: bytes) -> dict[str, Any]:
-    """What the templates need of a figure and its image."""
-    data = base64.b64encode(png).decode("ascii")
+def entry(figure: Figure) -> dict[str, Any]:
+    """What the templates need of a figure with its image."""
+    data = base64.b64encode(figure.image).decode("ascii")
     kept = ("name", "title", "caption", "cases")
     return {"data": data, **{name: getattr(figure, name) for name in kept}}
 

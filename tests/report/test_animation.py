@@ -10,10 +10,10 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image
 
-from orchestrator.report import animation, snapshot
-from orchestrator.report import grain_marks as marks
+from orchestrator.report import drawing
+from orchestrator.report.pictures import animation, marks, snapshot
+from orchestrator.report.pictures.snapshot import Passage
 from orchestrator.report.results import Results
-from orchestrator.report.snapshot import Passage
 from orchestrator.runs.folder import Folder
 from tests.report.conftest import only
 
@@ -25,14 +25,15 @@ def passage(results: Results) -> Passage:
 
 
 def test_study_with_a_pile_has_one_animation(results: Results, tmp_path: Path) -> None:
-    ((figure, data),) = animation.draw(results, Folder(tmp_path))
-    assert (tmp_path / "figures" / "crest.gif").read_bytes() == data
-    assert len(data) <= 1.5e6
-    image = Image.open(BytesIO(data))
+    (figure,) = animation.draw(results)
+    assert drawing.saved(figure, Folder(tmp_path)) == figure
+    assert (tmp_path / "figures" / "crest.gif").read_bytes() == figure.image
+    assert len(figure.image) <= 1.5e6
+    image = Image.open(BytesIO(figure.image))
     assert image.format == "GIF"
     assert 10 < getattr(image, "n_frames", 1) <= animation.MOST
     assert "d = 1 mm" in figure.title
-    assert list(animation.draw(only(results, "grain"), Folder(tmp_path))) == []
+    assert list(animation.draw(only(results, "grain"))) == []
 
 
 def test_quiet_looks_are_left_out(passage: Passage) -> None:

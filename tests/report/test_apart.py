@@ -120,6 +120,13 @@ def test_captions_say_what_the_scene_has(results: Results) -> None:
     assert f"{captions.averaged([pile, other])}" == "max(d, h/40, h/20)"
 
 
+def test_caption_of_grains_says_which_of_the_piles_they_are(two: Results) -> None:
+    (pile,) = two.plan.piles.values()
+    assert "z₀ = d/30, rows along the slope, Eq. 4 (high Re*), mobile layers = 1." in (
+        captions.crest(two, pile, 9)
+    )
+
+
 def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     rows = results.joined("pile_threshold")
     assert "rises by 5 %" in captions.hold_protocol(rows)
@@ -172,9 +179,9 @@ def test_dashes_tell_all_laws_apart_but_the_papers_pair() -> None:
 def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
     heap = only(results, "pile")
     ((name, pile),) = heap.plan.piles.items()
-    flow = pile.scene.flow.model_copy(update={"turbulence": "RNGkEpsilon"})
+    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon"})
     other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
-    ours = {"scene_id": "another", "turbulence": "RNGkEpsilon"}
+    ours = {"scene_id": "another", "turbulence_model": "RNGkEpsilon"}
     scenes, bed = heap.tables["scenes"], heap.tables["wall_stress"]
     theirs = {"flow_case": other.flow.name}
     tables = {

@@ -7,17 +7,10 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.grains import motion
-from orchestrator.report import (
-    flow_field,
-    flow_picture,
-    grain_picture,
-    mesh_picture,
-    snapshot,
-    spheres,
-)
 from orchestrator.report.figure import Figure
+from orchestrator.report.pictures import flow, flow_field, grains, mesh, snapshot, spheres
+from orchestrator.report.pictures.snapshot import Passage
 from orchestrator.report.results import Results
-from orchestrator.report.snapshot import Passage
 
 WINDOW = (-1.0, 3.0, -1.0, 1.0)
 
@@ -46,7 +39,7 @@ def test_spheres_are_cut_at_the_edges_of_the_window() -> None:
 
 
 def test_field_is_that_of_the_flow(results: Results) -> None:
-    (figure,) = flow_picture.draw(results)
+    (figure,) = flow.draw(results)
     (pile,) = results.plan.piles.values()
     shown = (-0.02, 0.1, 0.0, 0.03)
     velocity = flow_field.velocity(results.cases / pile.flow.name, shown, (60, 240))
@@ -63,7 +56,7 @@ def test_field_is_that_of_the_flow(results: Results) -> None:
 
 def test_mesh_is_that_of_the_flow(results: Results) -> None:
     (pile,) = results.plan.piles.values()
-    edges = mesh_picture.read_edges(results.cases / pile.flow.name)
+    edges = mesh.read_edges(results.cases / pile.flow.name)
     table = results.tables["wall_stress"]
     faces = len(table)
     # of a grid of quadrilaterals; its height is that of the lid
@@ -73,7 +66,7 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
     bed = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
     assert len(middles.intersection(bed)) > 0.9 * faces
-    (figure,) = mesh_picture.draw(results)
+    (figure,) = mesh.draw(results)
     assert figure.canvas is not None
     for ax in figure.canvas.axes:
         (line,) = (line for line in ax.lines if line.get_gid() == "mesh")
@@ -126,7 +119,7 @@ def test_no_snapshot_of_what_was_not_reached(passage: Passage) -> None:
 @pytest.fixture(scope="module")
 def figure(results: Results) -> Figure:
     """The picture of the grains."""
-    (drawn,) = grain_picture.draw(results)
+    (drawn,) = grains.draw(results)
     return drawn
 
 

@@ -11,11 +11,12 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from orchestrator.experiments.ladder import tags
 from orchestrator.experiments.ladder.ranking import ERRORS
-from orchestrator.report import labels, style, tags
+from orchestrator.experiments.ladder.tags import Tag
+from orchestrator.report import labels, style
 from orchestrator.report.results import split
 from orchestrator.report.style import Look
-from orchestrator.report.tags import Tag
 
 *AT_FRACTIONS, OF_CURVE = ERRORS
 HEADS = {

@@ -7,8 +7,8 @@ import pandas as pd
 from orchestrator.experiments.ladder import chart, gains
 from orchestrator.experiments.ladder.ranking import ERRORS, together
 from orchestrator.fidelity.levels import FLOW, GRAINS, LEVELS
-from orchestrator.report import experiment
-from orchestrator.report.experiment import Section
+from orchestrator.report import document
+from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
 from orchestrator.runs.workspace import Workspace
 
@@ -26,7 +26,7 @@ def write(tables: Mapping[str, pd.DataFrame], space: Workspace, solvers: Mapping
         _known(tables["levels"]),
     ]
     title = "Speed against accuracy"
-    experiment.write(title, sections, space.folder, space.page.name, solvers)
+    document.write(title, sections, space.folder, space.page.name, solvers)
 
 
 def _accuracy(points: pd.DataFrame) -> Section:
@@ -56,7 +56,7 @@ def _accuracy(points: pd.DataFrame) -> Section:
                 chart.by_fraction(by_dem),
             ),
         ),
-        (experiment.sheet(_means(by_dem)),),
+        (document.sheet(_means(by_dem)),),
     )
 
 
@@ -68,7 +68,7 @@ def _gains(routes: pd.DataFrame) -> Section:
         "small pile; the pile of the figure has more grains, in proportion to which it is "
         "extrapolated, and needs as many runs as the fast level has load steps.",
         (Figure("gains", "Factors gained", "", (), gains.draw(routes)),),
-        (experiment.sheet(routes),),
+        (document.sheet(routes),),
     )
 
 
@@ -77,7 +77,7 @@ def _known(known: pd.DataFrame) -> Section:
         "The fidelity levels, and what is known of them",
         "The largest error over the scenes of a class, %, without the reference's own uncertainty. "
         "From this table `study --tolerance` chooses.",
-        tables=(experiment.sheet(_meanings()), experiment.sheet(_wide(known))),
+        tables=(document.sheet(_meanings()), document.sheet(_wide(known))),
         limits=(
             "An error is known for the classes of scenes that were run, no others. It is that of "
             "the method, not of the model: first cell, turbulence model and the way to read the "

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.experiments.stability import figures
 from orchestrator.experiments.stability.verdicts import WRONG, Judged
-from orchestrator.report import experiment
-from orchestrator.report.experiment import Section
+from orchestrator.report import document
+from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
 from orchestrator.runs.workspace import Workspace
 
@@ -21,7 +21,7 @@ def write(judged: Sequence[Judged], space: Workspace, solvers: Mapping[str, str]
     """Write the page."""
     sheet = Figure("maps", TITLE, "", (), figures.sheet(judged))
     sections = [Section("All maps", ALL, (sheet,)), *map(_section, judged)]
-    experiment.write(TITLE, sections, space.folder, space.page.name, solvers)
+    document.write(TITLE, sections, space.folder, space.page.name, solvers)
 
 
 def _section(judged: Judged) -> Section:

@@ -12,9 +12,10 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from orchestrator.grains.pile import Pile
-from orchestrator.report import captions, flow_picture, stress, style
+from orchestrator.report import captions, stress, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.flow_field import Window
+from orchestrator.report.pictures import flow
+from orchestrator.report.pictures.flow_field import Window
 from orchestrator.report.results import Results
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +28,7 @@ CREST = (-0.7, 0.7, -0.25, 0.25)
 
 def draw(results: Results) -> Iterator[Figure]:
     """One figure: of the study's least slope, whose mesh stands for all."""
-    for pile in flow_picture.chosen(results)[:1]:
+    for pile in flow.chosen(results)[:1]:
         edges = read_edges(results.cases / pile.flow.name) / pile.bed.height
         canvas = _frame(pile, edges, stress.title(results, pile))
         yield Figure("mesh", "Mesh of the flow", captions.mesh(pile), (pile.flow.name,), canvas)

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import experiment, style
-from orchestrator.report.experiment import Section
+from orchestrator.report import document, style
+from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
 from orchestrator.runs.folder import Folder
 from tests.report.test_page import Page
@@ -25,9 +25,9 @@ def written(tmp_path: Path) -> Path:
     table = pd.DataFrame({"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
     sections = [
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
-        Section("Found", "", figures[1:], [experiment.sheet(table)], ["No more than <this>."]),
+        Section("Found", "", figures[1:], [document.sheet(table)], ["No more than <this>."]),
     ]
-    experiment.write(TITLE, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
+    document.write(TITLE, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
     return tmp_path / "page.html"
 
 

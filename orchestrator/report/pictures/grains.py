@@ -16,12 +16,12 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from orchestrator.grains.pile import Pile
-from orchestrator.report import captions, flow_picture, labels, snapshot, spheres, style
-from orchestrator.report import grain_marks as marks
+from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.grain_marks import Window
+from orchestrator.report.pictures import flow, marks, snapshot, spheres
+from orchestrator.report.pictures.marks import Window
+from orchestrator.report.pictures.snapshot import Snapshot
 from orchestrator.report.results import Results, split, valid
-from orchestrator.report.snapshot import Snapshot
 
 FloatArray = NDArray[np.float64]
 
@@ -57,8 +57,10 @@ def draw(results: Results) -> Iterator[Figure]:
         look = passage.first(fraction)
         if look is not None:
             windows, d = marks.windows(pile), pile.scene.grain.diameter
-            velocity = flow_picture.sampled(pile, results.cases, windows[-1], d)
-            yield _figure(Shown(pile, passage.at(look), windows, velocity), fraction)
+            velocity = flow.sampled(pile, results.cases, windows[-1], d)
+            shown = Shown(pile, passage.at(look), windows, velocity)
+            caption = captions.grains(results, pile, shown.found, fraction)
+            yield _figure(shown, fraction, caption)
 
 
 def chosen(results: Results) -> Iterator[Pile]:
@@ -74,13 +76,16 @@ def chosen(results: Results) -> Iterator[Pile]:
         yield from itertools.islice(filter(results.has_files, piles), 1)
 
 
-def _figure(shown: Shown, fraction: float) -> Figure:
+def _figure(shown: Shown, fraction: float, caption: str) -> Figure:
     pile = shown.pile
-    d, alpha = pile.scene.grain.diameter, labels.plain("alpha_deg", pile.bed.slope_deg)
+    alpha, d = (
+        labels.plain("alpha_deg", pile.bed.slope_deg),
+        labels.plain("d_m", pile.scene.grain.diameter),
+    )
     return Figure(
         f"grains-alpha{pile.bed.slope_deg:g}",
-        f"Grains when {fraction:.0%} have moved, {alpha}, d = {labels.millimetres(d)}",
-        captions.grains(pile, shown.found, fraction),
+        f"Grains when {fraction:.0%} have moved, {alpha}, {d}",
+        caption,
         (pile.case.name, pile.flow.name),
         _frame(shown),
     )

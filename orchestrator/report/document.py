@@ -1,4 +1,4 @@
-"""The page of an experiment: what was run, figures, tables, limits; one file like a study’s."""
+"""A page of sections, for experiments and the benchmark; one file like a study's page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.report import facts, page, style
+from orchestrator.report import drawing, facts, page
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
 from orchestrator.runs.folder import Folder
@@ -57,7 +57,7 @@ def write(
         The programs that ran, with their versions.
     """
     html = page.fill(
-        "experiment.html.j2",
+        "document.html.j2",
         title=title,
         sections=[_drawn(section, folder) for section in sections],
         long=LONG,
@@ -69,13 +69,10 @@ def write(
 
 def _drawn(section: Section, folder: Folder) -> dict[str, Any]:
     """A section as the template needs it, its figures as entries with images."""
-    images = [
-        page.entry(figure, style.save(figure.canvas, folder, figure.name))
-        for figure in section.figures
-        if figure.canvas
-    ]
+    drawn = (drawing.saved(figure, folder) for figure in section.figures)
     names = ("title", "text", "tables", "limits")
-    return {**{name: getattr(section, name) for name in names}, "figures": images}
+    parts = {name: getattr(section, name) for name in names}
+    return {**parts, "figures": [page.entry(figure) for figure in drawn]}
 
 
 def sheet(table: pd.DataFrame) -> Sheet:

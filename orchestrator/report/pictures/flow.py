@@ -10,9 +10,10 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from orchestrator.grains.pile import Pile
-from orchestrator.report import captions, flow_field, stress, style
+from orchestrator.report import captions, stress, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.flow_field import Window
+from orchestrator.report.pictures import flow_field
+from orchestrator.report.pictures.flow_field import Window
 from orchestrator.report.results import Results
 from orchestrator.runs.case import is_whole
 

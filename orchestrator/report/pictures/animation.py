@@ -13,13 +13,12 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 from PIL import Image
 
-from orchestrator.report import FIGURES, captions, grain_picture, labels, snapshot, style
-from orchestrator.report import grain_marks as marks
+from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.grain_marks import Window
+from orchestrator.report.pictures import grains, marks, snapshot
+from orchestrator.report.pictures.marks import Window
+from orchestrator.report.pictures.snapshot import Passage, Snapshot
 from orchestrator.report.results import Results
-from orchestrator.report.snapshot import Passage, Snapshot
-from orchestrator.runs.folder import Folder
 
 NAME = "crest"
 STIR, NEAR = 0.05, 2.0
@@ -33,23 +32,22 @@ FRAME_MS, LAST_MS = 50, 2500
 PIXELS_PER_INCH = 140
 
 
-def draw(results: Results, folder: Folder) -> Iterator[tuple[Figure, bytes]]:
-    """Put the animation into a directory; give it with its bytes. None of a study without piles.
+def draw(results: Results) -> Iterator[Figure]:
+    """The animation; none of a study without piles.
 
     It is of the pile of the picture of the grains, at the least slope.
     """
-    for pile in list(grain_picture.chosen(results))[:1]:
+    for pile in list(grains.chosen(results))[:1]:
         passage = snapshot.read(pile, results.cases)
         window = marks.windows(pile)[-1]
         samples = choose(passage, window)
         if len(samples):
             data = _gif(passage, window, samples)
-            folder.put(f"{FIGURES}/{NAME}.gif", data)
             d = labels.millimetres(pile.scene.grain.diameter)
             alpha = labels.plain("alpha_deg", pile.bed.slope_deg)
             title = f"The crest empties, {alpha}, d = {d} (animation)"
-            caption = captions.crest(pile, len(samples))
-            yield Figure(NAME, title, caption, (pile.case.name,), None), data
+            caption = captions.crest(results, pile, len(samples))
+            yield Figure(NAME, title, caption, (pile.case.name,), None, data)
 
 
 def choose(passage: Passage, window: Window) -> NDArray[np.int64]:

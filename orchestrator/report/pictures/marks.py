@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.grains.motion import MODES
 from orchestrator.grains.pile import Pile
-from orchestrator.report.snapshot import Snapshot
+from orchestrator.report.pictures.snapshot import Snapshot
 
 LYING, FIXED, INSIDE = "#e6decc", "#8c8c8c", "#c9c9c9"
 WAITING = "#fff7d0"

@@ -1,0 +1,82 @@
+"""All figures of a study drawn side by side, in the order of the page."""
+
+import contextlib
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+
+from orchestrator.errors import OrchestratorError
+from orchestrator.report import FIGURES, compared, piles, single, stress, style
+from orchestrator.report.figure import Figure
+from orchestrator.report.pictures import animation, flow, grains, mesh
+from orchestrator.report.results import Results
+from orchestrator.runs import process, retry
+from orchestrator.runs.folder import Folder
+
+Draw = Callable[[Results], Iterable[Figure]]
+SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
+    (1, (mesh.draw, flow.draw, grains.draw, animation.draw)),
+    (3, (piles.fractions,)),
+    (4, (piles.extended,)),
+    (0, (compared.draw, single.draw)),
+    (2, (stress.draw,)),
+)
+"""What is drawn in one process, the dearest first, and its place on the page."""
+
+
+def draw(results: Results, folder: Folder) -> list[Figure]:
+    """Put each figure's files into a directory; give it with its image.
+
+    The sections are drawn side by side: matplotlib holds one core for seconds a figure.
+
+    Raises
+    ------
+    OrchestratorError
+        If the processes that draw are killed again and again.
+    """
+    _shared.append(results)
+    try:
+        parts = _parts(folder)
+    finally:
+        _shared.clear()
+    places = [place for place, _ in SECTIONS]
+    order = sorted(zip(places, parts, strict=True), key=lambda pair: pair[0])
+    return [figure for _, part in order for figure in part]
+
+
+def _parts(folder: Folder) -> list[list[Figure]]:
+    # forked, the workers have the results and the imported libraries already
+    context = multiprocessing.get_context("fork")
+    workers = min(os.cpu_count() or 1, len(SECTIONS))
+    for _ in range(retry.MOST):
+        with (
+            contextlib.suppress(BrokenProcessPool),
+            ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),)) as pool,
+        ):
+            return list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
+    raise OrchestratorError(
+        "a process that draws figures was killed",
+        where=str(folder.root),
+        remedy="out of memory? `orchestrator report` draws them again",
+    )
+
+
+_shared: list[Results] = []
+"""What the workers inherit: results are too large to be sent to each."""
+
+
+def _section(number: int, folder: Folder) -> list[Figure]:
+    _, draws = SECTIONS[number]
+    return [saved(figure, folder) for draw in draws for figure in draw(_shared[0])]
+
+
+def saved(figure: Figure, folder: Folder) -> Figure:
+    """The figure with its image in place of its canvas, its files written."""
+    if figure.canvas:
+        image = style.save(figure.canvas, folder, figure.name)
+        return replace(figure, canvas=None, image=image)
+    folder.put(f"{FIGURES}/{figure.name}.gif", figure.image)
+    return figure
