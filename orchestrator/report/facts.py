@@ -148,9 +148,10 @@ def parameters(results: Results) -> Sheet:
         run = fields.ANSWERED + column
         answered = _values(results.scenes[run]) if run in fields.ANSWERS else asked
         if asked or answered:
-            symbol = ", ".join(text for text in (one.info.label, one.info.symbol) if text)
-            rows.append((symbol, one.info.unit, one.name or column, asked or "default", answered))
-    head = ("parameter", "unit", "in a study file", "asked for", "answered with")
+            words = ", ".join(t for t in (one.info.label, labels.text_of(one.info.symbol)) if t)
+            other = "" if answered == asked else answered
+            rows.append((words, one.info.unit, one.name or column, asked or "default", other))
+    head = ("parameter", "unit", "in a study file", "asked for", "answered with, if otherwise")
     return Sheet(head, tuple(rows))
 
 

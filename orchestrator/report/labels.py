@@ -30,7 +30,7 @@ def written(column: str, value: Any) -> str:
 def plain(column: str, value: Any) -> str:
     """A value with its symbol where there is no mathematics."""
     info = words(column)
-    return _said(info, value, info.symbol.replace("_0", "₀"), "{:g}".format)
+    return _said(info, value, text_of(info.symbol), "{:g}".format)
 
 
 def _said(info: Info, value: Any, symbol: str, number: Callable[[float], str]) -> str:
@@ -43,6 +43,11 @@ def value(column: str, value: Any) -> str:
     """A value alone."""
     info = words(column)
     return info.choices.get(value, value) if isinstance(value, str) else amount(value, info.unit)
+
+
+def text_of(symbol: str) -> str:
+    """A symbol where there is no mathematics."""
+    return symbol.replace("_0", "₀")
 
 
 def math_of(symbol: str) -> str:
