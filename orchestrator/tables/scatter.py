@@ -4,8 +4,9 @@ import pandas as pd
 
 from orchestrator.study import fields
 
-SIMILAR = ["level", "alpha_deg", "force_law", "fraction"]
-"""Piles that agree in these are taken to scatter alike; rows are level, or lie along the slope."""
+SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
+"""Piles that agree in these are taken to scatter alike: rows are level, or lie along the slope;
+lift carries grains off, which then collide, or it does not."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
@@ -13,20 +14,21 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
 
     Half the range over the seeds, relative to their mean, is found for each set of piles that
     differ in the seed alone: random gaps, or perturbed replicas of a lattice, which differ by
-    round-off. A pile
-    gets the largest one of the same rows, slope, force law and fraction; where the study ran no
-    seeds, none, and its interval stays as it is.
+    round-off. A pile gets the largest one of the same rows, slope, force law and fraction, of piles
+    that lift off or that do not; where the study ran no seeds, none, and its interval stays.
     """
     if thresholds.empty:
         return thresholds
     of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
     ids = thresholds["scene_id"]
     table = thresholds.assign(
-        level=ids.map(of_scene["packing"]) == "horizontal", replicas=ids.map(_twins(of_scene))
+        level=ids.map(of_scene["packing"]) == "horizontal",
+        lifted=thresholds["share_carried_off"] > 0,
+        replicas=ids.map(_twins(of_scene)),
     )
     table = table.merge(_scatter(table), on=SIMILAR, how="left", validate="many_to_one")
     wider = table["scatter"].fillna(0.0)
-    return table.drop(columns=["level", "replicas"]).assign(
+    return table.drop(columns=["level", "lifted", "replicas"]).assign(
         shields_low=table["shields_low"] * (1 - wider),
         shields_high=table["shields_high"] * (1 + wider),
     )

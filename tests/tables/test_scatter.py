@@ -21,6 +21,7 @@ def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:
             "z0_over_d": 0.1,
             "nu_m2_s": 1e-5,
             "stress": "wall",
+            "share_carried_off": 0.0,
             "shields": shields,
             "shields_low": np.multiply(shields, 0.98),
             "shields_high": np.multiply(shields, 1.02),
@@ -52,6 +53,15 @@ def test_twins_of_level_rows_scatter_by_themselves() -> None:
     found = with_scatter(*_tables()).set_index("scene_id")
     assert found.loc[["f", "g"], "scatter"].tolist() == pytest.approx([0.1, 0.1])
     assert found.loc["f", "shields_low"] == pytest.approx(1.8 * 0.98 * 0.9)
+
+
+def test_piles_that_lift_off_widen_no_others() -> None:
+    thresholds, scenes = _tables()
+    lifted = thresholds.assign(share_carried_off=[1.0] * 3 + [0.0] * 4)
+    found = with_scatter(lifted, scenes).set_index("scene_id")
+    assert found.loc[["a", "b", "c"], "scatter"].tolist() == pytest.approx([0.05] * 3)
+    assert found["scatter"].isna()["d"]
+    assert found.loc["d", "shields_low"] == pytest.approx(2.0 * 0.98)
 
 
 def test_piles_that_differ_in_more_than_the_seed_are_no_scatter() -> None:
