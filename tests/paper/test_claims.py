@@ -14,7 +14,8 @@ from orchestrator.paper.claims.base import Claim, Evidence, Verdict, in_regime
 from orchestrator.physics import curves
 from orchestrator.report.results import Results
 from orchestrator.study import fields, study
-from orchestrator.study.closed_form import closed_form
+from orchestrator.study.closed_form import closed_form, law_holds
+from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables import Tables
 
@@ -149,7 +150,7 @@ def exact() -> Tables:
 
 
 def _parameters(scene: Scene) -> dict[str, object]:
-    return {**fields.asked(scene), **fields.answered(scene)}
+    return {**fields.asked(scene), **fields.answered(scene), "law_holds": law_holds(scene)}
 
 
 def _closed_form(scene: Scene) -> dict[str, float]:
@@ -168,6 +169,19 @@ def test_the_closed_form_itself_is_judged_so(exact: Tables) -> None:
     assert found["curves.best_fit"].verdict == "partly"
     assert "best β = 45°, d/30: off by 1.6" in found["curves.best_fit"].measured[1]
     assert "best β = 50°, d/30: off by 1.1" in found["curves.best_fit"].measured[2]
+    assert "water, bridged, Re* = 0.018 … 306" in found["curves.best_fit"].measured[3]
+
+
+def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
+    answers: dict[tuple[float, ...], set[str]] = {}
+    for scene in study.load("paper", [PRESETS]).scenes:
+        if isinstance(scene.bed, PileBed) and scene.fluid.viscosity == 1e-5:
+            key = (scene.bed.slope_deg, scene.grain.diameter, scene.bed.roughness)
+            laws = {scene.forces.law} if law_holds(scene) else set()
+            answers[key] = answers.get(key, set()) | laws
+    assert len(answers) == 56
+    assert all(base.BRIDGED in laws for laws in answers.values())
+    assert sum(laws == {base.BRIDGED} for laws in answers.values()) == 34
 
 
 def test_grains_on_the_curves_fit_them(exact: Tables) -> None:

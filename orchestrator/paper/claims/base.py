@@ -23,6 +23,8 @@ BY_SHARE = (
 WAITING_TIME = 5.0
 """Least waiting time of what is a load step rather than a ramp, sqrt(d/g')."""
 NAMES: dict[str, str] = {"low": "low regime", "high": "high regime"}
+BRIDGED = "bridged"
+"""The law of this program that has an answer where neither of the paper's has."""
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that are answers by whatever method; the others show what DEM alone measures."""
 BESIDE = ("fraction", "flow_level", "grain_level")
@@ -94,17 +96,28 @@ class Evidence:
     @cached_property
     def held(self) -> pd.DataFrame:
         """Those of them under held flows, at the study's commonest contact and protocol."""
-        held = self.grains[self.grains["waiting_time"] >= WAITING_TIME]
-        choices = others(held, *GRAIN)
-        if held.empty:
-            return held
-        combination = held.groupby(choices, sort=True, dropna=False).ngroup()
-        return held[combination == combination.mode()[0]]
+        return _commonest(self.grains)
+
+    @cached_property
+    def bridged(self) -> pd.DataFrame:
+        """The same of the law that has an answer between the regimes; the paper has none there."""
+        table = self.joined("single_grain")
+        return _commonest(table[table["force_law"] == BRIDGED])
 
     def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
         """A table of piles whose force law holds, of one packing and one stress."""
         table = self.joined(name)
         return table[in_regime(table) & (table["packing"] == packing) & (table["stress"] == stress)]
+
+
+def _commonest(grains: pd.DataFrame) -> pd.DataFrame:
+    """Grains under held flows, at the commonest contact and protocol."""
+    held = grains[grains["waiting_time"] >= WAITING_TIME]
+    choices = others(held, *GRAIN)
+    if held.empty:
+        return held
+    combination = held.groupby(choices, sort=True, dropna=False).ngroup()
+    return held[combination == combination.mode()[0]]
 
 
 def in_regime(table: pd.DataFrame) -> pd.Series:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.paper.claims.base import NAMES, Claim, Evidence, Verdict, combined
+from orchestrator.paper.claims.base import BRIDGED, NAMES, Claim, Evidence, Verdict, combined
 from orchestrator.physics import curves
 from orchestrator.report import labels, reference
 from orchestrator.report.results import split
@@ -14,6 +14,8 @@ from orchestrator.report.results import split
 FloatArray = NDArray[np.float64]
 Lines = Mapping[str, tuple[FloatArray, FloatArray]]
 
+FITTED = {**NAMES, BRIDGED: "bridged"}
+"""The laws that are judged, and their names in sentences."""
 POINTS = 60
 """Re*, evenly spaced in its logarithm, at which a series is compared with the curves."""
 BETA = (50.0, 55.0)
@@ -36,7 +38,7 @@ COLUMNS = (
 
 def best_fit(evidence: Evidence) -> Claim:
     """Single grains on a flat bed against the curves for water, and for air."""
-    grains = evidence.held
+    grains = pd.concat([evidence.held, evidence.bridged])
     flat = grains[(grains["alpha_deg"] == 0) & grains["shields_dem"].notna()].astype(
         {"reynolds": float, "shields_dem": float}
     )
@@ -55,9 +57,9 @@ def _families(evidence: Evidence, flat: pd.DataFrame) -> dict[str, Lines]:
 
 
 def _distances(flat: pd.DataFrame, lines: Lines) -> pd.DataFrame:
-    """Mean factor, its sign and the range of Re* of each series, by regime."""
+    """Mean factor, its sign and the range of Re* of each series, by law."""
     rows = []
-    for law_name in NAMES:
+    for law_name in FITTED:
         part = flat[flat["force_law"] == law_name]
         series = [own for _, own in split(part, "beta_deg", "z0_over_d") if len(own) > 1]
         grid = _common(series)
@@ -96,13 +98,14 @@ def _read(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
 
 def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
     measured = []
-    verdicts: list[Verdict] = []
+    verdicts: dict[str, Verdict] = {}
     for family, table in tables.items():
-        for law_name in NAMES:
+        for law_name in FITTED:
             own = table[table["force_law"] == law_name]
             if len(own):
                 measured.append(_said(family, law_name, own))
-                verdicts += [_judged(own)] if family == "water" else []
+                if family == "water":
+                    verdicts[law_name] = _judged(own)
     return Claim(
         "Best fit with Shields’ laboratory results: β from 50° to 55° and z₀ ≈ d/30, for small and "
         "for large Re*",
@@ -110,14 +113,15 @@ def _judged_fit(tables: Mapping[str, pd.DataFrame]) -> Claim:
         ("off by: mean factor from the curves (mean of τ over theirs; the worst one)", *measured)
         if measured
         else (),
-        "in each regime, against the mean of the logarithms of the water curves that cover an Re*: "
-        "reproduced if the best of the study’s β and z₀ is one of those named and within a factor "
-        f"{GOOD:g} in the mean; not if neither; partly if one, or if the regimes differ",
-        combined(verdicts) if len(verdicts) == len(NAMES) else "no data",
+        "in each regime, and by the bridged law where the study has it, against the mean of the "
+        "logarithms of the water curves that cover an Re*: reproduced if the best of the study’s β "
+        f"and z₀ is one of those named and within a factor {GOOD:g} in the mean; not if neither; "
+        "partly if one, or if these differ",
+        combined(verdicts.values()) if verdicts.keys() >= NAMES.keys() else "no data",
         "Eq. 3 tends to a constant for Re* → 0, where the curves of water go on rising: no β fits "
-        "both ends. And the grains are in air, the curves of water; against those of air, listed "
-        "for comparison, the high regime lies far above (their thresholds are lower in Shields’ "
-        "terms, and cohesion is in those of small grains).",
+        "both ends; the bridged law is Eq. 2 there. And the grains are in air, the curves of "
+        "water; against those of air, listed for comparison, the high regime lies far above (their "
+        "thresholds are lower in Shields’ terms, and cohesion is in those of small grains).",
         ("dem-horizontal",),
     )
 
@@ -138,7 +142,7 @@ def _said(family: str, law_name: str, own: pd.DataFrame) -> str:
     named = own[own["beta_deg"].between(*BETA) & own["z0_over_d"].map(_is_named)]
     rest = [_fit(row) for at, row in named.sort_values("beta_deg").iterrows() if at != best.name]
     return (
-        f"{family}, {NAMES[law_name]}, Re* = {best['first']:.2g} … {best['last']:.3g}: best "
+        f"{family}, {FITTED[law_name]}, Re* = {best['first']:.2g} … {best['last']:.3g}: best "
         + "; ".join([_fit(best), *rest])
     )
 

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.paper.claims.base import (
+    BRIDGED,
     NAMES,
     WAITING_TIME,
     Claim,
@@ -117,7 +118,7 @@ def regimes(evidence: Evidence) -> Claim:
     return Claim(
         "Two regimes, Eq. 2 and Eq. 4, give drag and lift for the diameters considered",
         "1.1 and 3.1 (the paper leaves 5 < Re* < 30 as a transition)",
-        (*measured, *_beyond_drag_law(evidence)),
+        (*measured, *_unanswered(own, piles), *_beyond_drag_law(evidence)),
         "judged on piles of all the paper’s diameters; reproduced: at least 95 % have a force law "
         "that holds at their own threshold; not: at most 5 %; else partly",
         by_share(own["regime"] != "transition") if _whole_range(own["d_m"]) else "no data",
@@ -126,6 +127,20 @@ def regimes(evidence: Evidence) -> Claim:
         "drawn hollow. The drag law of Eq. 4 is a fit up to a particle Reynolds number of about "
         "1000.",
         ("extended-shields", "dem-horizontal"),
+    )
+
+
+def _unanswered(own: pd.DataFrame, piles: pd.DataFrame) -> tuple[str, ...]:
+    """How many piles have no answer of a law that holds, by the paper's two and by all."""
+    answered = piles[piles["law_holds"].astype(bool)]
+    others = answered[answered["force_law"] == BRIDGED]
+    if others.empty:
+        return ()
+    keys = ["alpha_deg", "d_m", "z0_over_d"]
+    found = len(own.merge(answered[keys].drop_duplicates(), on=keys))
+    return (
+        f"piles without an answer that holds when those by the bridged law count: "
+        f"{len(own) - found} of {len(own)}",
     )
 
 
