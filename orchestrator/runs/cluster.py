@@ -90,6 +90,7 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
     """
     jobqueue, distributed = _libraries()
     kind = getattr(jobqueue, SYSTEMS[queue.system])
+    cases.mkdir(exist_ok=True)
     settings = _settings(kind, queue.settings, cases.parent)
     with _opened(kind, settings) as cluster, distributed.Client(cluster) as client:
         cores = _cores(kind, settings)
