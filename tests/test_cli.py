@@ -58,14 +58,14 @@ def test_threshold_for_people_and_with_a_roughness_in_metres(orchestrator: Comma
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--diameter", "-1e-3"], ["--diameter", "greater than 0"]),
-        (["--diameter", "0"], ["--diameter", "greater than 0"]),
+        (["--diameter", "-1e-3"], ["--diameter", "greater than or equal"]),
+        (["--diameter", "0"], ["--diameter", "greater than or equal"]),
         (["--diameter", "nan"], ["--diameter", "finite"]),
         (["--diameter", "1e-3", "--density", "1"], ["--density", "not above"]),
         (["--diameter", "1e-3", "--slope", "31"], ["--slope", "30"]),
         (["--diameter", "1e-3", "--entrainment-angle", "61"], ["--entrainment-angle", "60"]),
         (["--diameter", "1e-3", "--roughness", "rough"], ["--roughness", "d/30"]),
-        (["--diameter", "1e-3", "--viscosity", "0"], ["--viscosity", "greater than 0"]),
+        (["--diameter", "1e-3", "--viscosity", "0"], ["--viscosity", "greater than or equal"]),
         (["--diameter", "1 mm"], ["--diameter", "1 mm"]),
         ([], ["--diameter"]),
     ],

@@ -13,6 +13,7 @@ from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict, failures
 from orchestrator.report import FIGURES, settings
 from orchestrator.runs.folder import Folder
+from orchestrator.tables import text
 
 PAGE = "comparison.html"
 NUMBERS = "comparison.csv"
@@ -68,7 +69,7 @@ def write(
 
 def _text(table: pd.DataFrame, digits: str) -> str:
     columns = ["solver", *table.columns.drop("solver")]
-    return table[columns].to_csv(index=False, float_format=digits)
+    return text.csv(table[columns], digits)
 
 
 def _verdicts(contenders: Sequence[Contender]) -> Iterator[dict[str, Any]]:

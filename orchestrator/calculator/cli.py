@@ -95,7 +95,8 @@ def _refusal(error: InputError, asked: Mapping[str, str]) -> InputError:
         for one in PARAMETERS
         if one.name in asked and (whole or one.option in said.where)
     ]
-    return InputError(said.what, where=said.where, remedy="; ".join(about) or said.remedy)
+    advice = about if whole and about else [said.remedy, *about]
+    return InputError(said.what, where=said.where, remedy="; ".join(filter(None, advice)))
 
 
 def _printed(

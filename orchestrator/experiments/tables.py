@@ -5,9 +5,10 @@ from collections.abc import Mapping
 import pandas as pd
 
 from orchestrator.runs.folder import Folder
+from orchestrator.tables import text
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder) -> None:
     """Write each table as CSV into an experiment's directory."""
     for name, table in tables.items():
-        folder.put(f"tables/{name}.csv", table.to_csv(index=False))
+        folder.put(f"tables/{name}.csv", text.csv(table))

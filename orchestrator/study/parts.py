@@ -12,9 +12,26 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
 from orchestrator.study.info import Info
+from orchestrator.study.ranges import (
+    Damping,
+    Density,
+    Diameter,
+    EntrainmentAngle,
+    FluidDensity,
+    FrictionAngle,
+    Gravity,
+    Height,
+    Length,
+    LiftCoefficient,
+    OverHeight,
+    Roughness,
+    Slope,
+    Speed,
+    Stiffness,
+    Viscosity,
+)
 
-Positive = Annotated[float, Field(gt=0)]
-Fraction = Annotated[float, Field(gt=0, le=1)]
+Fraction = Annotated[float, Field(ge=1e-6, le=1)]
 Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
@@ -47,47 +64,49 @@ class Part(BaseModel):
         use_attribute_docstrings=True,
     )
 
+    @field_validator("*", mode="after")
+    @classmethod
+    def _without_minus_zero(cls, value: Any) -> Any:
+        """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
+        return value + 0.0 if isinstance(value, float) else value
+
 
 class Fluid(Part):
     """The fluid; the default is the paper's air."""
 
-    density: Annotated[Positive, Info("fluid density", "ρ_f", "kg/m³", "rho_f_kg_m3")] = 1.0
+    density: Annotated[FluidDensity, Info("fluid density", "ρ_f", "kg/m³", "rho_f_kg_m3")] = 1.0
     """density of the fluid"""
-    viscosity: Annotated[Positive, Info("viscosity", "ν", "m²/s", "nu_m2_s")] = 1e-5
+    viscosity: Annotated[Viscosity, Info("viscosity", "ν", "m²/s", "nu_m2_s")] = 1e-5
     """kinematic viscosity that the grains feel"""
-    gravity: Annotated[Positive, Info("gravity", "g", "m/s²", "g_m_s2")] = GRAVITY
+    gravity: Annotated[Gravity, Info("gravity", "g", "m/s²", "g_m_s2")] = GRAVITY
     """acceleration of gravity"""
 
 
 class Grain(Part):
     """Equal spheres and their contact law."""
 
-    diameter: Annotated[Positive, Info("diameter", "d", "m", "d_m")]
+    diameter: Annotated[Diameter, Info("diameter", "d", "m", "d_m")]
     """grain diameter"""
-    density: Annotated[Positive, Info("grain density", "ρ_sol", "kg/m³", "rho_sol_kg_m3")] = 2500.0
+    density: Annotated[Density, Info("grain density", "ρ_sol", "kg/m³", "rho_sol_kg_m3")] = 2500.0
     """density of the grains"""
-    friction_angle_deg: Annotated[
-        float, Field(gt=0, lt=90), Info("friction angle", "φ", "°", "phi_deg")
-    ] = 35.0
+    friction_angle_deg: Annotated[FrictionAngle, Info("friction angle", "φ", "°", "phi_deg")] = 35.0
     """angle of Coulomb's friction between grains"""
-    stiffness: Annotated[
-        float, Field(ge=1e2, le=1e9), Info("stiffness", "K d/W", scope="DEM", about="answer")
-    ] = 1e4
+    stiffness: Annotated[Stiffness, Info("stiffness", "K d/W", scope="DEM", about="answer")] = 1e4
     """spring constant of a contact, normal and tangential, times the diameter over the weight"""
-    damping: Annotated[float, Field(ge=0, le=1), Info("damping", scope="DEM", about="answer")] = 0.1
+    damping: Annotated[Damping, Info("damping", scope="DEM", about="answer")] = 0.1
     """damping ratio of a collision"""
 
 
 class Bed(Part):
     """What every bed has. Subclasses say which grains it is made of."""
 
-    slope_deg: Annotated[float, Field(ge=0, lt=90), Info("slope", "α", "°", "alpha_deg")] = 0.0
+    slope_deg: Annotated[Slope, Info("slope", "α", "°", "alpha_deg")] = 0.0
     """slope of the bed; the flow goes up it"""
     entrainment_angle_deg: Annotated[
-        float, Field(gt=0, le=60), Info("entrainment angle", "β", "°", "beta_deg")
+        EntrainmentAngle, Info("entrainment angle", "β", "°", "beta_deg")
     ] = 60.0
     """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
-    roughness: Annotated[Positive, Info("roughness length", "z_0", "m", "z0_m")]
+    roughness: Annotated[Roughness, Info("roughness length", "z_0", "m", "z0_m")]
     """roughness length of the bed; a study file may write a part of the diameter: "d/30" """
 
 
@@ -103,7 +122,7 @@ class PileBed(Bed):
 
     kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
     """what the bed is made of"""
-    height: Annotated[Positive, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
+    height: Annotated[Height, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
     """height of the bed line that the flow goes over"""
     packing: Annotated[
         Packing,
@@ -119,11 +138,13 @@ class PileBed(Bed):
     ] = "aligned"
     """pattern of the pile's grains; random gaps are between grains of rows along the slope"""
     disorder: Annotated[
-        float, Field(gt=0, le=0.2), Info("disorder", unit="d", scope="disordered piles")
+        float, Field(ge=1e-6, le=0.2), Info("disorder", unit="d", scope="disordered piles")
     ] = 0.02
     """largest gap between two grains of the row under the four uppermost"""
     seed: Annotated[
-        int, Field(ge=0), Info("seed", scope="disordered piles and replicas", about="replica")
+        int,
+        Field(ge=0, le=10**9),
+        Info("seed", scope="disordered piles and replicas", about="replica"),
     ] = 0
     """which of the many disordered packings; of a lattice 0 is itself, any other a replica with
     grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
@@ -157,18 +178,18 @@ class Flow(Part):
     ] = "solve"
     """where the stress on a pile comes from"""
     speed: Annotated[
-        Positive,
+        Speed,
         Info("speed of the solve", "U_e", "m/s", "solve_u_e_m_s", "solved flows", "answer"),
     ] = 10.0
     """speed at the lid at which the flow over a pile is solved; the stress is scaled from it"""
     viscosity: Annotated[
-        Positive,
+        Viscosity,
         Info("viscosity of the solve", "ν", "m²/s", "solve_nu_m2_s", "solved flows", "answer"),
     ] = 1e-5
     """kinematic viscosity of that solve: the wall is rough, the fluid's own moves only the grain's
     Re*"""
     first_cell_height: Annotated[
-        Positive | None,
+        Length | None,
         Info(
             "first cell",
             unit="m",
@@ -185,12 +206,12 @@ class Flow(Part):
     ] = 40
     """cells of the mesh along each face of the pile"""
     expansion_ratio: Annotated[
-        float, Field(gt=1, le=2), Info("expansion ratio", scope="solved flows", about="answer")
+        float, Field(ge=1.01, le=2), Info("expansion ratio", scope="solved flows", about="answer")
     ] = 1.1
     """ratio of neighbouring cells up from the bed and away from the pile, with 40 cells along a
     face; it follows their number"""
     roughness: Annotated[
-        Positive | None,
+        Roughness | None,
         Info(
             "roughness length of the solve",
             "z_0",
@@ -246,7 +267,7 @@ class Forces(Part):
     ] = "bridged"
     """drag and lift on an exposed grain"""
     lift_coefficient: Annotated[
-        float, Field(ge=0), Info("lift coefficient", "α_s", column="alpha_s")
+        LiftCoefficient, Info("lift coefficient", "α_s", column="alpha_s")
     ] = LIFT_COEFFICIENT
     """lift coefficient"""
     stress: Annotated[
@@ -258,7 +279,7 @@ class Forces(Part):
         ),
     ] = "wall"
     """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
-    averaging_length: Annotated[Positive, Info("averaging length", unit="h", scope="piles")] = (
+    averaging_length: Annotated[OverHeight, Info("averaging length", unit="h", scope="piles")] = (
         1 / 40
     )
     """least length of bed that a grain's stress is averaged on: the crest's own value never
@@ -304,16 +325,18 @@ class Protocol(Part):
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
     another), or DEM"""
     load_increment: Annotated[
-        float, Field(gt=0, le=0.2), Info("load increment", "Δu*/u*", scope="DEM", about="answer")
+        float, Field(ge=1e-4, le=0.2), Info("load increment", "Δu*/u*", scope="DEM", about="answer")
     ] = 0.02
     """relative rise of u* from one load step to the next"""
     waiting_time: Annotated[
-        float, Field(ge=1), Info("waiting time", unit="√(d/g′)", scope="DEM", about="answer")
+        float,
+        Field(ge=1, le=1e4),
+        Info("waiting time", unit="√(d/g′)", scope="DEM", about="answer"),
     ] = 10.0
     """time without a passage of the displacement criterion that ends a load step"""
     displacement_criterion: Annotated[
         float,
-        Field(gt=0, le=0.5),
+        Field(ge=1e-3, le=0.5),
         Info("displacement criterion", unit="d", scope="DEM and peeling", about="answer"),
     ] = 0.3
     """displacement along the bed from which a grain counts as moved"""
@@ -328,7 +351,7 @@ class Protocol(Part):
     ] = (0.1, 0.3, 0.5, 0.7)
     """fractions of the exposed grains at which the thresholds of a pile are reported"""
     time_step: Annotated[
-        float, Field(gt=0, le=2), Info("time step", unit="√(m/K)", scope="DEM", about="answer")
+        float, Field(ge=1e-3, le=2), Info("time step", unit="√(m/K)", scope="DEM", about="answer")
     ] = 0.2
     """time step of the grains' integration"""
 

@@ -9,8 +9,9 @@ import itertools
 import os
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
 TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
 TIME_LIMIT_S = 3600.0
+LONGEST_S = 1e8
+"""Three years."""
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 MOST_SCENES = 100_000
@@ -81,7 +84,7 @@ class Study:
     cluster: dict[str, Any]
     text: str
 
-    @property
+    @cached_property
     def scenes(self) -> tuple[Scene, ...]:
         """Every scene once, in the file's order."""
         return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
@@ -118,7 +121,8 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
             remedy=f"presets: {known}; or give the path of a TOML file",
         )
     try:
-        text = path.read_text(encoding="utf-8")
+        # some editors begin a text with a mark of its encoding
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None
     # a file's name may be bytes that are no text; the page and the tables are text
@@ -153,19 +157,32 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError(f"not TOML: {error}", where=where) from None
     _known(data, TOP_KEYS, where, "")
     limit = data.get("time_limit", TIME_LIMIT_S)
-    if not isinstance(limit, int | float) or isinstance(limit, bool) or not limit > 0:
-        raise InputError(
-            f"{limit!r} is not a time in seconds above 0", where=f"{where}: time_limit"
-        )
+    check_time(limit, f"{where}: time_limit")
     title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    groups = tuple(_groups(data, where))
+    groups = tuple(_resolved(list(_groups(data, where))))
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
     cluster = _table(data, "cluster", where)
     return Study(name, title, groups, float(limit), tolerance, cluster, text)
+
+
+def check_time(value: Any, where: str) -> None:
+    """A time limit is one that a machine can wait for.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value <= LONGEST_S:
+        raise InputError(
+            f"{value!r} is not a time in seconds",
+            where=where,
+            remedy=f"above 0, and at most {LONGEST_S:g}",
+        )
 
 
 def check_tolerance(value: Any, where: str) -> None:
@@ -198,6 +215,14 @@ def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
         yield Group(str(item.get("name", f"group {number}")), scenes, place)
 
 
+def _resolved(groups: Sequence[Group]) -> Iterator[Group]:
+    """The groups with a force law for each of their scenes; for all of them at once."""
+    each = resolved([scene for group in groups for scene in group.scenes])
+    for group in groups:
+        decided = itertools.islice(each, len(group.scenes))
+        yield replace(group, scenes=tuple(itertools.chain.from_iterable(decided)))
+
+
 def _merged(
     data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
 ) -> dict[str, Any]:
@@ -213,7 +238,7 @@ def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]:
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> list[Scene]:
     axes = tables["axes"]
     for key, values in axes.items():
         part, dot, field = key.partition(".")
@@ -232,7 +257,24 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> Iterator[Scene]
     grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
-    yield from resolved([make_scene(parts, where) for parts in _points(tables, grid)])
+    scenes = [make_scene(parts, where) for parts in _points(tables, grid)]
+    if len(grid) > 1:
+        _check_distinct(scenes, grid, where)
+    return scenes
+
+
+def _check_distinct(scenes: list[Scene], grid: list[tuple[Any, ...]], where: str) -> None:
+    """See that each combination of values is a scene of its own."""
+    points: dict[str, tuple[Any, ...]] = {}
+    for scene, point in zip(scenes, grid, strict=True):
+        same = points.setdefault(scene.id, point)
+        if same is not point:
+            said, again = (", ".join(map(str, values)) for values in (same, point))
+            raise InputError(
+                f"{said} and {again} are one scene",
+                where=f"{where}: axes",
+                remedy="list each value once",
+            )
 
 
 def _points(

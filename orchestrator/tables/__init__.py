@@ -17,7 +17,7 @@ from orchestrator.fidelity import checks
 from orchestrator.plan import Plan
 from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
-from orchestrator.tables import piles, scenes, single
+from orchestrator.tables import piles, scenes, single, text
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter
 
@@ -80,11 +80,11 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
     """Put each table as CSV and as Parquet into a sub-directory, and what the columns mean."""
     for name, table in tables.items():
-        folder.put(f"{place}/{name}.csv", table.to_csv(index=False))
+        folder.put(f"{place}/{name}.csv", text.csv(table))
         folder.put(f"{place}/{name}.parquet", table.to_parquet(index=False))
     used = sorted({str(column) for table in tables.values() for column in table})
     rows = [{"column": column, "meaning": COLUMNS[column]} for column in used]
-    folder.put(f"{place}/columns.csv", pd.DataFrame(rows).to_csv(index=False))
+    folder.put(f"{place}/columns.csv", text.csv(pd.DataFrame(rows)))
 
 
 def read(folder: Folder, place: str) -> Tables:

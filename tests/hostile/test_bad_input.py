@@ -76,6 +76,8 @@ VALUES = {
     "negative": "-1.0",
     "nan": "nan",
     "inf": "inf",
+    "vast": "1e30",
+    "vaster": "1e308",
     "text": "'; rm -rf /'",
     "truth": "true",
     "list": "[[1]]",

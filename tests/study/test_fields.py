@@ -136,9 +136,9 @@ def test_reference_has_every_field(one: Quantity) -> None:
 def test_reference_says_ranges_and_defaults() -> None:
     rows = {line.split(" | ")[0]: line for line in reference.text().splitlines()}
     assert "| ≥ 0, < 90 | `0.0` |" in rows["| `slope_deg`"]
-    assert "| > 0 | worked out |" in rows["| `first_cell_height`"]
-    assert "| > 0 | none: required |" in rows["| `diameter`"]
-    assert "| > 0, ≤ 1 | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
+    assert "| ≥ 1e-12, ≤ 10000 | worked out |" in rows["| `first_cell_height`"]
+    assert "| ≥ 1e-07, ≤ 10 | none: required |" in rows["| `diameter`"]
+    assert "| ≥ 1e-06, ≤ 1 | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
     assert '| `"d/30"` | roughness length of the bed' in reference.text()
     assert '<br>`"RNGkEpsilon"`: RNG k-ε<br>' in rows["| `turbulence_model`"]
     assert '<br>`"upwind"`<br>' in rows["| `convection_scheme`"]

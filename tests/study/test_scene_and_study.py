@@ -149,14 +149,14 @@ BAD = [
     ("[grain]\n", "test.toml: grain.diameter", "missing"),
     ("[grain]\ndiameter = '1 mm'\n", "test.toml: grain.diameter", "number"),
     ("[grain]\ndiameter = true\n", "test.toml: grain.diameter", "number"),
-    ("[grain]\ndiameter = 0.0\n", "test.toml: grain.diameter", "greater than 0"),
-    ("[grain]\ndiameter = -1e-3\n", "test.toml: grain.diameter", "greater than 0"),
+    ("[grain]\ndiameter = 0.0\n", "test.toml: grain.diameter", "greater than or equal"),
+    ("[grain]\ndiameter = -1e-3\n", "test.toml: grain.diameter", "greater than or equal"),
     ("[grain]\ndiameter = nan\n", "test.toml: grain.diameter", "finite"),
     ("[grain]\ndiameter = 1e-3\ndensity = 0.5\n", "test.toml: grain.density", "float"),
     (
         "[grain]\ndiameter = 1e-3\n[bed]\nentrainment_angle_deg = 0.0\n",
         "test.toml: bed.entrainment_angle_deg",
-        "greater than 0",
+        "greater than or equal",
     ),
     (
         "[grain]\ndiameter = 1e-3\n[bed]\nentrainment_angle_deg = 61.0\n",

@@ -161,4 +161,4 @@ def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> 
         parts[part].pop(field, None)
         if value != DEFAULT:
             parts[part][field] = value
-    return tuple(resolved([make_scene(parts, where)]))
+    return next(resolved([make_scene(parts, where)]))
