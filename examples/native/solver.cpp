@@ -12,6 +12,7 @@
 #include <map>
 #include <regex>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 
 // scene.json is one flat object of numbers and words
@@ -41,16 +42,24 @@ struct Forces {
     double drag, lift;
 };
 
-// Drag and lift on an exposed grain, N: Eq. 2 (low) and Eq. 4 (high)
+// The positive root x of ustar^2 = viscous x + (x/rough)^2: the stress is carried together
+double bridge(double ustar, double viscous, double rough) {
+    return 2 * ustar * ustar / (viscous + std::hypot(viscous, 2 * ustar / rough));
+}
+
+// Drag and lift on an exposed grain, N: Eq. 2 (low), Eq. 4 (high) and the law that bridges them
 Forces forces(const Scene& s, double ustar) {
     const double d = s["d_m"], rho = s["rho_f_kg_m3"], nu = s["nu_m2_s"], r = s["z0_m"] / d;
-    if (s.word.at("force_law") == "low")
-        return {1.5 * pi * (1 + 2 * r) * rho * d * d * ustar * ustar,
-                s["alpha_s"] / 2 * (1 + 2 * r) * rho * std::pow(d * ustar, 3) / nu};
-    const double v = 2.5 * ((1 + r) * std::log1p(1 / r) - 1);
-    const double gradient = std::sqrt(2.5 * std::log1p(1 / r) * nu);
-    return {3 * pi * rho * nu * d * v * ustar * (1 + 0.15 * std::pow(v * ustar * d / nu, 0.687)),
-            s["alpha_s"] * v * gradient * rho * std::pow(d * ustar, 1.5)};
+    const std::string& law = s.word.at("force_law");
+    if (law != "low" && law != "high" && law != "bridged")
+        throw std::runtime_error("this solver has no force law " + law);
+    const double a = nu / (d / 2 + s["z0_m"]);
+    const double c = 2.5 * ((1 + r) * std::log1p(1 / r) - 1), g = 2.5 * std::log1p(1 / r) / d;
+    const double speed = law == "low" ? ustar * ustar / a : law == "high" ? ustar * c : bridge(ustar, a, c);
+    const double shear = law == "low" ? ustar * ustar / nu : law == "high" ? ustar * g : bridge(ustar, nu, g);
+    const double finite = law == "low" ? 1 : 1 + 0.15 * std::pow(speed * d / nu, 0.687);
+    return {3 * pi * rho * nu * d * speed * finite,
+            s["alpha_s"] * rho * std::sqrt(nu * shear) * d * d * speed};
 }
 
 // The u* at which the moment of the forces about the neighbour reaches that of the weight, m/s

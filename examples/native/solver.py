@@ -19,17 +19,29 @@ STEP = 0.05  # of the integration, in sqrt(m/K)
 
 
 def forces(scene, ustar):
-    """Drag and lift on an exposed grain, N (Eqs. 2 and 4)."""
+    """Drag and lift on an exposed grain, N (Eqs. 2 and 4, and the law that bridges them)."""
     d, rho, nu = scene["d_m"], scene["rho_f_kg_m3"], scene["nu_m2_s"]
-    r = scene["z0_m"] / d
+    speed, gradient = flow_around(scene, ustar)
+    drag = 3 * math.pi * rho * nu * d * speed
+    if scene["force_law"] != "low":
+        drag *= 1 + 0.15 * (speed * d / nu) ** 0.687
+    return drag, scene["alpha_s"] * rho * math.sqrt(nu * gradient) * d**2 * speed
+
+
+def flow_around(scene, ustar):
+    """Speed (m/s) and shear (1/s) of the flow around the grain."""
+    d, nu, r = scene["d_m"], scene["nu_m2_s"], scene["z0_m"] / scene["d_m"]
+    viscous = (nu / (d / 2 + scene["z0_m"]), nu)
+    rough = (KARMAN * ((1 + r) * math.log(1 + 1 / r) - 1), KARMAN * math.log(1 + 1 / r) / d)
     if scene["force_law"] == "low":
-        drag = 1.5 * math.pi * (1 + 2 * r) * rho * d**2 * ustar**2
-        lift = scene["alpha_s"] / 2 * (1 + 2 * r) * rho * d**3 * ustar**3 / nu
-        return drag, lift
-    v = KARMAN * ((1 + r) * math.log(1 + 1 / r) - 1)
-    drag = 3 * math.pi * rho * nu * d * v * ustar * (1 + 0.15 * (v * ustar * d / nu) ** 0.687)
-    gradient = math.sqrt(KARMAN * math.log(1 + 1 / r) * nu)
-    return drag, scene["alpha_s"] * v * gradient * rho * d**1.5 * ustar**1.5
+        return tuple(ustar**2 / a for a in viscous)
+    if scene["force_law"] == "high":
+        return tuple(ustar * c for c in rough)
+    if scene["force_law"] != "bridged":
+        raise SystemExit(f"this solver has no force law {scene['force_law']}")
+    # ustar^2 = a x + (x/c)^2: viscosity and turbulence carry the stress together
+    pairs = zip(viscous, rough, strict=True)
+    return tuple(2 * ustar**2 / (a + math.hypot(a, 2 * ustar / c)) for a, c in pairs)
 
 
 def threshold(scene):

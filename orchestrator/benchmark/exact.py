@@ -20,7 +20,7 @@ from orchestrator.benchmark.problem import (
 from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.study import closed_form as study_form
-from orchestrator.study.closed_form import forces, regime_of
+from orchestrator.study.closed_form import forces, law_holds
 from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
 
@@ -79,7 +79,7 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by load steps is the closed form's, and means something."""
-    return regime_of(scene) == scene.forces.law and scene.protocol.waiting_time >= LEAST_QUIET
+    return law_holds(scene) and scene.protocol.waiting_time >= LEAST_QUIET
 
 
 def _cell(scene: Scene) -> pd.DataFrame:

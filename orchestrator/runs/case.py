@@ -116,6 +116,7 @@ def prepare(case: Case, cases: Path) -> Path:
     What an interrupted run left there is thrown away: it is never trusted half-written. What else
     lies there, an input that someone has changed too, is kept aside: a solver might read it.
     """
+    cases.mkdir(parents=True, exist_ok=True)
     is_ours = _made_by(case, cases / case.name)
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
     assets.copy_template(case.template, directory)
