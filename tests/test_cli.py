@@ -165,7 +165,7 @@ def test_other_versions_of_the_solver(
 def test_an_interrupted_study_leaves_no_child_and_is_continued(
     orchestrator: Command, tmp_path: Path
 ) -> None:
-    slow = GRAINS.replace("load_increment = 0.05", "load_increment = 2e-5")
+    slow = GRAINS.replace("load_increment = 0.05", "load_increment = 1e-4, waiting_time = 60.0")
     (tmp_path / "grains.toml").write_text(slow)
     root = Path(__file__).parent.parent
     driver = subprocess.Popen(
