@@ -114,33 +114,37 @@ def _air(grains: pd.DataFrame, found: Sequence[Fit]) -> Iterator[str]:
         return
     at, water = MIDDLES[known], MEDIANS[known]
     air = np.exp(np.nanmean(np.log(np.array(curves)[:, known]), axis=0))
-    off = [_off(fit.line(at), air) for fit in found]
+    said = "; ".join(_from_air(found, at, air, water))
     yield (
         f"At the same Re* the published curves for air lie at {np.median(air / water):.2f} of the "
         f"medians for water ({(air / water).min():.2f} … {(air / water).max():.2f}, Re* = "
         f"{number(at[0])} … {number(at[-1])}; mean of their logarithms). The fluid enters every "
-        "law here by Re* alone, so one line has to serve both: the one that is widest in water is "
-        f"off the curves for air by a factor of {off[0]:.2f} in the median"
-        f"{_nearest(found, off, at, water)}."
+        f"law here by Re* alone, so one line has to serve both{f': {said}' if said else ''}."
     )
 
 
-def _nearest(found: Sequence[Fit], off: Sequence[float], at: FloatArray, water: FloatArray) -> str:
-    """The combination nearest to the curves for air, and how far it is from water."""
+def _from_air(
+    found: Sequence[Fit], at: FloatArray, air: FloatArray, water: FloatArray
+) -> Iterator[str]:
+    """How far the best line for water and the best for air are from the curves for air."""
+    off = [_off(fit.line(at), air) for fit in found]
+    if np.isfinite(off[0]):
+        yield f"the one widest in water is off the curves for air by a factor of {off[0]:.2f}"
     nearest = int(np.argmin(off))
-    if not np.isfinite(off[nearest]):
-        return ""
-    fit = found[nearest]
-    return (
-        f"; nearest to them is {fit.name}, off by {off[nearest]:.2f}, and off the medians for "
-        f"water by {_off(fit.line(at), water):.2f}"
-    )
+    if np.isfinite(off[nearest]):
+        fit = found[nearest]
+        yield (
+            f"nearest to them is {fit.name}, off by {off[nearest]:.2f}, and off the medians for "
+            f"water by {_off(fit.line(at), water):.2f} (medians of these factors)"
+        )
 
 
 def _off(tau: FloatArray, other: FloatArray) -> float:
-    """Median factor between two lines, above or below, where both are; infinite if nowhere."""
+    """Median factor between two lines, above or below; infinite if the first has less than half."""
     ratio = (tau / other)[np.isfinite(tau)]
-    return float(np.median(np.maximum(ratio, 1 / ratio))) if len(ratio) else np.inf
+    if 2 * len(ratio) < len(tau):
+        return np.inf
+    return float(np.median(np.maximum(ratio, 1 / ratio)))
 
 
 def _read(reynolds: FloatArray, shields: FloatArray) -> FloatArray:

@@ -119,6 +119,9 @@ def test_sentences_follow_from_the_numbers() -> None:
     assert "nearest to them is Zeng et al. 2009, with torque" in air
     (missed,) = [one for one in measured.sentences(grains, every[1:]) if "none is within" in one]
     assert missed.endswith("Re* = 0.1 … 35.")
+    narrow = Fit("low", BED, 0.01, 2.0)
+    (air,) = [one for one in measured.sentences(grains, [*every, narrow]) if "for air" in one]
+    assert "Eq. 2" not in air
     liquid = grains.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6)
     assert not any("air" in said for said in measured.sentences(liquid, every))
 
