@@ -79,7 +79,10 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by load steps is the closed form's, and means something."""
-    return law_holds(scene) and scene.protocol.waiting_time >= LEAST_QUIET
+    alone = study_form.closed_form(scene)
+    # else lift bears the weight before drag can push the grain up the slope: it rolls back
+    rolls = bool(alone.lift * np.tan(np.radians(scene.bed.slope_deg)) < alone.drag)
+    return law_holds(scene) and rolls and scene.protocol.waiting_time >= LEAST_QUIET
 
 
 def _cell(scene: Scene) -> pd.DataFrame:

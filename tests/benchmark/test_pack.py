@@ -11,12 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.benchmark import intake, pack, problem
+from orchestrator.benchmark import exact, intake, pack, problem
 from orchestrator.benchmark.export import export
 from orchestrator.benchmark.problem import EXPECTED
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
 from orchestrator.study import study
+from orchestrator.study.scene import Scene
 from tests.benchmark.conftest import ROOT
 from tests.conftest import Command
 
@@ -105,6 +106,23 @@ def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path, finished: 
     assert (grains["kind"] == "counted").sum() == told["count"]
     forced = grains["kind"].isin(["counted", "pushed"])
     assert grains.loc[forced, ["slope_deg", "ustar_over_ustar0"]].notna().all(axis=None)
+
+
+def _grain(**forces: object) -> Scene:
+    fields = "\n".join(f"{name} = {value!r}" for name, value in forces.items())
+    group = "[[group]]\nname = 'a'\nbed.slope_deg = 25.0"
+    text = f"[grain]\ndiameter = 3e-4\n[forces]\n{fields}\n{group}"
+    (scene,) = study.parse(text, name="a", where="a").scenes
+    return scene
+
+
+def test_pivots_are_of_every_law_that_holds_and_rolls_its_grain() -> None:
+    assert exact.has_pivot(_grain(law="bridged"))
+    # neither equation holds between Re* 3 and 30, and there Eq. 2 lifts the grain off
+    assert not exact.has_pivot(_grain(law="low"))
+    assert not exact.has_pivot(_grain(law="high"))
+    # a law that covers every Re* lifts it off, too, where its lift is large
+    assert not exact.has_pivot(_grain(law="bridged", lift_coefficient=50.0))
 
 
 def test_a_pivot_is_the_cell_of_its_case(all_levels: Path, finished: Path) -> None:
