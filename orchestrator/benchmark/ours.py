@@ -5,7 +5,7 @@ import re
 import resource
 import shutil
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,8 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.study import Group
 
 LIMIT_S = 3600.0
+CHECKS = ("collision", "incline", "sliding", "passing")
+"""Kinds that have a deck of their own: they need no scene of the study."""
 SAID = {
     "restitution": ("restitution", ""),
     "acceleration over g": ("acceleration_over_g", ""),
@@ -81,7 +83,7 @@ class Ours:
         """
         told = self.pack.scenes[name]
         kind = told["kind"]
-        if kind in ("collision", "incline", "sliding", "passing"):
+        if kind in CHECKS:
             return check(kind, told, self.root / "checks")
         scene = self._scene(name.partition("-")[2], kind)
         group = Group("benchmark", (scene,), str(self.pack.root / STUDY))
@@ -95,6 +97,19 @@ class Ours:
             ours = float(made["single_grain"]["ustar_m_s"].iloc[0])
             return _given(exact.pivot(scene, ours)), took
         return self._bed(kind, asked, planned)
+
+    def check(self, names: Iterable[str]) -> None:
+        """See that ours can answer some scenes, before any solver is started.
+
+        Raises
+        ------
+        InputError
+            If the pack is of another version of the program.
+        """
+        for name in names:
+            kind = self.pack.scenes[name]["kind"]
+            if kind not in CHECKS:
+                self._scene(name.partition("-")[2], kind)
 
     def _scene(self, name: str, kind: str) -> Scene:
         found = (self.of_flow if kind == "flow" else self.scenes).get(name)

@@ -151,8 +151,10 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
     _check_apart(out, chosen)
     solver = Solver(split(command), limits, _secrets(chosen, out))
     ours = Ours(chosen, out / OURS / "cases")
+    ours.check(names)
     with claim.claimed(out, claim.RESULTS, command) as folder:
         _check_answers(folder, chosen)
+        ours.root.mkdir(parents=True, exist_ok=True)  # no link is on the way: the claim has looked
         note = _note(out.name, confined.hides())
         print(note, file=sys.stderr, flush=True)
         watch = Watch(chosen, folder)

@@ -165,8 +165,13 @@ def _workplace() -> Iterator[Path]:
         # a program may have put a link in its place, closed it to its owner, or made it deeper
         # than Python can remove
         if not work.is_symlink():
-            subprocess.run(["chmod", "-R", "u+rwX", "--", work], capture_output=True)
-        subprocess.run(["rm", "-rf", "--", work], capture_output=True)
+            _clean("chmod", "-R", "u+rwX", "--", str(work))
+        _clean("rm", "-rf", "--", str(work))
+
+
+def _clean(*command: str) -> None:
+    # the system's own, whatever PATH says
+    subprocess.run(command, capture_output=True, env={"PATH": os.defpath})
 
 
 @contextlib.contextmanager
