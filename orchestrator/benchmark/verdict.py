@@ -276,5 +276,5 @@ def _message(told: Mapping[str, Any], rows: pd.DataFrame, wrong: pd.DataFrame) -
 
 
 def _number(value: Any) -> float:
-    # whoever made the results: a whole number may be larger than any float
-    return float(value) if isinstance(value, int | float) and abs(value) < 1e300 else math.nan
+    # times, steps, memory: whoever made the results, what none of them can be is not known
+    return float(value) if isinstance(value, int | float) and 0 < value < 1e300 else math.nan

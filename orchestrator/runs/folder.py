@@ -71,34 +71,27 @@ class Folder:
             self._make_way(name, self._is_put)
             path.unlink(missing_ok=True)
 
-    def clear(self, name: str, is_ours: Ours | None = None) -> Path:
+    def clear(self, name: str, is_ours: Ours) -> Path:
         """Make way for a sub-directory; what is not ours in it is kept aside as it lies.
 
         Parameters
         ----------
         name : str
             The sub-directory.
-        is_ours : callable, optional
-            Whether a file in it is ours, by its path from there; by default, if it was put or
-            adopted and has not changed since.
+        is_ours : callable
+            Whether a file in it is ours, by its path from there.
 
         Returns
         -------
         Path
             Where it goes: nothing is there now, in a directory that is.
         """
-        is_ours = is_ours or (lambda inner: self._is_put(f"{name}/{inner}"))
         with self._told(name):
             path = self._reach(name)
             _sweep(path, is_ours)
             if os.path.lexists(path):
                 self._keep(name)
         return path
-
-    def adopt(self, name: str) -> None:
-        """Take every file of a sub-directory as ours: a program wrote them for us."""
-        found = [path for path in self.path(name).rglob("*") if _is_file(path)]
-        self._add((digest_file(path), path.relative_to(self.root).as_posix()) for path in found)
 
     @contextlib.contextmanager
     def renewed(self, *places: str, but: Sequence[str] = ()) -> Iterator[None]:

@@ -84,7 +84,17 @@ def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "text", ["[]", "{", "3", '{"error": []}', '{"seconds": "x"}', f'{{"seconds": {10**400}}}']
+    "text",
+    [
+        "[]",
+        "{",
+        "3",
+        '{"error": []}',
+        '{"seconds": 0, "cpu_s": 0}',
+        '{"cpu_s": -1}',
+        '{"seconds": "x"}',
+        f'{{"seconds": {10**400}}}',
+    ],
 )
 def test_results_of_a_stranger(formulas: Path, tmp_path: Path, text: str) -> None:
     given = tmp_path / "given"

@@ -178,7 +178,7 @@ def test_how_grains_move(tmp_path: Path) -> None:
     [[group]]
     forces = { law = "high", lift_coefficient = 0.0 }
     [[group]]
-    forces = { law = "high", lift_coefficient = 200.0 }
+    forces = { law = "high", lift_coefficient = 100.0 }
     bed = { entrainment_angle_deg = 20.0 }
     """
     one = _cells(text)
@@ -187,4 +187,4 @@ def test_how_grains_move(tmp_path: Path) -> None:
         scene.forces.lift_coefficient: MODES[mode]
         for scene, mode in zip(one.scenes, motion.mode, strict=True)
     }
-    assert found == {0.0: "rolled", 200.0: "lifted"}
+    assert found == {0.0: "rolled", 100.0: "lifted"}
