@@ -142,6 +142,16 @@ def wait_for(seen: Callable[[], bool], driver: "subprocess.Popen[str]") -> bool:
     return True
 
 
+def pause(driver: "subprocess.Popen[str]") -> None:
+    """Pause a driver where it is, unless it has ended."""
+    driver.send_signal(signal.SIGSTOP)
+    while driver.poll() is None:
+        state = Path(f"/proc/{driver.pid}/stat").read_text().rpartition(")")[2].split()[0]
+        if state in "TZ":
+            return
+        time.sleep(0.001)
+
+
 def processes_in(folder: Path) -> dict[int, str]:
     """Names of the living processes that work below a folder, by their number."""
     found = {}

@@ -19,6 +19,7 @@ from tests.faults.bench import (
     ended,
     kill_program,
     none_left_in,
+    pause,
     processes_in,
     same_tables,
     wait_for,
@@ -26,6 +27,7 @@ from tests.faults.bench import (
 )
 from tests.faults.ledger import Ledger
 
+Driver = subprocess.Popen[str]
 Seen = Callable[[Path], bool]
 SINCE = ".started"
 """A file in the study's parent: what is younger is of the driver that runs."""
@@ -65,6 +67,25 @@ STAGES: dict[str, tuple[Seen, str]] = {
 """For each: how it is seen, and what there is only after its end."""
 
 
+def _stopped(pile: Bench, under: tuple[str, ...], seen: Seen, after: str) -> Driver:
+    """A driver that is paused within a stage."""
+    for _ in range(20):
+        # a run that ended before its driver did has to be run again to be seen
+        for path in pile.out.glob(after):
+            path.unlink()
+        (pile.folder / SINCE).touch()
+        driver = pile.start(under=under)
+        if wait_for(partial(seen, pile.out), driver):
+            pause(driver)
+            if not list(pile.out.glob(after)):
+                return driver
+            # it was faster than this test: once more
+            driver.send_signal(signal.SIGCONT)
+        code, said = ended(driver)
+        assert code == 0, said
+    raise AssertionError(f"no driver was met before {after}")
+
+
 KILL, TERM, INT = signal.SIGKILL, signal.SIGTERM, signal.SIGINT
 HUP, QUIT = signal.SIGHUP, signal.SIGQUIT
 NOHUP = ("nohup",)
@@ -89,13 +110,9 @@ def test_a_driver_that_is_ended_at_each_stage_in_turn(
         for number, (stage, (seen, after)) in stages:
             name = " ".join([number.name, "to the driver", *(f"under {word}" for word in under)])
             faults.enter_context(ledger.fault(name, stage))
-            # a run that ended before its driver did has to be run again to be seen
-            for path in pile.out.glob(after):
-                path.unlink()
-            (pile.folder / SINCE).touch()
-            driver = pile.start(under=under)
-            assert wait_for(partial(seen, pile.out), driver), stage
+            driver = _stopped(pile, under, seen, after)
             driver.send_signal(number)
+            driver.send_signal(signal.SIGCONT)
             code, said = ended(driver)
             assert none_left_in(pile.folder), stage
             if number == signal.SIGKILL:
@@ -161,9 +178,9 @@ def test_each_solver_that_is_killed_once_is_run_again(
     with contextlib.ExitStack() as faults:
         for program, stage in SOLVERS.items():
             faults.enter_context(ledger.fault(f"{number.name} to the solver", stage))
-            # the pause makes a program live long enough to be found
-            pause = 'case "$1" in -h*) ;; *) sleep 0.3;; esac'
-            programs = wrapper(pile.folder / "bin", program, pause)
+            # the wait makes a program live long enough to be found
+            wait = 'case "$1" in -h*) ;; *) sleep 0.3;; esac'
+            programs = wrapper(pile.folder / "bin", program, wait)
         driver = pile.start(programs=programs)
         cases = pile.out / "cases"
         for program, stage in SOLVERS.items():
@@ -192,12 +209,22 @@ def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(
 def test_a_process_that_draws_is_killed(pile: Bench, ledger: Ledger) -> None:
     with ledger.fault("SIGKILL to a worker", "figures"):
         driver = pile.start()
-        assert wait_for(lambda: any(pile.out.glob("figures/*")), driver)
-        os.kill(_workers(driver.pid, pile.folder)[0], signal.SIGKILL)
+        # before that, a child may be one that is about to become a solver
+        assert wait_for(lambda: any(pile.out.glob("tables/*.csv")), driver)
+        assert wait_for(partial(_kill_a_worker, driver.pid, pile.folder), driver)
         code, said = ended(driver)
         assert code == 0, said
         assert none_left_in(pile.folder)
         pile.check_finished()
+
+
+def _kill_a_worker(driver: int, folder: Path) -> bool:
+    """Kill a process that a driver has forked; whether there was one."""
+    for pid in _workers(driver, folder):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+            return True
+    return False
 
 
 def _workers(driver: int, folder: Path) -> list[int]:
@@ -214,9 +241,10 @@ def _workers(driver: int, folder: Path) -> list[int]:
 
 def test_the_whole_session_gets_the_users_interrupt(pile: Bench, ledger: Ledger) -> None:
     with ledger.fault("SIGINT to all", "figures"):
-        driver = pile.start()
-        assert wait_for(lambda: any(pile.out.glob("figures/*")), driver)
+        seen, after = STAGES["figures"]
+        driver = _stopped(pile, (), seen, after)
         os.killpg(driver.pid, signal.SIGINT)
+        os.killpg(driver.pid, signal.SIGCONT)
         code, said = ended(driver)
         assert code == 130, said
         assert none_left_in(pile.folder)
