@@ -140,7 +140,7 @@ def run(seconds):
 
 
 def bed(scene, case):
-    """The grains of a pivot or a pile: hold after load step."""
+    """The grains of a pivot or a pile: load step after load step."""
     global protocol
     asked = door.Bed(case)
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))

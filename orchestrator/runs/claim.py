@@ -56,7 +56,7 @@ KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 
 @contextlib.contextmanager
 def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
-    """Make a directory, or take it up again, and load step it while the block runs.
+    """Make a directory, or take it up again, and hold it while the block runs.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
             raise InputError(
                 f"the output directory cannot be used: {error.strerror or error}",
                 where=str(error.filename or root),
-                remedy="choose another with --out",
+                remedy="choose another directory",
             ) from None
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(LOCK, RECORD, kind.marker, *kind.names)
@@ -110,7 +110,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
                 f"the directory holds the {found['kind']} {found['name']}, "
                 f"not the {kind.word} {name}",
                 where=str(folder.root),
-                remedy="choose another with --out",
+                remedy="choose another directory",
             )
     if told(folder.root, kind) is None and not any(_matches(folder.root, kind.traces)):
         _check_empty(folder.root, kind)
@@ -131,7 +131,7 @@ def _check_empty(root: Path, kind: Kind) -> None:
         raise InputError(
             f"the output directory holds something that is not a {kind.word}: {strange[0]}",
             where=str(root),
-            remedy="choose an empty or a new one with --out",
+            remedy="choose an empty or a new one",
         )
 
 

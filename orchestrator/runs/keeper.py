@@ -17,13 +17,13 @@ from collections.abc import Iterator
 from typing import Any, NoReturn
 
 LOOK_S = 0.25
-"""Between two samples at what the program takes."""
+"""Between two looks at what the program takes."""
 WALK_S = 1.0
 """Least time between two looks at its files, which may be many."""
 FAREWELL_S = 10.0
 """Most that is spent on ending processes that start others."""
 FILES = 100_000
-"""Most files of a program: a sample at them must end."""
+"""Most files of a program: a look at them must end."""
 ENTRY = 4096
 """A file takes this much of a disk even if it is empty, bytes."""
 _SET_DEATH_SIGNAL, _SET_DUMPABLE, _SET_SUBREAPER = 1, 4, 36
