@@ -1,8 +1,8 @@
 """Where the grains of a bed lie, which of them are exposed, and which may move.
 
-A packing is a lattice of equal spheres in the plane of the flow: rows in which the centres are
-``2 d cos(beta)`` apart, each row resting in the pockets of the one below, ``d sin(beta)`` lower.
-Lengths here are in diameters, with the foot of the form at the origin.
+A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart, each row
+resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are in diameters d of
+the scene, with the foot of the form at the origin; each grain has a size of its own.
 """
 
 from dataclasses import dataclass
@@ -43,6 +43,8 @@ class Packing:
     ----------
     centres : ndarray, shape (n, 2)
         x and z of each centre.
+    sizes : ndarray, shape (n,)
+        Diameter of each grain, d.
     mobile : ndarray of bool, shape (n,)
         May move; the others are fixed.
     windward, lee : ndarray of bool, shape (n,)
@@ -52,6 +54,7 @@ class Packing:
     """
 
     centres: FloatArray
+    sizes: FloatArray
     mobile: BoolArray
     windward: BoolArray
     lee: BoolArray
@@ -116,6 +119,7 @@ def pile(
     shift = np.random.default_rng(seed).uniform(-aside, aside, centres.shape)
     return Packing(
         centres=centres + shift,
+        sizes=np.ones(len(centres)),
         mobile=np.append(mobile, rest),
         windward=np.append(windward, rest),
         lee=np.append(lee, rest),

@@ -86,11 +86,11 @@ def has_pivot(scene: Scene) -> bool:
 
 
 def _cell(scene: Scene) -> pd.DataFrame:
-    centres, _ = cells.cell(scene)
-    return _three(centres * scene.grain.diameter, scene.grain.diameter)
+    centres, _, sizes = cells.cell(scene)
+    return _three(centres * scene.grain.diameter, sizes * scene.grain.diameter)
 
 
-def _three(centres: Any, diameter: float) -> pd.DataFrame:
+def _three(centres: Any, diameter: Any) -> pd.DataFrame:
     """Two fixed grains and a mobile one; centres in m, shape (3, 2)."""
     x, z = centres.T
     kinds = ["fixed", "fixed", "mobile"]

@@ -29,7 +29,8 @@ WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 LAST = 1.2
 """Flow of the last load step: a grain that still lies then contradicts the closed form by 20 %."""
 SPACING = 3.0
-"""Of the cells across the flow, diameters: grains of two cells never meet."""
+"""Of the cells across the flow, in diameters of the largest grain: grains of two cells never
+meet."""
 UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
 BLOCK = 512
@@ -66,6 +67,7 @@ class SingleGrainCase(GrainCase):
         rules = self.scenes[0].protocol
         parameters = {
             "diameter": DIAMETER,
+            "smallest": 1.0,
             "density": DENSITY,
             "gravity": GRAVITY,
             **protocol.contact(self._grain, rules),
@@ -92,11 +94,13 @@ class SingleGrainCase(GrainCase):
     def _grains(self) -> deck.GrainTable:
         cells = [cell(scene) for scene in self.scenes]
         centres = np.concatenate([one[0] for one in cells]) * DIAMETER
-        across = np.repeat(np.arange(len(cells)) * SPACING * DIAMETER, 3)
+        sizes = np.concatenate([one[2] for one in cells])
+        across = np.repeat(np.arange(len(cells)) * SPACING * sizes.max() * DIAMETER, 3)
         return deck.GrainTable(
             position=np.column_stack([centres[:, 0], across, centres[:, 1]]),
             kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
             along=np.repeat([one[1] for one in cells], 3, axis=0),
+            sizes=sizes,
             diameter=DIAMETER,
             density=DENSITY,
         )
@@ -109,14 +113,20 @@ class SingleGrainCase(GrainCase):
         return pushes
 
 
-def cell(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Two neighbours and the grain, d, shape (3, 2); the unit vector up the slope, shape (2,)."""
+def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Two neighbours and the grain: their centres, shape (3, 2), and sizes, in its diameter.
+
+    Between them the unit vector up the slope, shape (2,).
+    """
     alpha = np.radians(scene.bed.slope_deg)
-    beta = np.radians(scene.bed.entrainment_angle_deg)
+    beta, apart = np.radians(scene.pocket_angle_deg), (1 + 1 / scene.bed.relative_size) / 2
     along = np.array([np.cos(alpha), np.sin(alpha)])
     outward = np.array([-along[1], along[0]])
-    behind, ahead = (side * np.cos(beta) * along - np.sin(beta) * outward for side in (-1, 1))
-    return np.vstack([behind, ahead, [0.0, 0.0]]), along
+    behind, ahead = (
+        apart * (side * np.cos(beta) * along - np.sin(beta) * outward) for side in (-1, 1)
+    )
+    neighbour = 1 / scene.bed.relative_size
+    return np.vstack([behind, ahead, [0.0, 0.0]]), along, np.array([neighbour, neighbour, 1.0])
 
 
 def flows(scene: Scene) -> FloatArray:
@@ -126,7 +136,7 @@ def flows(scene: Scene) -> FloatArray:
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
     """Force of the flow on the scene's grain at such flows, N, shape (flows, 2)."""
-    _, along = cell(scene)
+    _, along, _ = cell(scene)
     ustar = rising * float(closed_form(scene).friction_velocity)
     drag, lift = (one(ustar) for one in forces(scene))
     return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])

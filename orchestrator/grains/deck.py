@@ -13,7 +13,8 @@ FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
 """Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only."""
 
 MEANING = {
-    "diameter": "m",
+    "diameter": "d of the units below; of every grain, or the median of a mixture, m",
+    "smallest": "diameter of the smallest grain that may move, d",
     "density": "kg/m3",
     "gravity": "of the submerged grain, m/s2",
     "friction": "tan(phi)",
@@ -47,13 +48,16 @@ class GrainTable:
         One of FIXED, MOBILE, COUNTED, PUSHED.
     along : ndarray, shape (n, 2)
         Unit vector downstream along the bed, in which displacement is counted.
+    sizes : ndarray, shape (n,)
+        Diameter of each grain over `diameter`.
     diameter, density : float
-        Of every grain, m and kg/m3.
+        The diameter d of the deck's units, m; the density of every grain, kg/m3.
     """
 
     position: FloatArray
     kind: NDArray[np.int64]
     along: FloatArray
+    sizes: FloatArray
     diameter: float
     density: float
 
@@ -61,6 +65,11 @@ class GrainTable:
     def counted_ids(self) -> NDArray[np.int64]:
         """Ids (from 1) of the grains whose motion is counted."""
         return np.flatnonzero(self.kind == COUNTED) + 1
+
+    @property
+    def smallest(self) -> float:
+        """Diameter of the smallest grain that may move, d."""
+        return float(self.sizes[self.kind != FIXED].min())
 
     @property
     def last_mobile(self) -> float:
@@ -111,7 +120,9 @@ def write(
     counted = np.flatnonzero(grains.kind == COUNTED)
     for place, axis in enumerate("xz"):
         _write_sets(directory / f"force.{axis}.txt", pushed, force[:, pushed, place])
-        _write_sets(directory / f"along.{axis}.txt", counted, grains.along[None, counted, place])
+        # in these units displacement is one in the grain's own diameter
+        own = grains.along[None, counted, place] / grains.sizes[counted]
+        _write_sets(directory / f"along.{axis}.txt", counted, own)
 
 
 def _write_sets(path: Path, grains: NDArray[np.int64], sets: FloatArray) -> None:
@@ -130,12 +141,11 @@ def _data_file(grains: GrainTable, margin: float) -> str:
     bounds = "".join(
         f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in zip(low, high, "xyz", strict=True)
     )
-    size = f"{grains.diameter!r} {grains.density!r}"
+    diameters = (grains.diameter * grains.sizes).tolist()
+    columns = zip(grains.kind.tolist(), diameters, grains.position.tolist(), strict=True)
     rows = "".join(
-        f"{number} {kind} {size} {x!r} {y!r} {z!r}\n"
-        for number, (kind, (x, y, z)) in enumerate(
-            zip(grains.kind.tolist(), grains.position.tolist(), strict=True), 1
-        )
+        f"{number} {kind} {diameter!r} {grains.density!r} {x!r} {y!r} {z!r}\n"
+        for number, (kind, diameter, (x, y, z)) in enumerate(columns, 1)
     )
     head = f"grains: id type diameter density x y z\n\n{len(grains.kind)} atoms\n4 atom types\n\n"
     return f"{head}{bounds}\nAtoms\n\n{rows}"

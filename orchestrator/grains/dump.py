@@ -26,7 +26,8 @@ class Track:
     Attributes
     ----------
     travel, rise : ndarray
-        Displacement since the settling, along the bed downstream and normal to it, diameters.
+        Displacement since the settling, along the bed downstream and normal to it, in the grain's
+        own diameter.
     roll : ndarray
         Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
     """
@@ -40,7 +41,7 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     """Read what the counted grains did at each sample; arguments as in `read_passage`."""
     ids = grains.counted_ids
     state = read_passage(directory, ids, samples)
-    return _track(state, grains.along[ids - 1], grains.diameter)
+    return _track(state, grains.along[ids - 1], grains.diameter * grains.sizes[ids - 1])
 
 
 def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> FloatArray:
@@ -111,7 +112,7 @@ def _there(
     return found
 
 
-def _track(state: FloatArray, along: FloatArray, diameter: float) -> Track:
+def _track(state: FloatArray, along: FloatArray, diameter: FloatArray) -> Track:
     right, up = (state[:2, 1:] - state[:2, :1]) / diameter
     vx, vz, spin = state[2:, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):

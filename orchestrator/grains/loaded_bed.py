@@ -14,7 +14,7 @@ from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains.loading import Loading
+from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -136,8 +136,18 @@ class LoadedBed:
         Exposed grains that may move carry a force.
         """
         pushed = self.packing.mobile & (self.packing.windward | self.packing.lee)
-        drag, lift = forces(self.scene)
+        drag, lift = forces(self.scene, self.packing.sizes)
         return Loading(drag, lift, np.where(pushed, ratio, 0.0), self.tangents, self.normals)
+
+    @cached_property
+    def force_tables(self) -> list[ForceTable]:
+        """For each of the n grains, its forces over its own weight."""
+        unit, weight = float(closed_form(self.scene).friction_velocity), self.scene.weight
+        tables = {
+            size: ForceTable(*forces(self.scene, size), weight * size**3, unit)
+            for size in np.unique(self.packing.sizes).tolist()
+        }
+        return [tables[size] for size in self.packing.sizes.tolist()]
 
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""

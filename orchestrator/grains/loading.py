@@ -25,7 +25,7 @@ class Loading:
     Attributes
     ----------
     drag, lift : callable
-        The force law of the scene.
+        The force law of the scene: of n local friction velocities, or of one.
     ratio : ndarray, shape (n,)
         Local friction velocity over the undisturbed one; negative where the flow runs back, 0 for
         a grain that carries no force.
@@ -42,12 +42,11 @@ class Loading:
 
     def at(self, ustar0: float) -> FloatArray:
         """Force on each grain (N) at an undisturbed friction velocity (m/s), shape (n, 2)."""
-        force = np.zeros((len(self.ratio), 2))
         loaded = self.ratio != 0
-        local, turned = np.abs(self.ratio[loaded]) * ustar0, np.sign(self.ratio[loaded])
-        drag, lift = self.drag(local) * turned, self.lift(local)
-        force[loaded] = drag[:, None] * self.along[loaded] + lift[:, None] * self.outward[loaded]
-        return force
+        local = np.where(loaded, np.abs(self.ratio), 1.0) * ustar0
+        drag, lift = self.drag(local) * np.sign(self.ratio), self.lift(local)
+        force = drag[:, None] * self.along + lift[:, None] * self.outward
+        return np.where(loaded[:, None], force, 0.0)
 
     def in_steps(self, flows: Sequence[float]) -> FloatArray:
         """Force on each grain at several undisturbed friction velocities, shape (steps, n, 2)."""

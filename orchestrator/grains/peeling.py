@@ -10,22 +10,23 @@ With one grain on two neighbours this is the pivot of Eq. 1.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.loading import ForceTable, Loading
-from orchestrator.study.closed_form import closed_form
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Place = tuple[float, float]
 
 TOUCH = 1e-3
-"""Two grains closer than this touch, d."""
-REACH = 2.4
-"""Only grains this near can touch one on its way to the displacement criterion, d."""
+"""Two grains closer than this touch, of the mean of their diameters."""
+REACH = 1.4
+"""Only grains whose surfaces are this near can touch one on its way to the displacement criterion,
+of its own diameter."""
 MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
 
@@ -40,22 +41,22 @@ def of_bed(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     ratio : ndarray, shape (n,)
         Local friction velocity over the undisturbed one, signed.
     """
-    scene, loading = bed.scene, bed.loading(ratio)
-    alone = float(closed_form(scene).friction_velocity)
     found = flows(
         bed.packing.centres,
-        loading,
-        ForceTable(loading.drag, loading.lift, scene.weight, alone),
+        bed.packing.sizes,
+        bed.loading(ratio),
+        bed.force_tables,
         along=bed.tangents,
-        marker=scene.protocol.displacement_criterion,
+        marker=bed.scene.protocol.displacement_criterion,
     )
     return np.asarray(found[bed.packing.windward])
 
 
 def flows(
     centres: FloatArray,
+    sizes: FloatArray,
     loading: Loading,
-    table: ForceTable,
+    tables: Sequence[ForceTable],
     *,
     along: FloatArray,
     marker: float,
@@ -65,35 +66,37 @@ def flows(
     Parameters
     ----------
     centres : ndarray, shape (n, 2)
-        x and z of each grain, diameters.
+        x and z of each grain, in one unit of length d.
+    sizes : ndarray, shape (n,)
+        Diameter of each grain, d.
     loading : Loading
         The forces; grains that carry one may leave.
-    table : ForceTable
-        Its force law over the submerged weight.
+    tables : sequence of ForceTable
+        For each grain its force law over its own submerged weight.
     along : ndarray, shape (n, 2)
         Unit vectors downstream along the bed.
     marker : float
-        Displacement along it that counts as motion, diameters.
+        Displacement along it that counts as motion, of the grain's own diameter.
 
     Returns
     -------
     ndarray, shape (n,)
         Undisturbed friction velocity, m/s; infinite for grains that never leave.
     """
-    places = [(x, z) for x, z in centres.tolist()]
-    near = dict(_neighbours(centres, loading.ratio != 0))
+    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
+    near = dict(_neighbours(centres, sizes, loading.ratio != 0))
     ratio, tangents = loading.ratio.tolist(), loading.along.tolist()
     normals, ups = loading.outward.tolist(), along.tolist()
     present = np.ones(len(centres), bool)
     left = np.full(len(centres), np.inf)
 
     next_flow = np.full(len(centres), np.inf)
-    ways: dict[int, list[Place]] = {}
+    ways: dict[int, list[Disc]] = {}
 
     def sample(i: int) -> None:
-        others = [places[k] for k in near[i] if present[k]]
-        push = _Push(table, ratio[i], tangents[i], normals[i])
-        next_flow[i], ways[i] = _Climb(places[i], others, push, ups[i], marker).needed()
+        others = [grains[k] for k in near[i] if present[k]]
+        push = _Push(tables[i], ratio[i], tangents[i], normals[i])
+        next_flow[i], ways[i] = _Climb(grains[i], others, push, ups[i], marker).needed()
 
     for i in near:
         sample(i)
@@ -105,21 +108,57 @@ def flows(
         left[i], next_flow[i], present[i] = reached, np.inf, False
         for k in near[i]:
             # whom it would not have rolled over was not on its way
-            if k in near and present[k] and places[i] in ways[k]:
+            if k in near and present[k] and grains[i] in ways[k]:
                 sample(k)
     return left
 
 
-def _neighbours(centres: FloatArray, chosen: BoolArray) -> Iterator[tuple[int, list[int]]]:
+def pivots(
+    centres: FloatArray,
+    sizes: FloatArray,
+    loading: Loading,
+    tables: Sequence[ForceTable],
+) -> FloatArray:
+    """The flow at which each grain by itself begins to roll over its foremost contact.
+
+    Arguments and result as in `flows`: nobody leaves before, nobody stands in the way.
+    """
+    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
+    found = np.full(len(centres), np.inf)
+    for i, near in _neighbours(centres, sizes, loading.ratio != 0):
+        push = _Push(tables[i], *(float(loading.ratio[i]), loading.along[i], loading.outward[i]))
+        climb = _Climb(grains[i], [grains[k] for k in near], push, loading.along[i], 0.0)
+        found[i] = climb.first()
+    return found
+
+
+def _neighbours(
+    centres: FloatArray, sizes: FloatArray, chosen: BoolArray
+) -> Iterator[tuple[int, list[int]]]:
     """Some grains, each with those within its reach, in order of their numbers."""
     order = np.argsort(centres[:, 0], kind="stable")
-    x, z = centres[order].T
+    (x, z), own = centres[order].T, sizes[order]
     ranks = np.flatnonzero(chosen[order])
-    first, last = np.searchsorted(x, x[ranks] - REACH), np.searchsorted(x, x[ranks] + REACH)
+    far = REACH * own + (own + own.max()) / 2
+    first, last = (np.searchsorted(x, x[ranks] + side * far[ranks]) for side in (-1, 1))
     for rank, a, b in zip(ranks.tolist(), first.tolist(), last.tolist(), strict=True):
-        near = np.hypot(x[a:b] - x[rank], z[a:b] - z[rank]) < REACH
+        apart = np.hypot(x[a:b] - x[rank], z[a:b] - z[rank])
+        near = apart < REACH * own[rank] + (own[a:b] + own[rank]) / 2
         near[rank - a] = False
         yield int(order[rank]), np.sort(order[a:b][near]).tolist()
+
+
+class Disc(NamedTuple):
+    """A grain in the plane."""
+
+    x: float
+    z: float
+    radius: float
+
+    @property
+    def place(self) -> Place:
+        """Its centre."""
+        return self.x, self.z
 
 
 @dataclass(frozen=True)
@@ -140,17 +179,22 @@ class _Push:
 
 @dataclass(frozen=True)
 class _Climb:
-    """The way of one grain over its neighbours; lengths in d, forces over W."""
+    """The way of one grain over its neighbours; lengths in d, forces over its weight."""
 
-    start: Place
-    others: Sequence[Place]
+    start: Disc
+    others: Sequence[Disc]
     push: _Push
     along: Sequence[float]
     marker: float
 
-    def needed(self) -> tuple[float, list[Place]]:
+    def first(self) -> float:
+        """The least flow at which it begins to roll over its foremost contact; 0 without any."""
+        pivot = self._foremost()
+        return self._flow_to_leave(self.start.place, pivot) if pivot else 0.0
+
+    def needed(self) -> tuple[float, list[Disc]]:
         """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
-        place, pivot = self.start, self._foremost()
+        place, pivot = self.start.place, self._foremost()
         flow, way = 0.0, []
         while pivot is not None:
             way.append(pivot)
@@ -163,34 +207,46 @@ class _Climb:
             place, pivot = met
         return flow, way
 
-    def _foremost(self) -> Place | None:
+    def _foremost(self) -> Disc | None:
         """The contact that lies farthest round towards downstream, from below."""
-        touching = (k for k in self.others if math.dist(k, self.start) < 1 + TOUCH)
-        return max(touching, key=lambda k: _lean(self.start, k), default=None)
+        here = self.start.place
+        touching = (
+            k for k in self.others if math.dist(k.place, here) < (1 + TOUCH) * self._reach(k)
+        )
+        return max(touching, key=lambda k: _lean(here, k.place), default=None)
 
-    def _flow_to_leave(self, place: Place, pivot: Place) -> float:
+    def _reach(self, other: Disc) -> float:
+        """Distance of the centres where the grain touches another."""
+        return self.start.radius + other.radius
+
+    def _flow_to_leave(self, place: Place, pivot: Disc) -> float:
         """The flow at which the resultant passes through the contact: no moment about it."""
-        lean = _lean(place, pivot)
+        lean = _lean(place, pivot.place)
         return self.push.flow_to_reach(math.cos(lean), math.sin(lean), math.sin(lean))
 
-    def _next(self, place: Place, pivot: Place) -> tuple[Place, Place] | None:
+    def _next(self, place: Place, pivot: Disc) -> tuple[Place, Disc] | None:
         """Where the grain, rolling over its pivot, meets another before the criterion; which."""
-        turned = math.atan2(place[1] - pivot[1], place[0] - pivot[0])
+        turned = math.atan2(place[1] - pivot.z, place[0] - pivot.x)
         meetings = [m for m in self._meetings(pivot) if -1.0 < m[0] < turned - 1e-9]
         if not meetings:
             return None
         angle, met = max(meetings)
-        at = (pivot[0] + math.cos(angle), pivot[1] + math.sin(angle))
-        travel = sum((a - b) * t for a, b, t in zip(at, self.start, self.along, strict=True))
-        return (at, met) if travel < self.marker - 1e-9 else None
+        arm = self._reach(pivot)
+        at = (pivot.x + arm * math.cos(angle), pivot.z + arm * math.sin(angle))
+        start = self.start.place
+        travel = sum((a - b) * t for a, b, t in zip(at, start, self.along, strict=True))
+        own = 2 * self.start.radius
+        return (at, met) if travel < (self.marker - 1e-9) * own else None
 
-    def _meetings(self, pivot: Place) -> Iterator[tuple[float, Place]]:
+    def _meetings(self, pivot: Disc) -> Iterator[tuple[float, Disc]]:
         """Direction from the pivot at which a grain on it would touch another, for each other."""
+        arm = self._reach(pivot)
         for other in self.others:
-            apart = math.dist(other, pivot)
-            if 0 < apart < 2:
-                direction = math.atan2(other[1] - pivot[1], other[0] - pivot[0])
-                angle = direction + math.acos(apart / 2)
+            apart, touch = math.dist(other.place, pivot.place), self._reach(other)
+            if abs(arm - touch) < apart < arm + touch:
+                direction = math.atan2(other.z - pivot.z, other.x - pivot.x)
+                cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
+                angle = direction + math.acos(cosine)
                 yield (angle if angle <= math.pi else angle - 2 * math.pi), other
 
 

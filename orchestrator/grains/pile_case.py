@@ -81,6 +81,7 @@ class PileCase(GrainCase):
         ceiling = (MARGIN + 0.5) / line.tangents[line.windward, 0]
         return {
             "diameter": d,
+            "smallest": self._grains.smallest,
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
             **protocol.contact(self.scene.grain, rules),
@@ -115,6 +116,7 @@ class PileCase(GrainCase):
             position=np.column_stack([x, np.zeros_like(x), z]),
             kind=kind,
             along=self.loaded.tangents,
+            sizes=bed.sizes,
             diameter=d,
             density=self.scene.grain.density,
         )

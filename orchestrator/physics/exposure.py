@@ -56,6 +56,10 @@ class Exposure:
         """The shape that the fields broadcast to."""
         return np.broadcast_shapes(*(field.shape for field in self.fields))
 
+    def take(self, number: int) -> "Exposure":
+        """One grain of those that the fields broadcast to."""
+        return Exposure(*(np.broadcast_to(field, self.shape)[..., number] for field in self.fields))
+
     @property
     def ratio(self) -> FloatArray:
         """Roughness length over diameter, z0/d."""

@@ -32,10 +32,13 @@ def law(scene: Scene) -> ForceLaw:
     return LAWS[scene.forces.law]
 
 
-def exposure(scene: Scene) -> Exposure:
-    """What the force on a grain of a scene depends on besides the friction velocity."""
+def exposure(scene: Scene, sizes: ArrayLike = 1.0) -> Exposure:
+    """What the force on a grain of a scene depends on besides the friction velocity.
+
+    Grains of other sizes are given by their diameters, in that of the scene.
+    """
     return Exposure(
-        scene.grain.diameter,
+        scene.grain.diameter * np.asarray(sizes, float),
         scene.bed.roughness,
         scene.fluid.density,
         scene.fluid.viscosity,
@@ -43,9 +46,9 @@ def exposure(scene: Scene) -> Exposure:
     )
 
 
-def forces(scene: Scene) -> tuple[Force, Force]:
-    """Drag and lift on an exposed grain of a resolved scene."""
-    here, there = law(scene), exposure(scene)
+def forces(scene: Scene, sizes: ArrayLike = 1.0) -> tuple[Force, Force]:
+    """Drag and lift on an exposed grain of a resolved scene, or on grains of some sizes."""
+    here, there = law(scene), exposure(scene, sizes)
     return partial(here.drag, exposure=there), partial(here.lift, exposure=there)
 
 
@@ -82,7 +85,7 @@ def _grain(scene: Scene) -> tuple[float, ...]:
         scene.forces.lift_coefficient,
         scene.grain.density,
         scene.bed.slope_deg,
-        scene.bed.entrainment_angle_deg,
+        scene.pocket_angle_deg,
         scene.fluid.gravity,
     )
 

@@ -79,6 +79,7 @@ def _is_disordered(scene: Scene) -> bool:
 
 APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
+    "single grains": lambda scene: not isinstance(scene.bed, PileBed),
     "piles": lambda scene: isinstance(scene.bed, PileBed),
     "disordered piles": _is_disordered,
     "disordered piles and replicas": lambda scene: (

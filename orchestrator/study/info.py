@@ -6,6 +6,7 @@ from typing import Literal
 
 Scope = Literal[
     "every scene",
+    "single grains",
     "piles",
     "disordered piles",
     "disordered piles and replicas",

@@ -24,6 +24,7 @@ from orchestrator.study.ranges import (
     Length,
     LiftCoefficient,
     OverHeight,
+    RelativeSize,
     Roughness,
     Slope,
     Speed,
@@ -107,7 +108,16 @@ class Bed(Part):
     ] = 60.0
     """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
     roughness: Annotated[Roughness, Info("roughness length", "z_0", "m", "z0_m")]
-    """roughness length of the bed; a study file may write a part of the diameter: "d/30" """
+    """roughness length of the bed; a study file may write a part of the diameter of the bed's
+    grains: "d/30" """
+    relative_size: Annotated[
+        RelativeSize,
+        # scenes of equal grains are what they were before there was another
+        Field(exclude_if=lambda value: value == 1.0),
+        Info("relative size", "D/d", scope="single grains"),
+    ] = 1.0
+    """diameter of a single grain over that of its two neighbours, which lie as far apart as equal
+    grains do: 2 d cos β"""
 
 
 class GrainBed(Bed):

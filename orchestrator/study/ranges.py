@@ -28,6 +28,8 @@ Length = Annotated[float, Field(ge=1e-12, le=1e4)]
 """Of a mesh's cells, which resolve what the lengths above allow."""
 OverHeight = Annotated[float, Field(ge=1e-4, le=100)]
 """A length over a pile's height: from far below a cell of any mesh to several piles."""
+RelativeSize = Annotated[float, Field(ge=0.1, le=10)]
+"""A smaller grain falls through the pores of a bed, a larger one lies on many grains."""
 FrictionAngle = Annotated[float, Field(ge=1, le=89)]
 """Degrees. From wet ice to grains that hold by more than friction."""
 Slope = Annotated[float, Field(ge=0, lt=90)]

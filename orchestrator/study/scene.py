@@ -2,6 +2,7 @@
 
 import re
 from functools import cached_property
+from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
@@ -10,6 +11,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import weight
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.parts import (
+    Bed,
     Flow,
     Fluid,
     Forces,
@@ -49,10 +51,8 @@ class Scene(Part):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
                 check_mesh(self.bed.height, self.first_cell_height)
-        elif self.bed.roughness >= self.grain.diameter:
-            raise UnfitError(
-                "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
-            )
+        else:
+            check_grain(self.bed, self.grain.diameter)
         return self
 
     @cached_property
@@ -80,7 +80,14 @@ class Scene(Part):
     @property
     def limiting_slope_deg(self) -> float:
         """Slope beyond which a grain slides or rolls back without any flow, degrees."""
-        return min(self.grain.friction_angle_deg, 90 - self.bed.entrainment_angle_deg)
+        return min(self.grain.friction_angle_deg, 90 - self.pocket_angle_deg)
+
+    @property
+    def pocket_angle_deg(self) -> float:
+        """Angle at which a grain leaves its pocket, degrees: beta, of equal grains."""
+        if self.bed.relative_size == 1.0:
+            return self.bed.entrainment_angle_deg
+        return degrees(acos(pocket_cosine(self.bed)))
 
     @property
     def solve_roughness(self) -> float:
@@ -94,6 +101,27 @@ class Scene(Part):
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
         return default_first_cell_height(self.bed.height, self.solve_roughness)
+
+
+def pocket_cosine(bed: Bed) -> float:
+    """Cosine of the angle at which a single grain leaves its pocket; above 1 it falls through.
+
+    Its neighbours' centres are 2 d cos(beta) apart and (D + d)/2 from its own.
+    """
+    return 2 * cos(radians(bed.entrainment_angle_deg)) / (1 + bed.relative_size)
+
+
+def check_grain(bed: Bed, diameter: float) -> None:
+    """A single grain must stand out of the roughness and lie on its neighbours."""
+    if bed.roughness >= diameter:
+        raise UnfitError("bed.roughness", "z0 is not below the grain's diameter", "typical: d/30")
+    if pocket_cosine(bed) >= 1:
+        raise UnfitError(
+            "bed.relative_size",
+            f"a grain of {bed.relative_size:g} d falls between neighbours that are"
+            f" {2 * cos(radians(bed.entrainment_angle_deg)):.3g} d apart",
+            "raise it, or bed.entrainment_angle_deg",
+        )
 
 
 def check_density(density: float, fluid_density: float) -> None:
@@ -118,6 +146,10 @@ def check_method(law: str, method: str) -> None:
 
 def check_pile(bed: PileBed, diameter: float) -> None:
     """What meshes and packings of piles can be built at all."""
+    if bed.relative_size != 1:
+        raise UnfitError(
+            "bed.relative_size", "it is of a single grain on its neighbours", "leave it out"
+        )
     low, high = BUILDABLE_DEG
     if not low <= bed.slope_deg <= high:
         raise UnfitError(

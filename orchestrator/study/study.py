@@ -297,16 +297,23 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
         For the first thing wrong: the file, the field and the remedy.
     """
     bed = {**BED, **parts["bed"]}
-    diameter = parts["grain"].get("diameter")
     try:
-        # of a number beyond all floats the model says itself that it is wrong
-        if isinstance(diameter, int | float) and abs(diameter) < sys.float_info.max:
+        if diameter := _of_the_bed(parts["grain"].get("diameter"), bed.get("relative_size", 1.0)):
             bed["roughness"] = roughness_length(bed["roughness"], diameter)
         return Scene.model_validate({**parts, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
+
+
+def _of_the_bed(diameter: Any, relative_size: Any) -> float:
+    """Diameter of the grains that make the bed rough, m; 0 where the model will refuse it."""
+    if not isinstance(diameter, int | float) or abs(diameter) >= sys.float_info.max:
+        return 0.0
+    # the model will refuse a size that is none
+    is_size = isinstance(relative_size, int | float) and 1e-3 < relative_size < 1e3
+    return float(diameter / relative_size) if is_size else float(diameter)
 
 
 def _explained(error: ValidationError, where: str) -> InputError:

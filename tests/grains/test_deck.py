@@ -57,6 +57,7 @@ def _table(count: int = 3) -> deck.GrainTable:
         position=rng.normal(size=(count, 3)),
         kind=np.array([deck.FIXED, deck.MOBILE, deck.COUNTED])[:count],
         along=np.tile([1.0, 0.0], (count, 1)),
+        sizes=np.ones(count),
         diameter=1e-3,
         density=2500.0,
     )

@@ -25,6 +25,7 @@ def grains() -> deck.GrainTable:
         position=rows[:, 4:],
         kind=rows[:, 1].astype(np.int64),
         along=np.tile([np.cos(SLOPE), np.sin(SLOPE)], (len(rows), 1)),
+        sizes=np.ones(len(rows)),
         diameter=1e-3,
         density=2500.0,
     )

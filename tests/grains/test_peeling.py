@@ -31,7 +31,26 @@ def _flows(
 
     loading = Loading(square, lifting, np.sqrt(drag), along, outward)
     table = ForceTable(square, lifting, weight=1.0, unit=1.0)
-    return peeling.flows(centres, loading, table, along=along, marker=MARKER)
+    tables = [table] * len(centres)
+    return peeling.flows(
+        centres, np.ones(len(centres)), loading, tables, along=along, marker=MARKER
+    )
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(size: float) -> None:
+    half = math.sqrt(((1 + size) / 2) ** 2 - 0.25)
+    centres, sizes = np.array([[0.0, half], [-0.5, 0], [0.5, 0]]), np.array([size, 1.0, 1.0])
+    loading = Loading(
+        np.square,
+        np.zeros_like,
+        np.array([1.0, 0, 0]),
+        *np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2),
+    )
+    tables = [ForceTable(np.square, np.zeros_like, weight=1.0, unit=1.0)] * 3
+    alone = peeling.pivots(centres, sizes, loading, tables)
+    found = peeling.flows(centres, sizes, loading, tables, along=loading.along, marker=MARKER)
+    assert found[0] == alone[0] == pytest.approx(math.sqrt(0.5 / half), rel=1e-9)
 
 
 def _row(count: int, beta_deg: float, slope_deg: float) -> tuple[FloatArray, int]:

@@ -28,6 +28,7 @@ def grains() -> GrainTable:
         position=rows[:, 4:],
         kind=rows[:, 1].astype(np.int64),
         along=np.tile([1.0, 0.0], (len(rows), 1)),
+        sizes=np.ones(len(rows)),
         diameter=DIAMETER,
         density=DENSITY,
     )

@@ -58,6 +58,22 @@ def test_threshold_of_the_pivot_law_in_both_regimes_from_one_run(tmp_path: Path)
     assert np.all(found.high > 0.995)
 
 
+def test_a_grain_on_a_row_of_others_leaves_at_the_angle_of_its_own_pocket(tmp_path: Path) -> None:
+    text = f"""
+    grain = {{ diameter = 1e-3 }}
+    protocol = {{ load_increment = 0.001 }}
+    [axes]
+    "bed.relative_size" = {np.linspace(0.5, 3.0, 10).tolist()}
+    """
+    one = _cells(text)
+    found = threshold.of_grains(_run(one, tmp_path))
+    np.testing.assert_allclose(found.value, 1.0, atol=0.002)
+    # half a row's spacing over the distance of the centres, by hand
+    angles = [scene.pocket_angle_deg for scene in one.scenes]
+    ratios = np.array([scene.bed.relative_size for scene in one.scenes])
+    np.testing.assert_allclose(np.cos(np.radians(angles)), 1 / (1 + ratios), rtol=1e-12)
+
+
 def test_a_bed_has_no_scale(tmp_path: Path) -> None:
     # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the load
     # step
