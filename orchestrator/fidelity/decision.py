@@ -89,7 +89,8 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
     scene : Scene
         Resolved.
     tolerance : float or None
-        Relative error of tau_c at each of the scene's fractions; None: every scene as it is asked.
+        Relative error of tau_c at each of the scene's fractions, the uncertainty of the reference
+        included; None: every scene as it is asked.
     above : Bound, optional
         Levels that turned out to be not good enough.
 
@@ -189,7 +190,7 @@ def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Itera
     for names in itertools.product(*(_above(part, above.get(part)) for part in parts)):
         named = tuple(zip(parts, names, strict=True))
         found = calibration.known(dict(named), dict(classes), fractions)
-        yield _Pair(named, max(one.error for one in found), found[0].cost_core_s)
+        yield _Pair(named, max(one.total for one in found), found[0].cost_core_s)
 
 
 def _above(part: Part, name: str | None) -> list[str]:

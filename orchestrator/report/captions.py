@@ -23,7 +23,7 @@ DRAG_LAW = (
 )
 PAIR = "Eq. 2 holds for Re* < 3 and Eq. 4 for Re* ≥ 30; shaded: where neither does"
 OUTSIDE = ", whose Re* can lie outside the shaded range by one of the two"
-HOLLOW = "Hollow markers: the force law does not hold at the scene’s own single-grain threshold."
+HOLLOW = "Hollow markers: not usable, for the reason in the column why_not of the tables."
 
 
 def listed(values: Iterable[float], scale: float = 1) -> str:

@@ -69,7 +69,7 @@ def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
     cells = (
         f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
         f"{labels.ratio_of(row['z0_over_d'], 'd')}",
-        f"{forces}, {row['nu_m2_s']:g}" + ("" if row["law_holds"] else "\n(does not hold)"),
+        f"{forces}, {row['nu_m2_s']:g}",
     )
     chosen = "\n".join(labels.plain(c, row[c]) for c in extra if pd.notna(row[c]))
     return (*cells, chosen) if extra else cells
@@ -77,7 +77,7 @@ def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
 
 def _threshold(row: pd.Series) -> str:
     if pd.isna(row["shields"]):
-        return f"not reached\n(highest n/N {row['highest_fraction']:.0%})"
+        return str(row["why_not"])
     low, high = sorted((row["shields_low"], row["shields_high"]))
     return f"{row['shields']:.4f}\n({low:.4f} … {high:.4f})\nu*₀ {row['ustar0_m_s']:.3f} m/s"
 

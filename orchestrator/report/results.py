@@ -99,5 +99,8 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def valid(table: pd.DataFrame) -> pd.Series:
-    """Whether the force law of each row holds at its scene's own single-grain threshold."""
-    return table["law_holds"].astype(bool)
+    """Whether each threshold is usable; of scenes, whether their force law holds.
+
+    A scene is judged at its own single-grain threshold.
+    """
+    return table["usable" if "usable" in table else "law_holds"].astype(bool)

@@ -191,7 +191,7 @@ def point_entries(rows: pd.DataFrame) -> list[Artist]:
         name = f"{labels.methods(own)}, {labels.value('force_law', law_name)}"
         markers.append((name, own[SHAPE].mode()[0], "0.2"))
     if not valid(rows).all():
-        markers.append(("hollow: the force law does not hold", markers[-1][1], "white"))
+        markers.append(("hollow: not usable, see why_not", markers[-1][1], "white"))
     return [
         Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
         for label, m, face in markers

@@ -20,6 +20,7 @@ from orchestrator.study.study import Study
 from orchestrator.tables import piles, scenes, single, text
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter
+from orchestrator.tables.usable import with_usable
 
 Tables = dict[str, pd.DataFrame]
 
@@ -38,13 +39,14 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     cells = [one for one in plan.cells if one.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))
     thresholds = pd.DataFrame(row for answer in ready for row in piles.threshold_rows(answer))
+    grains = pd.DataFrame(single.rows(plan, cells, cases))
     made = {
         "scenes": asked,
-        "single_grain": pd.DataFrame(single.rows(plan, cells, cases)),
+        "single_grain": with_usable(grains, asked, study),
         "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
         "pile_grain": _concat(map(piles.grains, ready)),
         "pile_curve": _concat(map(piles.curve, ready)),
-        "pile_threshold": with_scatter(thresholds, asked),
+        "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
         "check": pd.DataFrame(_checks(study, plan, cases, done)),
     }
     return {name: table for name, table in made.items() if not table.empty}

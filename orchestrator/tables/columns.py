@@ -35,7 +35,8 @@ COLUMNS: dict[str, str] = {
     "ustar_over_ustar0": "signed friction velocity at the grain over ustar0",
     "grain_id": "id of the grain in the deck",
     "load_step": "number of the load step; 0 is the settling",
-    "mode": "how it moved: rolled, slid, lifted (rose by more than 0.3 d) or none",
+    "mode": "how it moved: rolled, slid, lifted (rose by more than 0.3 d) or none; how many"
+    " are lifted depends on the stiffness and on the mobile layers of the model",
     "fell_upstream": "whether the grain fell back before or instead of moving downstream",
     "moved_in_load_step": "hold in which the grain passed the marker or was carried off; 0: never",
     "fallen_in_load_step": "hold in which it was first a marker's length upstream; 0: never",
@@ -59,6 +60,10 @@ COLUMNS: dict[str, str] = {
     "agree": "whether shields lies in the interval of DEM, widened by the tolerance",
     "scatter": "half the range of shields over seeds, over its mean: the largest of the piles whose"
     " rows lie alike, of the same slope, force law and fraction",
+    "usable": "whether nothing in why_not speaks against the threshold",
+    "why_not": "what does, at the Re* of the threshold: the force law or its drag law ends, the bed"
+    " is hydraulically smooth, lift carried grains off, the error is not known or above the"
+    " tolerance, the fraction was not reached; empty if nothing",
     "pivot_ustar0_m_s": "ustar0_m_s by the closed form with each grain's own stress",
     "kind": "kind of the case",
     "cpu_s": "processor time of the solvers",

@@ -130,7 +130,9 @@ def test_caption_of_grains_says_which_of_the_piles_they_are(two: Results) -> Non
 def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     rows = results.joined("pile_threshold")
     assert "rises by 5 %" in captions.hold_protocol(rows)
-    without = rows.assign(answered_method="pivot", answered_load_increment=None, shape="s")
+    without = rows.assign(
+        answered_method="pivot", answered_load_increment=None, shape="s", usable=True
+    )
     said = captions.hold_protocol(without)
     assert "Holding protocol" not in said
     assert "pivot" in said

@@ -189,9 +189,9 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
 
 
 def test_piles_in_the_transition_are_hollow(results: Results) -> None:
-    table = results.tables["pile_threshold"]
+    table = results.tables["pile_threshold"].assign(usable=False)
     scenes = results.scenes.assign(regime="transition", law_holds=False)
-    changed = {**results.tables, "scenes": scenes}
+    changed = {**results.tables, "scenes": scenes, "pile_threshold": table}
     found = drawn(pile_figures(replace(results, tables=changed)))
     (ax,) = found["extended-shields-d30"]
     assert not marked(ax, SOLID)

@@ -21,7 +21,6 @@ JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
     single.numerical,
     single.slope,
     motion.order,
-    motion.modes,
     piles.slope,
     piles.above_single,
     counting.wiggles,

@@ -1,0 +1,103 @@
+"""Whether a threshold may be used, and why not: judged at the Re* of the answer itself."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import Bound
+from orchestrator.physics.laws import LAWS
+from orchestrator.study.study import Study
+
+SMOOTH_BELOW = 5 / 30
+"""u* z0/nu below which a bed is hydraulically smooth: u* k_s/nu = 5 with k_s = 30 z0 (Nikuradse,
+VDI Forschungsheft 361, 1933)."""
+CARRIED_OFF = 0.1
+"""Share of the moved grains from which a threshold is one of lift-off."""
+Reason = tuple[NDArray[np.bool_], list[str]]
+"""Which rows it is true of, and what it says of each row."""
+
+
+def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, study: Study) -> pd.DataFrame:
+    """Add the columns ``usable`` and ``why_not`` to thresholds of piles or of single grains.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Thresholds, with ``reynolds`` at the threshold.
+    scenes : DataFrame
+        The scenes by their id.
+    study : Study
+        Whose tolerance the known errors are held against.
+    """
+    if table.empty:
+        return table
+    columns = [name for name in scenes if name not in table or name == "scene_id"]
+    rows = table.merge(scenes.drop_duplicates("scene_id")[columns], on="scene_id", how="left")
+    found = _reasons(rows, study.tolerance)
+    said: list[list[str]] = [[] for _ in range(len(rows))]
+    for true, texts in found:
+        for index in np.flatnonzero(true):
+            said[index].append(texts[index])
+    why = ["; ".join(one) for one in said]
+    return table.assign(usable=[not one for one in why], why_not=why)
+
+
+def _reasons(rows: pd.DataFrame, tolerance: float | None) -> Iterator[Reason]:
+    reynolds = rows["reynolds"]
+    if "answered_method" in rows and "reynolds_closed_form" in rows:
+        reynolds = reynolds.where(rows["answered_method"] == "dem", rows["reynolds_closed_form"])
+    reached = reynolds.notna().to_numpy()
+    yield ~reached, [_unreached(row) for row in rows.to_dict("records")]
+    ustar = (reynolds * rows["nu_m2_s"] / rows["d_m"]).to_numpy(float)
+    yield from ((true & reached, texts) for true, texts in _law(rows, ustar))
+    if "share_carried_off" in rows:
+        yield _smooth(rows, ustar)
+        share = rows["share_carried_off"].to_numpy(float)
+        yield (
+            share > CARRIED_OFF,
+            [f"lift carried off {one:.0%} of the moved grains" for one in share],
+        )
+        if tolerance is not None:
+            yield _inexact(rows["error_estimate"].to_numpy(float), tolerance)
+
+
+def _unreached(row: Mapping[object, object]) -> str:
+    if "highest_fraction" not in row:
+        return "the grain did not move in any load step"
+    return f"not reached: at most {row['highest_fraction']:.0%} of {row['count']} grains moved"
+
+
+def _law(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Iterator[Reason]:
+    """What the bounds of each row's force law say."""
+    for name in sorted(set(rows["force_law"])):
+        own = (rows["force_law"] == name).to_numpy()
+        d = rows["d_m"].to_numpy(float)
+        z0 = rows["z0_over_d"].to_numpy(float) * d
+        exposure = Exposure(d, z0, *(rows[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s")))
+        for bound in LAWS[name].bounds(ustar, exposure):
+            values = np.broadcast_to(bound.value, ustar.shape)
+            texts = [str(Bound(bound.quantity, value, bound.low, bound.high)) for value in values]
+            yield own & ~bound.holds, texts
+
+
+def _smooth(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Reason:
+    """The flow of a pile is over a rough bed; a smooth one has another z0."""
+    number = (ustar * rows["z0_over_d"] * rows["d_m"] / rows["nu_m2_s"]).to_numpy(float)
+    texts = [
+        f"hydraulically smooth bed: u* z0/nu {n:.2g} is below {SMOOTH_BELOW:.2g}" for n in number
+    ]
+    return number < SMOOTH_BELOW, texts
+
+
+def _inexact(error: NDArray[np.float64], tolerance: float) -> Reason:
+    """Levels whose error is not known, or known to be above the tolerance."""
+    texts = [
+        "no reference: the error of its levels is not known"
+        if np.isnan(one)
+        else f"known error {one:.1%} is above the tolerance of {tolerance:.3g}"
+        for one in error
+    ]
+    return ~(error <= tolerance * (1 + 1e-9)), texts
