@@ -4,8 +4,8 @@ In wall units (y = z ustar/nu): ``U' + l^2 U'^2 = 1``, ``l = 0.41 y (1 - exp(-y/
 shifts y by D of Rotta (1962) in the correlation of Cebeci and Chang (1978). The shear depends on
 z + D alone, so that two integrals, tabulated once, serve every grain.
 
-The constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which cites the same authors, as
-does the form; 26 is the value commonly quoted of van Driest. The originals were not at hand.
+The form and the constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which cites the
+same authors; 26 is the value commonly quoted of van Driest. The originals were not at hand.
 """
 
 from functools import cache
