@@ -183,7 +183,7 @@ def test_an_interrupted_study_leaves_no_child_and_is_continued(
     second = orchestrator("study", "grains.toml", "--out", "out")
     _refused(second, str(driver.pid))
     driver.send_signal(signal.SIGINT)
-    _, said = driver.communicate(timeout=20)
+    _, said = driver.communicate(timeout=300)
     assert driver.returncode == 130
     assert "the same command continues" in said
     assert "Traceback" not in said

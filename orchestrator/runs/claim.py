@@ -29,6 +29,8 @@ class Kind:
         What else this program writes into it, by names and by patterns: none may be a link.
     traces : tuple of str
         Patterns of what only such a directory holds: it is known by them if its marker is lost.
+    option : str
+        How another directory is chosen.
     """
 
     word: str
@@ -36,6 +38,7 @@ class Kind:
     names: tuple[str, ...] = ()
     many: tuple[str, ...] = ()
     traces: tuple[str, ...] = ()
+    option: str = " with --out"
 
 
 _CASE = f"cases/*-{'[0-9a-f]' * 12}"
@@ -50,7 +53,7 @@ RESULTS = Kind(
     ("[1-5]-*", "ours/[1-5]-*", f"ours/{_CASE}"),
 )
 COMPARISON = Kind("comparison with the pack", "benchmark.json", _PAGE)
-PACK = Kind("benchmark pack", "manifest.json")
+PACK = Kind("benchmark pack", "manifest.json", option=" as PACK")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 
 
@@ -86,7 +89,7 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
             raise InputError(
                 f"the output directory cannot be used: {error.strerror or error}",
                 where=str(error.filename or root),
-                remedy="choose another directory",
+                remedy=f"choose another{kind.option}",
             ) from None
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(LOCK, RECORD, kind.marker, *kind.names)
@@ -110,7 +113,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
                 f"the directory holds the {found['kind']} {found['name']}, "
                 f"not the {kind.word} {name}",
                 where=str(folder.root),
-                remedy="choose another directory",
+                remedy=f"choose another{kind.option}",
             )
     if told(folder.root, kind) is None and not any(_matches(folder.root, kind.traces)):
         _check_empty(folder.root, kind)
@@ -131,7 +134,7 @@ def _check_empty(root: Path, kind: Kind) -> None:
         raise InputError(
             f"the output directory holds something that is not a {kind.word}: {strange[0]}",
             where=str(root),
-            remedy="choose an empty or a new one",
+            remedy=f"choose an empty or a new one{kind.option}",
         )
 
 
