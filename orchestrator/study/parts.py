@@ -7,11 +7,19 @@ degrees and say so in their names; all else is in SI units or in the unit that i
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    field_validator,
+)
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
 from orchestrator.study.info import Info
+from orchestrator.study.profile import Profile, a_profile
 from orchestrator.study.ranges import (
     Damping,
     Density,
@@ -21,6 +29,7 @@ from orchestrator.study.ranges import (
     FrictionAngle,
     Gravity,
     Height,
+    LeeSlope,
     Length,
     LiftCoefficient,
     OverHeight,
@@ -40,9 +49,16 @@ Model = Literal["solve", "hill", "flat"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
+Shape = Literal[
+    "triangle", "dune", "cosine", "gaussian", "trapezoid", "step up", "step down", "flat"
+]
+Range = tuple[float, float]
+File = Annotated[
+    Profile, PlainValidator(a_profile), PlainSerializer(lambda profile: profile and profile.digest)
+]
 BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
-    "pile": "a triangular pile of grains across the flow",
+    "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
 }
 
 
@@ -127,13 +143,116 @@ class GrainBed(Bed):
     """what the bed is made of"""
 
 
+class Obstacle(Part):
+    """An obstacle across the flow, which carries no grains."""
+
+    kind: Literal["fence", "block", "half-cylinder"]
+    """what it is; all have steep sides, none is upright"""
+    x: float
+    """place of its middle, downstream of the foot of the first form"""
+    height: Height
+    """height over the bed"""
+    length: Length | None = None
+    """length of a block; by default its height"""
+
+    @property
+    def reach(self) -> float:
+        """From its middle to the foot of its sides on level bed, at most, m."""
+        return {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[self.kind] * self.height + (
+            (self.length or self.height) / 2 if self.kind == "block" else 0.0
+        )
+
+    def __str__(self) -> str:
+        length = f", {self.length:g} m long" if self.length else ""
+        return f"{self.kind} of {self.height:g} m at {self.x:g} m{length}"
+
+
+SLIP_FACE_DEG = 30.0
+LEVEL = 4.0
+
+
+def _unless(default: Any) -> Any:
+    """A field that a scene's digest leaves out where it says nothing: triangles keep their ids."""
+    return Field(exclude_if=lambda value: value == default)
+
+
 class PileBed(Bed):
-    """A triangular pile of grains across the flow (paper, 3.2)."""
+    """Grains across the flow, under a bed line of any shape (the paper's, 3.2, is a triangle)."""
 
     kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
     """what the bed is made of"""
     height: Annotated[Height, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
-    """height of the bed line that the flow goes over"""
+    """height of the forms that the flow goes over; that of a profile follows from it"""
+    shape: Annotated[
+        Shape,
+        _unless("triangle"),
+        Info(
+            "shape",
+            scope="piles",
+            choices={
+                "triangle": "two straight faces",
+                "dune": "a windward side and a slip face",
+                "cosine": "one wave of a cosine, from trough to trough",
+                "gaussian": "a Gaussian hill",
+                "trapezoid": "two straight faces and a level top",
+                "step up": "a straight face up to higher ground",
+                "step down": "a straight face down to lower ground",
+                "flat": "level bed",
+            },
+        ),
+    ] = "triangle"
+    """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
+    windward: Annotated[
+        Literal["straight", "curved"],
+        _unless("straight"),
+        Info(
+            "windward side",
+            scope="dunes",
+            choices={"straight": "one slope", "curved": "half a wave of a cosine"},
+        ),
+    ] = "straight"
+    """windward side of a dune"""
+    lee_slope_deg: Annotated[
+        LeeSlope | None, _unless(None), Info("lee slope", unit="°", scope="piles")
+    ] = None
+    """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
+    dune and a step down"""
+    brink_radius: Annotated[
+        float, Field(ge=0, le=1e3), _unless(0.0), Info("brink radius", unit="m", scope="dunes")
+    ] = 0.0
+    """radius with which a dune's brink is rounded; 0 leaves it sharp"""
+    length: Annotated[
+        Length | None, _unless(None), Info("length", unit="m", scope="beds with level parts")
+    ] = None
+    """length of level bed with grains: of a trapezoid's top, of a flat bed, before or behind a
+    step; by default 4 h"""
+    forms: Annotated[int, Field(ge=1, le=100), _unless(1), Info("forms", scope="piles")] = 1
+    """number of forms in a train"""
+    spacing: Annotated[Length | None, _unless(None), Info("spacing", unit="m", scope="piles")] = (
+        None
+    )
+    """from one form of a train to the next; by default they touch"""
+    profile: Annotated[File | None, _unless(None), Info("profile", scope="piles")] = None
+    """file with the bed line, in place of a shape: columns x_m and z_m; a path is relative to the
+    study file"""
+    smoothing: Annotated[
+        float, Field(ge=0, le=1e3), _unless(0.0), Info("smoothing", unit="m", scope="profiles")
+    ] = 0.0
+    """length over which a noisy profile is smoothed"""
+    obstacles: Annotated[tuple[Obstacle, ...], _unless(()), Info("obstacles", scope="piles")] = ()
+    """fences, blocks and half-cylinders on the bed, which carry no grains: tables with `kind`, `x`,
+    `height` and, of a block, `length`"""
+    counted: Annotated[
+        Literal["windward", "all"] | Range | None,
+        _unless(None),
+        Info(
+            "counted grains",
+            scope="piles",
+            choices={"windward": "on sides that rise", "all": "all"},
+        ),
+    ] = None
+    """exposed grains that are counted, or the range of x in which; by default those of windward
+    sides, all of a flat bed, a step down and a profile"""
     packing: Annotated[
         Packing,
         Info(
@@ -162,6 +281,28 @@ class PileBed(Bed):
         int, Field(ge=1, le=1000), Info("mobile layers", scope="piles", about="answer")
     ] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
+
+    @field_validator("obstacles", "counted", mode="before")
+    @classmethod
+    def _tuple_of_a_list(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+    @property
+    def lee_slope(self) -> float:
+        """Slope of a straight lee side, degrees."""
+        steep = self.shape in ("dune", "step down")
+        return self.lee_slope_deg or (SLIP_FACE_DEG if steep else self.slope_deg)
+
+    @property
+    def level_length(self) -> float:
+        """Length of level bed with grains, m."""
+        return self.length or LEVEL * self.height
+
+    @property
+    def counts(self) -> str | Range:
+        """Which exposed grains are counted."""
+        everywhere = self.profile or self.shape in ("flat", "step down")
+        return self.counted or ("all" if everywhere else "windward")
 
     @property
     def is_replica(self) -> bool:

@@ -2,6 +2,7 @@
 
 import re
 from functools import cached_property
+from itertools import pairwise
 from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
@@ -25,6 +26,16 @@ from orchestrator.study.parts import (
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+FORMS = ("triangle", "dune", "cosine", "gaussian", "trapezoid")
+FIELDS_OF_SHAPES = {
+    "windward": ("dune",),
+    "brink_radius": ("dune",),
+    "lee_slope_deg": ("triangle", "dune", "trapezoid", "step down"),
+    "length": ("trapezoid", "step up", "step down", "flat"),
+    "forms": FORMS,
+    "spacing": FORMS,
+}
+"""Fields that some shapes alone have."""
 
 
 class Scene(Part):
@@ -150,17 +161,42 @@ def check_pile(bed: PileBed, diameter: float) -> None:
         raise UnfitError(
             "bed.relative_size", "it is of a single grain on its neighbours", "leave it out"
         )
-    low, high = BUILDABLE_DEG
-    if not low <= bed.slope_deg <= high:
-        raise UnfitError(
-            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
-        )
+    if not bed.profile:
+        check_shape(bed)
+    for one, other in pairwise(sorted(bed.obstacles, key=lambda one: one.x)):
+        if other.x - one.x < one.reach + other.reach:
+            what = f"{one} and {other} overlap"
+            raise UnfitError("bed.obstacles", what, "move one of them")
     if bed.height < 5 * diameter:
         raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
         )
+
+
+def check_shape(bed: PileBed) -> None:
+    """What forms have, and what they are made of."""
+    low, high = BUILDABLE_DEG
+    rises = bed.shape not in ("flat", "step down")
+    if rises and not low <= bed.slope_deg <= high:
+        raise UnfitError(
+            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
+        )
+    if bed.smoothing:
+        raise UnfitError("bed.smoothing", "it is of a profile", "leave it out")
+    for field, shapes in FIELDS_OF_SHAPES.items():
+        if getattr(bed, field) != PileBed.model_fields[field].default and bed.shape not in shapes:
+            what = f"{_a(bed.shape)} has none"
+            raise UnfitError(f"bed.{field}", what, f"leave it out; it is of: {', '.join(shapes)}")
+    if not rises and bed.slope_deg:
+        raise UnfitError("bed.slope_deg", f"{_a(bed.shape)} does not rise", "leave it out")
+    if bed.spacing and bed.forms == 1:
+        raise UnfitError("bed.spacing", "one form has no neighbour", "raise bed.forms")
+
+
+def _a(shape: str) -> str:
+    return f"a {shape}" if shape != "flat" else "a flat bed"
 
 
 def check_mesh(height: float, first_cell_height: float) -> None:
