@@ -23,7 +23,9 @@ test-faults: lint  ## kill, harm and starve a small study, and count what it sur
 calibration: setup  ## measure the fidelity levels and the maps anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
+	$(PYTHON) -m orchestrator budget
 	cp results/ladder/tables/levels.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
+	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
 	cp results/ladder/figures/gains.png docs/gains.png
 	cp results/stability/figures/maps.png docs/stability.png

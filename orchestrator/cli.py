@@ -142,6 +142,14 @@ def _add_experiments(commands: Any) -> None:
     )
     _add_run_options(command)
     command.set_defaults(run=_ladder)
+    command = commands.add_parser(
+        "budget", help="what the choices are worth that all models share: a tornado for each scene"
+    )
+    command.add_argument(
+        "source", nargs="?", default="budget", metavar="FILE|PRESET", help="default: %(default)s"
+    )
+    _add_run_options(command)
+    command.set_defaults(run=_budget)
     command = commands.add_parser("stability", help="maps of where each method fails")
     _add_run_options(command)
     command.set_defaults(run=_stability)
@@ -195,6 +203,17 @@ def _ladder(options: argparse.Namespace) -> int:
 
     asked = study.load(options.source, [paper.PRESETS])
     out = options.out or Path("results") / "ladder"
+    finished = run(asked, out, workers=options.workers)
+    return _end(finished.page, finished.failures)
+
+
+def _budget(options: argparse.Namespace) -> int:
+    from orchestrator import paper
+    from orchestrator.experiments.budget.run import run
+    from orchestrator.study import study
+
+    asked = study.load(options.source, [paper.PRESETS])
+    out = options.out or Path("results") / "budget"
     finished = run(asked, out, workers=options.workers)
     return _end(finished.page, finished.failures)
 

@@ -58,7 +58,7 @@ class Plan:
         return {one.name: state for one, state in zip(asked, states, strict=True) if state}
 
 
-def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
+def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
     Parameters
@@ -67,8 +67,6 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         With a tolerance, each scene is answered on the cheapest levels that are known to meet it.
     above : mapping, optional
         By scene id: levels that turned out to be not good enough.
-    cases : Path, optional
-        Where the runs are, or will be; the grains of a poured bed are read from there.
 
     Raises
     ------
@@ -81,21 +79,16 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
     decisions = {
         scene.id: decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
     }
-    return of(decisions, study.name, study.tolerance, cases)
+    return of(decisions, study.name, study.tolerance)
 
 
-def of(
-    decisions: Mapping[str, Decision],
-    name: str,
-    tolerance: float | None = None,
-    cases: Path | None = None,
-) -> Plan:
+def of(decisions: Mapping[str, Decision], name: str, tolerance: float | None = None) -> Plan:
     """List the cases that some decisions need; `name` names the study in messages.
 
     With a tolerance, answers without DEM are checked by it.
     """
     checked = checks.decisions(decisions, tolerance, _cost_s) if tolerance else {}
-    piles, check_piles = _piles(decisions, cases), _piles(checked, cases)
+    piles, check_piles = _piles(decisions), _piles(checked)
     grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
     try:
@@ -106,9 +99,9 @@ def of(
     return Plan(dict(decisions), piles, cells, check_piles, _in_order([*ordered, *cells]))
 
 
-def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
+def _piles(decisions: Mapping[str, Decision]) -> dict[str, Pile]:
     return {
-        asked: Pile(one.scene, cases)
+        asked: Pile(one.scene)
         for asked, one in decisions.items()
         if isinstance(one.scene.bed, PileBed)
     }
@@ -122,7 +115,7 @@ def settled(study: Study, directory: Path) -> Plan:
     """The plan after what the runs say: dearer levels where one failed or DEM overrules it."""
     above: dict[str, Bound] = {}
     while True:
-        planned = make(study, above, directory)
+        planned = make(study, above)
         if study.tolerance is None:
             return planned
         more = {**_failed(planned, directory), **_overruled(planned, study.tolerance, directory)}

@@ -1,10 +1,11 @@
 """The bed line: the bottom of the flow as a polyline, which mesh, packing and stress ask.
 
-Lengths are in any one unit: metres for the flow, diameters for a packing. The arc length s is zero
-at the foot of the form, the first corner that rises from the flat bed.
+Lengths are in any one unit: metres for the flow, diameters for a packing. Makers put the foot of
+the first form at x = 0, where the arc length s is zero.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,15 +22,28 @@ class BedLine:
     Attributes
     ----------
     x, z : tuple of float
-        Corners: downstream of the foot of the form, above the flat bed.
+        Corners: downstream of the foot of the first form, above the flat bed before it.
+    h : float
+        Height of the forms, in which domain, mesh and averaging are measured.
+    bare : tuple of (float, float)
+        Ranges of x of obstacles, which carry no grains.
     """
 
     x: tuple[float, ...]
     z: tuple[float, ...]
+    h: float
+    bare: tuple[tuple[float, float], ...] = ()
 
     def scaled(self, factor: float) -> "BedLine":
         """The same line in another unit of length."""
-        return BedLine(tuple(v * factor for v in self.x), tuple(v * factor for v in self.z))
+        x, z = (tuple(v * factor for v in values) for values in (self.x, self.z))
+        bare = tuple((start * factor, end * factor) for start, end in self.bare)
+        return BedLine(x, z, self.h * factor, bare)
+
+    def with_corners(self, places: Sequence[float]) -> "BedLine":
+        """The same line with more corners, in which it does not bend."""
+        x = np.union1d(self.x, places)
+        return replace(self, x=tuple(x.tolist()), z=tuple(self.height(x).tolist()))
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -57,11 +71,15 @@ class BedLine:
         return np.degrees(np.arctan2(self.tangents[:, 1], self.tangents[:, 0]))
 
     @cached_property
+    def bends_deg(self) -> FloatArray:
+        """Bend at each corner, positive at a top; 0 at the ends; shape (n,)."""
+        return np.concatenate([[0.0], -np.diff(self.slopes_deg), [0.0]])
+
+    @cached_property
     def arc_lengths(self) -> FloatArray:
-        """Arc length of each corner from the foot of the form, shape (n,)."""
+        """Arc length of each corner from the foot of the first form, shape (n,)."""
         along = np.concatenate([[0.0], np.cumsum(self.lengths)])
-        rises = np.flatnonzero(np.diff(self.z) > 0)
-        return np.asarray(along - along[rises[0] if len(rises) else 0])
+        return np.asarray(along - np.interp(0, self.x, along))
 
     @property
     def top(self) -> int:

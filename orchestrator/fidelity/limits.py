@@ -8,11 +8,12 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import LID_OVER_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.physics.constants import KARMAN
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
@@ -94,7 +95,21 @@ def _slope(scene: Scene) -> str | None:
 
 def _pile_slope(scene: Scene) -> str | None:
     bed, (low, high) = _pile(scene), PILE_SLOPES_DEG
-    return f"a pile of {bed.slope_deg:g} deg" if bed and not low <= bed.slope_deg <= high else None
+    if not bed or bed.profile or bed.shape in ("flat", "step down"):
+        return None
+    return None if low <= bed.slope_deg <= high else f"a pile of {bed.slope_deg:g} deg"
+
+
+def _bed_line(scene: Scene) -> str | None:
+    if not (bed := _pile(scene)):
+        return None
+    try:
+        of_bed(bed)
+    except UnfitError as error:
+        return str(error)
+    if bed.shape != "triangle" or bed.profile or bed.obstacles or bed.forms > 1:
+        return f"no grains lie on a bed like this one yet: {bed.profile or bed.shape}"
+    return None
 
 
 def _first_cell(scene: Scene) -> str | None:
@@ -192,6 +207,13 @@ CLOSE_PACKED_DEG = 59.0
 """Entrainment angle from which the grains of a row hold each other."""
 
 LIMITS = (
+    Limit(
+        "slope",
+        "bed",
+        _bed_line,
+        "Forms and obstacles do not overlap.",
+        "give them room",
+    ),
     Limit(
         "slope",
         "bed.slope_deg",

@@ -1,20 +1,25 @@
-"""The flow over one pile as an OpenFOAM case."""
+"""The flow over one bed line as an OpenFOAM case."""
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from importlib.metadata import version as installed
-from math import isfinite, log, radians, tan
+from math import isfinite, log
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from orchestrator.bed.line import BedLine, FloatArray
+from orchestrator.bed.shapes import triangle
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow import diagnostics
 from orchestrator.flow.diagnostics import Diagnostic
-from orchestrator.flow.mesh import write_mesh
+from orchestrator.flow.grid import Grid, along
+from orchestrator.flow.mesh import write_line, write_mesh
 from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
 from orchestrator.runs.case import Case
+from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Convection, Turbulence
 from orchestrator.study.scene import BUILDABLE_DEG
@@ -33,16 +38,16 @@ FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
 
 @dataclass(frozen=True)
 class FlowCase(Case):
-    """Steady turbulent flow over a triangular pile, or over a flat bed.
+    """Steady turbulent flow over a bed line.
 
-    The flow's u*/u*_0 depends on the slope, on z0/h, on the mesh, and hardly on U_e and nu.
+    The flow's u*/u*_0 depends on the shape, on z0/h, on the mesh, and hardly on U_e and nu.
 
     Parameters
     ----------
     slope_deg : float
-        Slope of both faces, 5 to 40 degrees; 0 leaves a flat bed in the domain of a pile.
+        Slope of the windward faces, where they are steepest; 0 if there are none.
     height_m : float
-        Height h of the pile, m; the lid is at 10 h.
+        Height h of the forms, m; the lid is at 10 h.
     roughness_m : float
         Roughness length z0 of the bed, m.
     speed_m_s : float
@@ -63,6 +68,8 @@ class FlowCase(Case):
         Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
     non_orthogonal_correctors : int
         Of the pressure for cells that are not orthogonal, in each iteration.
+    line : BedLine, optional
+        The bed line, m; by default a triangle of the slope and the height, or a flat bed.
 
     Raises
     ------
@@ -81,6 +88,7 @@ class FlowCase(Case):
     turbulence_model: Turbulence = "kEpsilon"
     convection_scheme: Convection = "linearUpwind"
     non_orthogonal_correctors: int = 1
+    line: BedLine | None = None
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
@@ -105,10 +113,10 @@ class FlowCase(Case):
         self._check_mesh()
 
     def _check_numbers(self) -> None:
-        for name, value in self.parameters.items():
-            if isinstance(value, str) or (
-                value == 0 and name in ("slope_deg", "non_orthogonal_correctors")
-            ):
+        for name, value in asdict(replace(self, line=None) if self.line else self).items():
+            if isinstance(value, str) or value is None:
+                continue
+            if value == 0 and name in ("slope_deg", "non_orthogonal_correctors"):
                 continue
             if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
@@ -141,8 +149,30 @@ class FlowCase(Case):
             name: int(getattr(self, name))
             for name in ("cells_per_face", "non_orthogonal_correctors")
         }
-        fields = asdict(self).items()
-        return {n: v if isinstance(v, str) else float(v) for n, v in fields} | whole
+        fields = asdict(replace(self, line=None)).items()
+        numbers = {n: v if isinstance(v, str) else float(v) for n, v in fields if n != "line"}
+        corners = digest_text(canonical_json(self.bed_line.corners.tolist()))
+        return {**numbers, **whole, "bed_line": corners}
+
+    @property
+    def bed_line(self) -> BedLine:
+        """The bed line, m."""
+        return self.line or triangle(self.slope_deg, self.height_m)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid lines of the mesh along it."""
+        return along(
+            self.bed_line,
+            slope_deg=self.slope_deg,
+            cells_per_face=self.cells_per_face,
+            growth=self.growth,
+        )
+
+    @property
+    def growth(self) -> float:
+        """Ratio of neighbouring cells: with twice the cells on a face all are half as long."""
+        return float(self.expansion_ratio ** (40 / self.cells_per_face))
 
     @property
     def ustar0_m_s(self) -> float:
@@ -160,19 +190,15 @@ class FlowCase(Case):
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
-        expansion_ratio = self.expansion_ratio ** (40.0 / self.cells_per_face)
-        face = 1.0 / tan(radians(self.slope_deg)) if self.slope_deg else 4.0
-        toe = 1.7 * face / self.cells_per_face
-        beside = _grown(10.0 / toe, expansion_ratio) + _grown(20.0 / toe, expansion_ratio)
-        up = _grown(LID_OVER_HEIGHT * self.height_m / self.first_cell_m, expansion_ratio)
-        return (2 * self.cells_per_face + beside) * up
+        up = log(1 + LID_OVER_HEIGHT * self.height_m / self.first_cell_m * (self.growth - 1))
+        return sum(self.grid.cells) * up / log(self.growth)
 
     def versions(self) -> dict[str, str]:
         """The programs that mesh and solve."""
         return {"gmsh": installed("gmsh"), "openfoam": openfoam.version()}
 
     def write(self, directory: Path, cases: Path) -> None:
-        """Write the case's numbers into the template's files, and mesh the pile."""
+        """Write the case's numbers into the template's files, and mesh it."""
         _set_values(
             directory / "parameters",
             freeStream=self.speed_m_s,
@@ -188,9 +214,9 @@ class FlowCase(Case):
             slope_deg=self.slope_deg,
             height=self.height_m,
             first_cell=self.first_cell_m,
-            cells_per_face=self.cells_per_face,
-            growth_at_40=self.expansion_ratio,
+            growth=self.growth,
         )
+        write_line(self.grid, directory / "bed_line.geo")
         write_mesh(directory)
 
     def collect(self, directory: Path) -> None:
@@ -219,14 +245,20 @@ class FlowCase(Case):
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
             raise Exploded("the stress on the bed is not a number", where=str(directory))
-        low, high = stress.z_e_m.min(), stress.z_e_m.max()
-        # flat parts of the bed have it larger by 1/cos(slope)
-        if not 0.48 * self.first_cell_m < low <= high < 0.7 * self.first_cell_m:
+        lowest = self.first_cell_m / 2 / np.cos(np.radians(self.slope_deg))
+        over = stress.z_e_m / np.cos(np.radians(self._slopes_deg(stress.x_m))) / lowest
+        if not 0.98 < over.min() <= over.max() < 1.02:
             raise SolverError(
-                f"z_e goes from {low:g} to {high:g} m, with first cells of {self.first_cell_m:g} m",
+                f"z_e is {over.min():.3g} to {over.max():.3g} of what the first cells should have",
                 where=str(directory),
                 remedy="remove the case and run it again",
             )
+
+    def _slopes_deg(self, x: FloatArray) -> FloatArray:
+        """Slope of the bed at some places, degrees."""
+        line = self.bed_line
+        segment = np.searchsorted(line.x, x) - 1
+        return np.asarray(line.slopes_deg[np.clip(segment, 0, len(line.slopes_deg) - 1)])
 
     def _check_upstream(self, upstream: Diagnostic, directory: Path) -> None:
         if not upstream.sound:
@@ -235,11 +267,6 @@ class FlowCase(Case):
                 where=str(directory),
                 remedy=f"{DIAGNOSTICS} says more; raise the first cell's height or the speed",
             )
-
-
-def _grown(length_over_first: float, expansion_ratio: float) -> float:
-    """How many cells that grow by `growth` fill a length."""
-    return log(1.0 + length_over_first * (expansion_ratio - 1.0)) / log(expansion_ratio)
 
 
 def _set_values(path: Path, **values: float | str) -> None:

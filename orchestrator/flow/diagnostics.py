@@ -12,9 +12,9 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.constants import KARMAN
 from orchestrator.runs.files import write_durably
 
-UPSTREAM_OF_TOE = 9.0
-"""Where the bed is undisturbed yet, h before the windward toe: the pile slows the flow by 4 % at
-5 h, and the inlet is at 10."""
+BEHIND_INLET = 1.0
+"""Where the bed is undisturbed yet, h behind the inlet: a pile slows the flow by 4 % at 5 h before
+its toe, and the inlet is at 10."""
 UPSTREAM_ERROR = 0.02
 """Of u* there: sound runs are within 0.011, whatever the mesh and the turbulence model; below 4 z0
 or without turbulence in the first cell it is 0.025 to 0.1."""
@@ -54,7 +54,7 @@ def of(
         u*_0 over the solve's nu, 1/m.
     """
     centre = float(np.median(stress.z_e_m))
-    upstream = float(stress.mean_over(-UPSTREAM_OF_TOE * height, 0.5 * height))
+    upstream = float(stress.mean_over(stress.edges_m[0] + BEHIND_INLET * height, 0.5 * height))
     bubble = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0
     found = (
         # y+: the eddy viscosity is kappa y+ times the molecular one

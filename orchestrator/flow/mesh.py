@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
+from orchestrator.flow.grid import Grid
 
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
@@ -22,6 +23,10 @@ process, even under nohup. The one before keeps gmsh quiet about it."""
 _GMSH = threading.Lock()  # gmsh has one global state
 _TOLERANCE = 0.01
 _QUAD, _HEXAHEDRON = 3, 5  # gmsh's element types
+
+LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each corner, m;
+// cells from it to the next one, and the ratio of each of these to the one upstream of it.
+"""
 
 Points = NDArray[np.float64]
 Cells = NDArray[np.int64]
@@ -46,11 +51,18 @@ class Mesh:
     bed: Cells
 
 
+def write_line(grid: Grid, path: Path) -> None:
+    """Write the bed line and the cells along it as `pile.geo` includes them."""
+    rows = zip(grid.line.x, grid.line.z, (*grid.cells, 0), (*grid.ratio, 1.0), strict=True)
+    lines = ",\n".join(f"  {x!r}, {z!r}, {cells}, {ratio!r}" for x, z, cells, ratio in rows)
+    path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
+
+
 def write_mesh(directory: Path) -> None:
-    """Mesh a case: `pile.geo` with its `parameters.geo` becomes `pile.msh`, ASCII 2.2.
+    """Mesh a case: `pile.geo` with what it includes becomes `pile.msh`, ASCII 2.2.
 
     The mesh must hold hexahedra only, none of them inverted, the physical groups in `GROUPS`, and
-    first cells of the height `first_cell` (normal to the faces of the pile) within 1 %.
+    first cells of the height `first_cell` (normal to the windward faces) within 1 %.
 
     Parameters
     ----------

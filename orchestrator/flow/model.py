@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import LID_OVER_HEIGHT, WALL_STRESS, FlowCase
@@ -44,12 +44,12 @@ class FlowModel(ABC):
     def line(self) -> BedLine:
         """The bed line, m."""
         assert isinstance(self.scene.bed, PileBed)
-        return triangle(self.scene.bed.slope_deg, self.scene.bed.height)
+        return of_bed(self.scene.bed)
 
     @property
     def lid_speed_ratio(self) -> float:
         """U_e over u*_0: the approaching flow's speed at the lid over its friction velocity."""
-        lid = LID_OVER_HEIGHT * float(self.line.crest[1])
+        lid = LID_OVER_HEIGHT * self.line.h
         return 1 / undisturbed_ustar(1.0, lid, self.scene.solve_roughness)
 
     @property
@@ -94,6 +94,7 @@ class Solved(FlowModel):
         assert isinstance(bed, PileBed)
         try:
             return _shared(
+                line=self.line,
                 slope_deg=bed.slope_deg,
                 height_m=bed.height,
                 roughness_m=self.scene.solve_roughness,

@@ -10,7 +10,8 @@ from pydantic.fields import FieldInfo
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.info import Info, Scope
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
-from orchestrator.study.scene import Scene
+from orchestrator.study.profile import Profile
+from orchestrator.study.scene import FIELDS_OF_SHAPES, Scene
 
 PARTS: Mapping[str, type[Part]] = {
     "fluid": Fluid,
@@ -52,8 +53,7 @@ class Quantity:
 
     def asked(self, scene: Scene) -> Any:
         """Its value as a scene asks for it; None where it is left open or has no effect."""
-        value = self.read(scene) if APPLIES[self.info.scope](scene) else None
-        return value if value is None or isinstance(value, str | int | float) else str(value)
+        return plain(self.read(scene)) if APPLIES[self.info.scope](scene) else None
 
     def used(self, scene: Scene) -> Any:
         """Its value as a scene uses it; None where it has no effect."""
@@ -70,6 +70,13 @@ class Quantity:
         return f"{self.meaning}{unit}{scope}" + (f"; {words}" if words else "")
 
 
+def plain(value: Any) -> Any:
+    """A value as a cell of a table: what is not a word or a number becomes a text."""
+    if isinstance(value, tuple):
+        return "; ".join(map(str, value)) or None
+    return str(value) if isinstance(value, Profile) else value
+
+
 def _is_solved(scene: Scene) -> bool:
     return isinstance(scene.bed, PileBed) and scene.flow.model == "solve"
 
@@ -82,11 +89,14 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
     "piles": lambda scene: isinstance(scene.bed, PileBed),
+    "dunes": lambda scene: isinstance(scene.bed, PileBed) and scene.bed.shape == "dune",
+    "beds with level parts": lambda scene: (
+        isinstance(scene.bed, PileBed) and scene.bed.shape in FIELDS_OF_SHAPES["length"]
+    ),
+    "profiles": lambda scene: isinstance(scene.bed, PileBed) and bool(scene.bed.profile),
     "disordered piles": _is_disordered,
-    "poured beds": lambda scene: scene.is_poured,
-    "random beds and replicas": lambda scene: (
-        isinstance(scene.bed, PileBed)
-        and (_is_disordered(scene) or scene.is_poured or scene.bed.is_replica)
+    "disordered piles and replicas": lambda scene: (
+        isinstance(scene.bed, PileBed) and (_is_disordered(scene) or scene.bed.is_replica)
     ),
     "solved flows": _is_solved,
     "DEM": lambda scene: scene.protocol.method == "dem",

@@ -5,14 +5,21 @@ text under it are what tables, figures and the reference of study files say of i
 degrees and say so in their names; all else is in SI units or in the unit that is declared.
 """
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    field_validator,
+)
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
-from orchestrator.study import sizes
 from orchestrator.study.info import Info
+from orchestrator.study.profile import Profile, a_profile
 from orchestrator.study.ranges import (
     Damping,
     Density,
@@ -22,6 +29,7 @@ from orchestrator.study.ranges import (
     FrictionAngle,
     Gravity,
     Height,
+    LeeSlope,
     Length,
     LiftCoefficient,
     OverHeight,
@@ -32,19 +40,25 @@ from orchestrator.study.ranges import (
     Stiffness,
     Viscosity,
 )
-from orchestrator.study.sizes import Sizes
 
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
-Packing = Literal["aligned", "horizontal", "disordered", "poured"]
+Packing = Literal["aligned", "horizontal", "disordered"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
 Model = Literal["solve", "hill", "flat"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
+Shape = Literal[
+    "triangle", "dune", "cosine", "gaussian", "trapezoid", "step up", "step down", "flat"
+]
+Range = tuple[float, float]
+File = Annotated[
+    Profile, PlainValidator(a_profile), PlainSerializer(lambda profile: profile and profile.digest)
+]
 BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
-    "pile": "a triangular pile of grains across the flow",
+    "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
 }
 
 
@@ -98,37 +112,6 @@ class Grain(Part):
     """spring constant of a contact, normal and tangential, times the diameter over the weight"""
     damping: Annotated[Damping, Info("damping", scope="DEM", about="answer")] = 0.1
     """damping ratio of a collision"""
-    sizes: Annotated[
-        Sizes | None,
-        # scenes of equal grains are what they were before there were mixtures
-        Field(exclude_if=lambda value: value is None),
-        Info("sizes", scope="poured beds"),
-    ] = None
-    """mixture of a poured bed; by default all grains have the diameter. A sieve table: rows of
-    diameter (m, rising) and mass fraction, which gives the diameter as its d50. Or a log-normal
-    distribution by mass about the diameter, { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, with
-    cut-offs in d, two geometric standard deviations by default"""
-
-    @field_validator("sizes", mode="before")
-    @classmethod
-    def _sizes_of_a_file(cls, value: Any) -> Any:
-        try:
-            return sizes.read(value)
-        except ValueError as error:
-            remedy = "write [[5e-4, 0.4], [1e-3, 0.6]], or { sigma_g = 1.3 }"
-            raise UnfitError("grain.sizes", str(error), remedy) from None
-
-    @model_validator(mode="after")
-    def _sizes_fit(self) -> Self:
-        if self.sizes is None:
-            return self
-        if what := sizes.fault(self.sizes):
-            raise UnfitError("grain.sizes", what, "look at the rows")
-        median = sizes.percentile(self.sizes, self.diameter, 0.5)
-        if isinstance(self.sizes, tuple) and abs(self.diameter / median - 1) > 1e-9:
-            what = f"the d50 of grain.sizes is {median:.9g} m"
-            raise UnfitError("grain.diameter", what, "leave it out")
-        return self
 
 
 class Bed(Part):
@@ -160,13 +143,116 @@ class GrainBed(Bed):
     """what the bed is made of"""
 
 
+class Obstacle(Part):
+    """An obstacle across the flow, which carries no grains."""
+
+    kind: Literal["fence", "block", "half-cylinder"]
+    """what it is; all have steep sides, none is upright"""
+    x: float
+    """place of its middle, downstream of the foot of the first form"""
+    height: Height
+    """height over the bed"""
+    length: Length | None = None
+    """length of a block; by default its height"""
+
+    @property
+    def reach(self) -> float:
+        """From its middle to the foot of its sides on level bed, at most, m."""
+        return {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[self.kind] * self.height + (
+            (self.length or self.height) / 2 if self.kind == "block" else 0.0
+        )
+
+    def __str__(self) -> str:
+        length = f", {self.length:g} m long" if self.length else ""
+        return f"{self.kind} of {self.height:g} m at {self.x:g} m{length}"
+
+
+SLIP_FACE_DEG = 30.0
+LEVEL = 4.0
+
+
+def _unless(default: Any) -> Any:
+    """A field that a scene's digest leaves out where it says nothing: triangles keep their ids."""
+    return Field(exclude_if=lambda value: value == default)
+
+
 class PileBed(Bed):
-    """A triangular pile of grains across the flow (paper, 3.2)."""
+    """Grains across the flow, under a bed line of any shape (the paper's, 3.2, is a triangle)."""
 
     kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
     """what the bed is made of"""
     height: Annotated[Height, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
-    """height of the bed line that the flow goes over"""
+    """height of the forms that the flow goes over; that of a profile follows from it"""
+    shape: Annotated[
+        Shape,
+        _unless("triangle"),
+        Info(
+            "shape",
+            scope="piles",
+            choices={
+                "triangle": "two straight faces",
+                "dune": "a windward side and a slip face",
+                "cosine": "one wave of a cosine, from trough to trough",
+                "gaussian": "a Gaussian hill",
+                "trapezoid": "two straight faces and a level top",
+                "step up": "a straight face up to higher ground",
+                "step down": "a straight face down to lower ground",
+                "flat": "level bed",
+            },
+        ),
+    ] = "triangle"
+    """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
+    windward: Annotated[
+        Literal["straight", "curved"],
+        _unless("straight"),
+        Info(
+            "windward side",
+            scope="dunes",
+            choices={"straight": "one slope", "curved": "half a wave of a cosine"},
+        ),
+    ] = "straight"
+    """windward side of a dune"""
+    lee_slope_deg: Annotated[
+        LeeSlope | None, _unless(None), Info("lee slope", unit="°", scope="piles")
+    ] = None
+    """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
+    dune and a step down"""
+    brink_radius: Annotated[
+        float, Field(ge=0, le=1e3), _unless(0.0), Info("brink radius", unit="m", scope="dunes")
+    ] = 0.0
+    """radius with which a dune's brink is rounded; 0 leaves it sharp"""
+    length: Annotated[
+        Length | None, _unless(None), Info("length", unit="m", scope="beds with level parts")
+    ] = None
+    """length of level bed with grains: of a trapezoid's top, of a flat bed, before or behind a
+    step; by default 4 h"""
+    forms: Annotated[int, Field(ge=1, le=100), _unless(1), Info("forms", scope="piles")] = 1
+    """number of forms in a train"""
+    spacing: Annotated[Length | None, _unless(None), Info("spacing", unit="m", scope="piles")] = (
+        None
+    )
+    """from one form of a train to the next; by default they touch"""
+    profile: Annotated[File | None, _unless(None), Info("profile", scope="piles")] = None
+    """file with the bed line, in place of a shape: columns x_m and z_m; a path is relative to the
+    study file"""
+    smoothing: Annotated[
+        float, Field(ge=0, le=1e3), _unless(0.0), Info("smoothing", unit="m", scope="profiles")
+    ] = 0.0
+    """length over which a noisy profile is smoothed"""
+    obstacles: Annotated[tuple[Obstacle, ...], _unless(()), Info("obstacles", scope="piles")] = ()
+    """fences, blocks and half-cylinders on the bed, which carry no grains: tables with `kind`, `x`,
+    `height` and, of a block, `length`"""
+    counted: Annotated[
+        Literal["windward", "all"] | Range | None,
+        _unless(None),
+        Info(
+            "counted grains",
+            scope="piles",
+            choices={"windward": "on sides that rise", "all": "all"},
+        ),
+    ] = None
+    """exposed grains that are counted, or the range of x in which; by default those of windward
+    sides, all of a flat bed, a step down and a profile"""
     packing: Annotated[
         Packing,
         Info(
@@ -176,7 +262,6 @@ class PileBed(Bed):
                 "aligned": "rows along the slope",
                 "horizontal": "level rows",
                 "disordered": "random gaps",
-                "poured": "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
             },
         ),
     ] = "aligned"
@@ -185,28 +270,44 @@ class PileBed(Bed):
         float, Field(ge=1e-6, le=0.2), Info("disorder", unit="d", scope="disordered piles")
     ] = 0.02
     """largest gap between two grains of the row under the four uppermost"""
-    poured_depth: Annotated[
-        float,
-        Field(ge=3, le=100, exclude_if=lambda value: value == 6.0),
-        Info("depth of the mould", unit="d", scope="poured beds"),
-    ] = 6.0
-    """depth of a poured bed under the bed line, along the vertical, to a row of fixed grains"""
     seed: Annotated[
         int,
         Field(ge=0, le=10**9),
-        Info("seed", scope="random beds and replicas", about="replica"),
+        Info("seed", scope="disordered piles and replicas", about="replica"),
     ] = 0
-    """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
-    replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
+    """which of the many disordered packings; of a lattice 0 is itself, any other a replica with
+    grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
     mobile_layers: Annotated[
         int, Field(ge=1, le=1000), Info("mobile layers", scope="piles", about="answer")
     ] = 2
     """layers of the windward face that may move; below them the grains are fixed"""
 
+    @field_validator("obstacles", "counted", mode="before")
+    @classmethod
+    def _tuple_of_a_list(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+    @property
+    def lee_slope(self) -> float:
+        """Slope of a straight lee side, degrees."""
+        steep = self.shape in ("dune", "step down")
+        return self.lee_slope_deg or (SLIP_FACE_DEG if steep else self.slope_deg)
+
+    @property
+    def level_length(self) -> float:
+        """Length of level bed with grains, m."""
+        return self.length or LEVEL * self.height
+
+    @property
+    def counts(self) -> str | Range:
+        """Which exposed grains are counted."""
+        everywhere = self.profile or self.shape in ("flat", "step down")
+        return self.counted or ("all" if everywhere else "windward")
+
     @property
     def is_replica(self) -> bool:
         """Whether it is a lattice but for shifts that matter to nothing but round-off."""
-        return self.packing in ("aligned", "horizontal") and self.seed > 0
+        return self.packing != "disordered" and self.seed > 0
 
 
 class Flow(Part):

@@ -34,6 +34,8 @@ FrictionAngle = Annotated[float, Field(ge=1, le=89)]
 """Degrees. From wet ice to grains that hold by more than friction."""
 Slope = Annotated[float, Field(ge=0, lt=90)]
 """Degrees. The flow goes up it."""
+LeeSlope = Annotated[float, Field(gt=0, le=60)]
+"""Degrees. The grid lines of a mesh are vertical."""
 EntrainmentAngle = Annotated[float, Field(ge=1, le=60)]
 """Degrees. At 60 the two grains below touch; at 0 the grain falls between them."""
 LiftCoefficient = Annotated[float, Field(ge=0, le=100)]

@@ -2,6 +2,7 @@
 
 import re
 from functools import cached_property
+from itertools import pairwise
 from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
@@ -22,10 +23,19 @@ from orchestrator.study.parts import (
     Protocol,
     UnfitError,
 )
-from orchestrator.study.sizes import Sizes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+FORMS = ("triangle", "dune", "cosine", "gaussian", "trapezoid")
+FIELDS_OF_SHAPES = {
+    "windward": ("dune",),
+    "brink_radius": ("dune",),
+    "lee_slope_deg": ("triangle", "dune", "trapezoid", "step down"),
+    "length": ("trapezoid", "step up", "step down", "flat"),
+    "forms": FORMS,
+    "spacing": FORMS,
+}
+"""Fields that some shapes alone have."""
 
 
 class Scene(Part):
@@ -48,9 +58,6 @@ class Scene(Part):
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
         check_method(self.forces.law, self.protocol.method)
-        if self.grain.sizes is not None and not self.is_poured:
-            what = "a lattice has equal grains: a mixture needs a poured bed"
-            raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
@@ -63,11 +70,6 @@ class Scene(Part):
     def id(self) -> str:
         """Digest of the scene's canonical JSON."""
         return digest_text(canonical_json(self.model_dump(mode="json")))[:12]
-
-    @property
-    def is_poured(self) -> bool:
-        """Whether its bed is poured by LIGGGHTS."""
-        return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
 
     @property
     def reduced_gravity(self) -> float:
@@ -159,17 +161,42 @@ def check_pile(bed: PileBed, diameter: float) -> None:
         raise UnfitError(
             "bed.relative_size", "it is of a single grain on its neighbours", "leave it out"
         )
-    low, high = BUILDABLE_DEG
-    if not low <= bed.slope_deg <= high:
-        raise UnfitError(
-            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
-        )
+    if not bed.profile:
+        check_shape(bed)
+    for one, other in pairwise(sorted(bed.obstacles, key=lambda one: one.x)):
+        if other.x - one.x < one.reach + other.reach:
+            what = f"{one} and {other} overlap"
+            raise UnfitError("bed.obstacles", what, "move one of them")
     if bed.height < 5 * diameter:
         raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
         )
+
+
+def check_shape(bed: PileBed) -> None:
+    """What forms have, and what they are made of."""
+    low, high = BUILDABLE_DEG
+    rises = bed.shape not in ("flat", "step down")
+    if rises and not low <= bed.slope_deg <= high:
+        raise UnfitError(
+            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
+        )
+    if bed.smoothing:
+        raise UnfitError("bed.smoothing", "it is of a profile", "leave it out")
+    for field, shapes in FIELDS_OF_SHAPES.items():
+        if getattr(bed, field) != PileBed.model_fields[field].default and bed.shape not in shapes:
+            what = f"{_a(bed.shape)} has none"
+            raise UnfitError(f"bed.{field}", what, f"leave it out; it is of: {', '.join(shapes)}")
+    if not rises and bed.slope_deg:
+        raise UnfitError("bed.slope_deg", f"{_a(bed.shape)} does not rise", "leave it out")
+    if bed.spacing and bed.forms == 1:
+        raise UnfitError("bed.spacing", "one form has no neighbour", "raise bed.forms")
+
+
+def _a(shape: str) -> str:
+    return f"a {shape}" if shape != "flat" else "a flat bed"
 
 
 def check_mesh(height: float, first_cell_height: float) -> None:
@@ -193,17 +220,12 @@ def default_first_cell_height(height: float, roughness: float) -> float:
     return min(max(height / 40, rough), height / 4)
 
 
-def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:
-    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``.
-
-    Of a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
-    finer than.
-    """
+def roughness_length(value: Any, diameter: float) -> Any:
+    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``."""
     if not isinstance(value, str):
         return value
-    match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", value)
-    if not match or float(match[2]) == 0:
+    match = re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", value)
+    if not match or float(match[1]) == 0:
         raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
     # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
-    of = percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
-    return float(f"{of / float(match[2]):.12g}")
+    return float(f"{diameter / float(match[1]):.12g}")

@@ -19,16 +19,15 @@ from pydantic import ValidationError
 
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
-from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.profiles import Profiles
 from orchestrator.study.renamed import RENAMED
 from orchestrator.study.scene import Scene, roughness_length
-from orchestrator.study.sizes import Sizes
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group")
+TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group", "profiles")
 TIME_LIMIT_S = 3600.0
 LONGEST_S = 1e8
 """Three years."""
@@ -75,7 +74,7 @@ class Study:
     cluster : dict
         Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
-        The file itself.
+        The file itself, and the profiles that it names.
     """
 
     name: str
@@ -163,12 +162,13 @@ def parse(text: str, *, name: str, where: str) -> Study:
     title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    groups = tuple(_resolved(list(_groups(data, where))))
+    profiles = Profiles(Path(where).parent, dict(_table(data, "profiles", where)))
+    groups = tuple(_resolved(list(_groups(data, where, profiles))))
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
     cluster = _table(data, "cluster", where)
-    return Study(name, title, groups, float(limit), tolerance, cluster, text)
+    return Study(name, title, groups, float(limit), tolerance, cluster, text + profiles.added)
 
 
 def check_time(value: Any, where: str) -> None:
@@ -203,7 +203,7 @@ def check_tolerance(value: Any, where: str) -> None:
         )
 
 
-def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
+def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator[Group]:
     listed = data.get("group", [{}])
     if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
         raise InputError(
@@ -213,7 +213,7 @@ def _groups(data: Mapping[str, Any], where: str) -> Iterator[Group]:
         place = f"{where}: group {number}" if "group" in data else where
         _known(item, GROUP_KEYS, place, "")
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
-        scenes = tuple(_scenes(merged, place))
+        scenes = tuple(_scenes(merged, place, profiles))
         yield Group(str(item.get("name", f"group {number}")), scenes, place)
 
 
@@ -240,7 +240,7 @@ def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> list[Scene]:
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, profiles: Profiles) -> list[Scene]:
     axes = tables["axes"]
     for key, values in axes.items():
         part, dot, field = key.partition(".")
@@ -259,7 +259,7 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str) -> list[Scene]:
     grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
     if len(grid) > MOST_SCENES:
         raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
-    scenes = [make_scene(parts, where) for parts in _points(tables, grid)]
+    scenes = [make_scene(parts, where, profiles) for parts in _points(tables, grid)]
     if len(grid) > 1:
         _check_distinct(scenes, grid, where)
     return scenes
@@ -290,7 +290,9 @@ def _points(
         yield parts
 
 
-def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
+def make_scene(
+    parts: Mapping[str, dict[str, Any]], where: str, profiles: Profiles | None = None
+) -> Scene:
     """Validate the tables of one scene; `where` names the file in messages.
 
     Raises
@@ -299,26 +301,16 @@ def make_scene(parts: Mapping[str, dict[str, Any]], where: str) -> Scene:
         For the first thing wrong: the file, the field and the remedy.
     """
     bed = {**BED, **parts["bed"]}
+    if profiles and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
+        bed |= profiles.bed(bed, where)
     try:
-        mixture, grain = _mixture(parts["grain"])
-        if diameter := _of_the_bed(grain.get("diameter"), bed.get("relative_size", 1.0)):
-            bed["roughness"] = roughness_length(bed["roughness"], diameter, mixture)
-        return Scene.model_validate({**parts, "grain": grain, "bed": bed})
+        if diameter := _of_the_bed(parts["grain"].get("diameter"), bed.get("relative_size", 1.0)):
+            bed["roughness"] = roughness_length(bed["roughness"], diameter)
+        return Scene.model_validate({**parts, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
-
-
-def _mixture(grain: dict[str, Any]) -> tuple[Sizes | None, dict[str, Any]]:
-    """The sizes of a bed's grains, None where they are equal; the grain, a sieve's with its d50."""
-    try:
-        found = sizes.read(grain.get("sizes"))
-    except ValueError:
-        return None, {"diameter": 1e-3, **grain}  # the model will refuse the sizes
-    if not isinstance(found, tuple):
-        return found, grain
-    return found, {"diameter": sizes.percentile(found, 1.0, 0.5), **grain}
 
 
 def _of_the_bed(diameter: Any, relative_size: Any) -> float:

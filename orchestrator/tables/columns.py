@@ -24,6 +24,10 @@ COLUMNS: dict[str, str] = {
     "shields_closed_form": "the same, closed form",
     "shields_low": "lower end of its interval: load increment, count, scatter, known error",
     "shields_high": "upper end of the same",
+    "shields_model_low": "lower end of the model's interval: the choices that all levels share, "
+    "changed one at a time by `orchestrator budget`; empty where they were not measured",
+    "shields_model_high": "upper end of the same",
+    "model_share": "the shared choice that moves the threshold most",
     "drag_over_weight": "drag over the submerged weight, closed form, at the threshold",
     "s_m": "arc length along the bed line from the windward toe",
     "s_over_h": "the same over h",

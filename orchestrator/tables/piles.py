@@ -10,6 +10,7 @@ import pandas as pd
 
 from orchestrator.fidelity import checks
 from orchestrator.fidelity.decision import Decision
+from orchestrator.fidelity.spread import spread
 from orchestrator.grains import threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
@@ -117,6 +118,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "fraction": fraction,
             "shields": _shields(scene, found.tau),
             **_interval(scene, found, answer.decision.error_estimate or 0.0),
+            **_model_interval(answer.decision.asked, fraction, _shields(scene, found.tau)),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
@@ -139,6 +141,16 @@ def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
     return {
         "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - error))),
         "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + error))),
+    }
+
+
+def _model_interval(scene: Scene, fraction: float, shields: float) -> Row:
+    """What the choices do that all levels share; never a part of the numerical interval."""
+    found = spread(scene, fraction)
+    return {
+        "shields_model_low": shields * (1 - found.low),
+        "shields_model_high": shields * (1 + found.high),
+        "model_share": found.dominant or None,
     }
 
 

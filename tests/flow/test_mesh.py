@@ -9,11 +9,13 @@ import meshio
 import numpy as np
 import pytest
 
+from orchestrator.bed.shapes import between_flats, of_bed
 from orchestrator.errors import SolverError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import Mesh, first_cell_heights, smallest_jacobian, write_mesh
 from orchestrator.runs import assets, case
 from orchestrator.study.scene import default_first_cell_height
+from tests.bed.test_shapes import SHAPES, H, bed
 from tests.flow.conftest import PILE
 
 
@@ -47,6 +49,32 @@ def test_a_mesh_for_each_pile(
     above_toe = z[np.isclose(x, crest)]
     assert above_toe.min() == pytest.approx(height if slope else 0.0, abs=1e-12)
     np.testing.assert_allclose(first_cell_heights(mesh), first / cos(radians(slope)), rtol=0.01)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
+    shape = bed(**SHAPES[name])
+    line = of_bed(shape)
+    flow = FlowCase(shape.slope_deg, H, shape.roughness, 10.0, 1e-6, H / 20, line=line)
+    mesh = written(case.prepare(flow, tmp_path))
+    corners = np.unique(np.round(mesh.points[mesh.bed][..., [0, 2]], 9).reshape(-1, 2), axis=0)
+    # the corners of the bed line are among the grid lines, and all others lie on it
+    np.testing.assert_allclose(corners[:, 1], line.height(corners[:, 0]), atol=2e-9)
+    assert all(np.abs(corners[:, 0] - x).min() < 2e-9 for x in line.x)
+    # but for bed at a sharp bend, neighbours differ by less than a factor
+    steps = np.diff(corners[:, 0])
+    assert (steps[1:] / steps[:-1]).max() < 3
+    np.testing.assert_allclose(
+        first_cell_heights(mesh), H / 20 / cos(radians(shape.slope_deg)), rtol=0.01
+    )
+
+
+def test_a_thousand_corners_are_meshed(tmp_path: Path) -> None:
+    x = np.linspace(0, 1, 1000)
+    line = between_flats(np.column_stack([x, 0.01 * (1 - np.cos(10 * np.pi * x))]), H)
+    flow = FlowCase(15.0, H, H / 600, 10.0, 1e-6, H / 20, line=line)
+    mesh = written(case.prepare(flow, tmp_path))
+    assert len(mesh.bed) == sum(flow.grid.cells) >= 999
 
 
 def test_twice_the_cells_keep_the_first_cell(tmp_path: Path) -> None:
@@ -96,9 +124,9 @@ def test_an_inverted_cell_is_seen() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "cause"),
     [
-        ("first = first_cell/Cos(slope);", "first = 1.3*first_cell;", "first cells 2"),
+        ("first_cell/Cos(slope_deg*Pi/180);", "1.3*first_cell;", "first cells 2"),
         ('"lid"', '"lib"', r"physical groups \['lid'\]"),
-        ("  Recombine Surface{61 + i};", "", "not of hexahedra only"),
+        ("Recombine Surface{:};", "", "not of hexahedra only"),
     ],
 )
 def test_a_mesh_that_is_not_the_one_asked_for(

@@ -13,12 +13,17 @@ from operator import add
 from pathlib import Path
 
 from orchestrator.fidelity.levels import Levels, Part
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
 FOLDER = Path(__file__).parent
 DISORDERS = (0.02, 0.05, 0.2)
 """Sizes of disorder up to which errors are known together, d."""
+
+
+VISCOUS, ROUGH = 3.0, 30.0
+"""Re* below which a bed is hydraulically smooth, and from which it is rough."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,14 @@ def scene_class(part: Part, scene: Scene) -> str:
         size = next(size for size in DISORDERS if scene.bed.disorder <= size)
         packing = f"disordered up to {size:g} d"
     return packing + ending
+
+
+def model_class(scene: Scene) -> str:
+    """The class of scenes that share what the choices common to all levels do to a threshold."""
+    assert isinstance(scene.bed, PileBed)
+    reynolds = float(closed_form(scene).reynolds)
+    names = {VISCOUS: "viscous", ROUGH: "transitional", math.inf: "rough"}
+    return f"{scene.bed.packing}, {next(name for end, name in names.items() if reynolds < end)}"
 
 
 def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:

@@ -1,38 +1,25 @@
-// A triangular pile under a boundary layer: four blocks of hexahedra with vertical grid lines,
-// one cell thick. x downstream from the windward toe, z upwards from the flat bed.
+// A bed line under a boundary layer: a block of hexahedra from each of its corners to the next one,
+// with vertical grid lines, one cell thick. x downstream, z upwards from the flat bed.
 Include "parameters.geo";
+Include "bed_line.geo";
 
 Mesh.MshFileVersion = 2.2;  // gmshToFoam reads it
 Mesh.Binary = 0;
 
-slope = slope_deg*Pi/180;
-If (slope_deg > 0)
-  rise = height;
-  face = height/Tan(slope);
-Else
-  rise = 0;
-  face = 4*height;
-EndIf
 lid = 10*height;
-upstream = 10*height;
-downstream = 20*height;
 thickness = height/10;
 
-// twice the cells along a face: twice the cells everywhere, but the same first cell
-growth = growth_at_40^(40/cells_per_face);
+// the grid lines are vertical, the height of the first cell is normal to the windward faces
+first = first_cell/Cos(slope_deg*Pi/180);
+cells_up = Ceil(Log(1 + lid*(growth - 1)/first)/Log(growth));
 
-// the cells that begin with `first` and grow by `growth` until they fill `length`
-Macro Count
-  cells = Ceil(Log(1 + length*(growth - 1)/first)/Log(growth));
-Return
-
-// the ratio at which `cells` cells that begin with `first` fill `length` exactly
+// the ratio at which these cells, beginning with `first`, fill `length` exactly
 Macro Ratio
   low = 1 + 1e-9;
   high = 2;
   For bisection In {1:60}
     ratio = (low + high)/2;
-    If (first*(ratio^cells - 1)/(ratio - 1) < length)
+    If (first*(ratio^cells_up - 1)/(ratio - 1) < length)
       low = ratio;
     Else
       high = ratio;
@@ -40,80 +27,57 @@ Macro Ratio
   EndFor
 Return
 
-// the faces: the cells at the crest, where the stress has its peak, are half as long as the mean
-cells = cells_per_face;
-length = face;
-first = face/cells_per_face/2;
-Call Ratio;
-ratio_face = ratio;
-
-// the flat bed before and behind goes on from the cell at the toe
-first = first*ratio^(cells - 1);
-length = upstream;
-Call Count;
-Call Ratio;
-cells_upstream = cells;
-ratio_upstream = ratio;
-length = downstream;
-Call Count;
-Call Ratio;
-cells_downstream = cells;
-ratio_downstream = ratio;
-
-// upwards: the grid lines are vertical, the height of the first cell is normal to the faces
-first = first_cell/Cos(slope);
-length = lid;
-Call Count;
-Call Ratio;
-cells_up = cells;
-ratio_flat = ratio;
-length = lid - rise;
-Call Ratio;
-ratio_crest = ratio;
-
-x() = {-upstream, 0, face, 2*face, 2*face + downstream};
-z() = {0, 0, rise, 0, 0};
-For i In {0:4}
-  Point(1 + i) = {x(i), 0, z(i)};
-  Point(11 + i) = {x(i), 0, lid};
-  Line(21 + i) = {1 + i, 11 + i};
-EndFor
-For i In {0:3}
-  Line(31 + i) = {1 + i, 2 + i};
-  Line(41 + i) = {11 + i, 12 + i};
-  Curve Loop(51 + i) = {31 + i, 22 + i, -(41 + i), -(21 + i)};
-  Plane Surface(61 + i) = {51 + i};
-EndFor
-Transfinite Curve{21, 22, 24, 25} = cells_up + 1 Using Progression ratio_flat;
-Transfinite Curve{23} = cells_up + 1 Using Progression ratio_crest;
-Transfinite Curve{31, 41} = cells_upstream + 1 Using Progression 1/ratio_upstream;
-Transfinite Curve{32, 42} = cells_per_face + 1 Using Progression 1/ratio_face;
-Transfinite Curve{33, 43} = cells_per_face + 1 Using Progression ratio_face;
-Transfinite Curve{34, 44} = cells_downstream + 1 Using Progression ratio_downstream;
-
-far_side() = {};
-air() = {};
-bed() = {};
-top() = {};
-For i In {0:3}
-  Transfinite Surface{61 + i} = {1 + i, 2 + i, 12 + i, 11 + i};
-  Recombine Surface{61 + i};
-  block() = Extrude {0, thickness, 0} { Surface{61 + i}; Layers{1}; Recombine; };
-  far_side() += block(0);
-  air() += block(1);
-  bed() += block(2);
-  top() += block(4);
-  If (i == 0)
-    inlet = block(5);
+// every entity by its number: to let gmsh find them, as Extrude does, takes minutes for 1000 corners.
+// Points of corner i: on the bed and on the lid, here and, beyond the cells, there.
+n = #bed_line()/4;
+last = n - 1;
+level = 1e300;
+For i In {0:last}
+  x = bed_line(4*i);
+  If (bed_line(4*i + 1) != level)
+    level = bed_line(4*i + 1);
+    length = lid - level;
+    Call Ratio;
   EndIf
-  If (i == 3)
-    outlet = block(3);
-  EndIf
+  Point(1 + i) = {x, 0, level};
+  Point(1 + n + i) = {x, 0, lid};
+  Point(1 + 2*n + i) = {x, thickness, level};
+  Point(1 + 3*n + i) = {x, thickness, lid};
+  Line(1 + i) = {1 + i, 1 + n + i};
+  Line(1 + n + i) = {1 + 2*n + i, 1 + 3*n + i};
+  Line(1 + 2*n + i) = {1 + i, 1 + 2*n + i};
+  Line(1 + 3*n + i) = {1 + n + i, 1 + 3*n + i};
+  Transfinite Curve{1 + i, 1 + n + i} = cells_up + 1 Using Progression ratio;
+  Transfinite Curve{1 + 2*n + i, 1 + 3*n + i} = 2;
+  Curve Loop(1 + i) = {1 + i, 1 + 3*n + i, -(1 + n + i), -(1 + 2*n + i)};
+  Plane Surface(1 + i) = {1 + i};
 EndFor
+For i In {0:last - 1}
+  For side In {0:3}
+    Line(1 + (4 + side)*n + i) = {1 + side*n + i, 2 + side*n + i};
+    Transfinite Curve{1 + (4 + side)*n + i} = bed_line(4*i + 2) + 1
+      Using Progression bed_line(4*i + 3);
+  EndFor
+  For side In {0:1}  // here and there
+    Curve Loop(1 + (1 + side)*n + i) = {1 + (4 + 2*side)*n + i, 2 + side*n + i,
+      -(1 + (5 + 2*side)*n + i), -(1 + side*n + i)};
+    // bed and lid
+    Curve Loop(1 + (3 + side)*n + i) = {1 + (4 + side)*n + i, 2 + (2 + side)*n + i,
+      -(1 + (6 + side)*n + i), -(1 + (2 + side)*n + i)};
+  EndFor
+  For side In {1:4}
+    Plane Surface(1 + side*n + i) = {1 + side*n + i};
+  EndFor
+  Surface Loop(1 + i) = {1 + i, 2 + i, 1 + n + i, 1 + 2*n + i, 1 + 3*n + i, 1 + 4*n + i};
+  Volume(1 + i) = {1 + i};
+EndFor
+Transfinite Surface{:};
+Recombine Surface{:};
+Transfinite Volume{:};
 
-Physical Volume("air") = {air()};
-Physical Surface("bed") = {bed()};
-Physical Surface("lid") = {top()};
-Physical Surface("inlet") = {inlet};
-Physical Surface("outlet") = {outlet};
-Physical Surface("sides") = {61:64, far_side()};
+Physical Volume("air") = {1:last};
+Physical Surface("bed") = {1 + 3*n:3*n + last};
+Physical Surface("lid") = {1 + 4*n:4*n + last};
+Physical Surface("inlet") = {1};
+Physical Surface("outlet") = {n};
+Physical Surface("sides") = {1 + n:n + last, 1 + 2*n:2*n + last};

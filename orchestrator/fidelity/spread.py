@@ -1,0 +1,86 @@
+"""The model's own spread: what the choices are worth that all fidelity levels share.
+
+``calibration/budget.csv`` holds what ``orchestrator budget`` measured: for each class of scenes,
+choice and fraction, how far its alternatives lower and raise a threshold.
+"""
+
+import csv
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+
+from orchestrator.fidelity import calibration
+from orchestrator.study.scene import Scene
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one choice does to a threshold.
+
+    Attributes
+    ----------
+    choice : str
+        Its name.
+    low, high : float
+        How far its alternatives lower and raise the Shields number, relative, at least 0.
+    """
+
+    choice: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What all shared choices do together.
+
+    Attributes
+    ----------
+    low, high : float
+        How far they lower and raise the Shields number of a threshold, relative; NaN where nothing
+        is known.
+    dominant : str
+        The choice with the widest share; empty where nothing is known.
+    """
+
+    low: float
+    high: float
+    dominant: str
+
+
+UNKNOWN = Spread(math.nan, math.nan, "")
+
+
+def together(values: Iterable[float]) -> float:
+    """Shares of choices that have nothing to do with one another, as one: their root sum square."""
+    return math.hypot(*values)
+
+
+def spread(scene: Scene, fraction: float) -> Spread:
+    """The spread of the threshold of a pile at a fraction of its grains."""
+    rows = _measured().get(calibration.model_class(scene), {})
+    if not rows:
+        return UNKNOWN
+    # between the fractions that were measured the nearest one speaks
+    return _of(rows[min(rows, key=lambda known: abs(known - fraction))])
+
+
+def _of(shares: tuple[Share, ...]) -> Spread:
+    # nothing falls below zero, however many choices lower it
+    low = min(together(one.low for one in shares), 1.0)
+    high = together(one.high for one in shares)
+    return Spread(low, high, max(shares, key=lambda one: one.low + one.high).choice)
+
+
+@cache
+def _measured() -> dict[str, dict[float, tuple[Share, ...]]]:
+    """What was measured, by class of scenes, then by fraction."""
+    found: dict[str, dict[float, tuple[Share, ...]]] = {}
+    with (calibration.FOLDER / "budget.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            share = Share(row["choice"], float(row["shields_low"]), float(row["shields_high"]))
+            by_fraction = found.setdefault(row["model_class"], {})
+            fraction = float(row["fraction"])
+            by_fraction[fraction] = (*by_fraction.get(fraction, ()), share)
+    return found

@@ -1,0 +1,65 @@
+"""The profiles that a study file names, from files beside it or from the study's own text."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.study import profile
+
+OWN = ("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius")
+"""Fields of a bed that a profile has of its own."""
+
+
+@dataclass
+class Profiles:
+    """Profiles by the name that the study file gives them.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the study file.
+    texts : dict
+        Text of each, of the study's own table `profiles` at first.
+    added : str
+        TOML with those that came from files: with it the study's text is whole without them.
+    """
+
+    folder: Path
+    texts: dict[str, Any]
+    added: str = field(default="", init=False)
+
+    def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
+        """What a profile says of a bed whose table names one; `where` names the study file.
+
+        Raises
+        ------
+        InputError
+            Naming the file, the line or the field, and the remedy.
+        """
+        for name in OWN:
+            if name in bed:
+                raise InputError(
+                    "a profile has its own", where=f"{where}: bed.{name}", remedy="leave it out"
+                )
+        name, smoothing = bed["profile"], bed.get("smoothing", 0.0)
+        if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
+            smoothing = 0.0  # the model will refuse it
+        found = profile.read(self._text(name), Path(name).name, self._place(name), smoothing)
+        return {"profile": found, "height": found.height, "slope_deg": found.steepest_deg}
+
+    def _place(self, name: str) -> str:
+        return str(self.folder / name)
+
+    def _text(self, name: str) -> str:
+        if name not in self.texts:
+            self.texts[name] = profile.text_of(self.folder / name)
+            head = "" if self.added else "\n[profiles]\n"
+            # a JSON string is a TOML string, but for the mark of deletion
+            text = json.dumps(self.texts[name], ensure_ascii=False).replace("\x7f", "\\u007f")
+            self.added += f"{head}{json.dumps(name)} = {text}\n"
+        text = self.texts[name]
+        if not isinstance(text, str):
+            raise InputError("not a text", where=f"profiles: {name}", remedy="write x_m,z_m ...")
+        return text

@@ -1,0 +1,91 @@
+"""Bed lines of all shapes: heights, slopes, trains, obstacles."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator.bed.shapes import of_bed, triangle
+from orchestrator.study.parts import Obstacle, PileBed, UnfitError
+
+H = 0.02
+
+
+def bed(**fields: Any) -> PileBed:
+    common = {"kind": "pile", "height": H, "roughness": H / 600, "slope_deg": 15.0}
+    return PileBed.model_validate({**common, **fields})
+
+
+SHAPES: dict[str, dict[str, Any]] = {
+    "triangle": {},
+    "dune": {"shape": "dune"},
+    "curved dune": {"shape": "dune", "windward": "curved"},
+    "rounded dune": {"shape": "dune", "brink_radius": H},
+    "curved and rounded": {"shape": "dune", "windward": "curved", "brink_radius": H},
+    "cosine": {"shape": "cosine"},
+    "gaussian": {"shape": "gaussian"},
+    "trapezoid": {"shape": "trapezoid"},
+    "step up": {"shape": "step up", "slope_deg": 40.0},
+    "step down": {"shape": "step down", "slope_deg": 0.0},
+    "flat": {"shape": "flat", "slope_deg": 0.0},
+    "train": {"shape": "dune", "forms": 5},
+    "apart": {"forms": 3, "spacing": 0.3},
+    "fence": {"obstacles": (Obstacle(kind="fence", x=-0.1, height=0.01),)},
+    "cylinder": {"obstacles": (Obstacle(kind="half-cylinder", x=0.3, height=0.005),)},
+    "block on it": {"obstacles": (Obstacle(kind="block", x=0.04, height=0.005, length=0.01),)},
+}
+
+
+def test_the_triangle_is_what_a_bed_is_by_default() -> None:
+    assert of_bed(bed()) == triangle(15.0, H)
+    assert "shape" not in bed().model_dump()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_line_goes_downstream_between_flat_beds(name: str) -> None:
+    line = of_bed(bed(**SHAPES[name]))
+    assert np.all(np.diff(line.x) > 0)
+    assert line.x[1] - line.x[0] == pytest.approx(10 * H)
+    assert line.x[-1] - line.x[-2] == pytest.approx(20 * H)
+    assert line.z[0] == line.z[1]
+    assert line.z[-1] == pytest.approx(line.z[-2])
+    assert np.interp(0.0, line.x, line.arc_lengths) == 0
+
+
+@pytest.mark.parametrize("name", ["triangle", "dune", "cosine", "gaussian", "trapezoid", "train"])
+def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
+    line = of_bed(bed(**SHAPES[name]))
+    assert max(line.z) == pytest.approx(H)
+    assert line.slopes_deg.max() == pytest.approx(15.0, rel=0.01)
+
+
+def test_a_dune_has_a_slip_face_and_its_brink_may_be_rounded() -> None:
+    sharp, rounded = (of_bed(bed(**SHAPES[name])) for name in ("dune", "rounded dune"))
+    assert sharp.slopes_deg.min() == pytest.approx(-30.0)
+    assert sharp.bends_deg.max() == pytest.approx(45.0)
+    assert rounded.bends_deg.max() < 2.1
+    # the arc lies within a radius of the tip, under it
+    assert H - H * (1 / np.cos(np.radians(22.5)) - 1) < max(rounded.z) < H
+    assert rounded.slopes_deg.min() == pytest.approx(-30.0)
+
+
+def test_forms_of_a_train_are_alike() -> None:
+    line, one = of_bed(bed(**SHAPES["apart"])), of_bed(bed())
+    for place in range(3):
+        x = np.linspace(0, one.x[-2], 50)
+        np.testing.assert_allclose(line.height(x + 0.3 * place), one.height(x), atol=1e-12)
+
+
+def test_forms_that_overlap_are_refused() -> None:
+    with pytest.raises(UnfitError, match=r"bed.spacing: forms 0.149\d* m long overlap at 0.1 m"):
+        of_bed(bed(forms=2, spacing=0.1))
+
+
+@pytest.mark.parametrize(("name", "x", "z"), [("fence", -0.1, 0.01), ("cylinder", 0.3, 0.005)])
+def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str, x: float, z: float) -> None:
+    line = of_bed(bed(**SHAPES[name]))
+    assert float(line.height(np.array(x))) == pytest.approx(z)
+    ((start, end),) = line.bare
+    assert start < x < end
+    assert np.abs(line.slopes_deg).max() < 75.1
+    np.testing.assert_allclose(line.height(np.array([start, end])), 0.0, atol=1e-12)
