@@ -58,7 +58,7 @@ class Plan:
         return {one.name: state for one, state in zip(asked, states, strict=True) if state}
 
 
-def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
+def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
     Parameters
@@ -67,6 +67,8 @@ def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
         With a tolerance, each scene is answered on the cheapest levels that are known to meet it.
     above : mapping, optional
         By scene id: levels that turned out to be not good enough.
+    cases : Path, optional
+        Where the runs are, or will be; the grains of a poured bed are read from there.
 
     Raises
     ------
@@ -79,16 +81,21 @@ def make(study: Study, above: Mapping[str, Bound] | None = None) -> Plan:
     decisions = {
         scene.id: decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
     }
-    return of(decisions, study.name, study.tolerance)
+    return of(decisions, study.name, study.tolerance, cases)
 
 
-def of(decisions: Mapping[str, Decision], name: str, tolerance: float | None = None) -> Plan:
+def of(
+    decisions: Mapping[str, Decision],
+    name: str,
+    tolerance: float | None = None,
+    cases: Path | None = None,
+) -> Plan:
     """List the cases that some decisions need; `name` names the study in messages.
 
     With a tolerance, answers without DEM are checked by it.
     """
     checked = checks.decisions(decisions, tolerance, _cost_s) if tolerance else {}
-    piles, check_piles = _piles(decisions), _piles(checked)
+    piles, check_piles = _piles(decisions, cases), _piles(checked, cases)
     grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
     try:
@@ -99,9 +106,9 @@ def of(decisions: Mapping[str, Decision], name: str, tolerance: float | None = N
     return Plan(dict(decisions), piles, cells, check_piles, _in_order([*ordered, *cells]))
 
 
-def _piles(decisions: Mapping[str, Decision]) -> dict[str, Pile]:
+def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
     return {
-        asked: Pile(one.scene)
+        asked: Pile(one.scene, cases)
         for asked, one in decisions.items()
         if isinstance(one.scene.bed, PileBed)
     }
@@ -115,7 +122,7 @@ def settled(study: Study, directory: Path) -> Plan:
     """The plan after what the runs say: dearer levels where one failed or DEM overrules it."""
     above: dict[str, Bound] = {}
     while True:
-        planned = make(study, above)
+        planned = make(study, above, directory)
         if study.tolerance is None:
             return planned
         more = {**_failed(planned, directory), **_overruled(planned, study.tolerance, directory)}

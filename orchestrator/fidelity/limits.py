@@ -107,6 +107,8 @@ def _bed_line(scene: Scene) -> str | None:
         of_bed(bed)
     except UnfitError as error:
         return str(error)
+    if bed.packing == "poured":
+        return "no grains can be poured around obstacles" if bed.obstacles else None
     if bed.shape != "triangle" or bed.profile or bed.obstacles or bed.forms > 1:
         return f"no grains lie on a bed like this one yet: {bed.profile or bed.shape}"
     return None

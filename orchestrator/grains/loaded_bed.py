@@ -1,19 +1,21 @@
 """The bed of a scene under its flow: bed line, packing, stress on the grains, forces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.bed import packing
+from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
+from orchestrator.bed.poured_case import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
+from orchestrator.grains import peeling
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces
 from orchestrator.study.parts import PileBed
@@ -24,7 +26,11 @@ FloatArray = NDArray[np.float64]
 TOE = 0.05
 """Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
 
+DIGITS = 9
+"""Of lengths in d that a poured bed depends on: beds that differ in their scale alone share it."""
+
 _packed = cache(packing.pile)
+_poured = cache(poured.read)
 
 
 @dataclass(frozen=True)
@@ -48,9 +54,18 @@ class Face:
 
 @dataclass(frozen=True)
 class LoadedBed:
-    """The bed of a scene of a pile, and the flow's forces on its n grains."""
+    """The bed of a scene of a pile, and the flow's forces on its n grains.
+
+    Attributes
+    ----------
+    scene : Scene
+        Of a pile.
+    cases : Path or None
+        Holds the finished runs; only the grains of a poured bed are read from there.
+    """
 
     scene: Scene
+    cases: Path | None = field(default=None, compare=False)
 
     @property
     def bed(self) -> PileBed:
@@ -74,9 +89,37 @@ class LoadedBed:
         """The bed line, diameters."""
         return self.model.line.scaled(1 / self.scene.grain.diameter)
 
+    @property
+    def surface(self) -> float:
+        """Height over the bed line of the centre of an exposed grain, d."""
+        return 0.5 + self.bed.roughness / self.scene.grain.diameter
+
+    @cached_property
+    def pouring(self) -> tuple[PouredBed, ...]:
+        """The run that pours the bed, if one does."""
+        if not self.scene.is_poured:
+            return ()
+        line, grain = self.line, self.scene.grain
+        x, z = (tuple(round(v, DIGITS) for v in values) for values in (line.x, line.z))
+        return (
+            PouredBed(
+                line=replace(line, x=x, z=z),
+                depth=self.bed.poured_depth,
+                surface=round(self.surface, DIGITS),
+                sizes=grain.sizes,
+                diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
+                friction_angle_deg=grain.friction_angle_deg,
+                seed=self.bed.seed,
+            ),
+        )
+
     @cached_property
     def packing(self) -> Packing:
         """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        for run in self.pouring:
+            assert self.cases is not None, "a poured bed is known when its run is done"
+            where, layers = self.cases / run.name, self.bed.mobile_layers
+            return _poured(where, self.line, surface=self.surface, mobile_layers=layers)
         return _packed(
             self.line,
             entrainment_angle_deg=self.bed.entrainment_angle_deg,
@@ -90,7 +133,10 @@ class LoadedBed:
     @cached_property
     def tangents(self) -> FloatArray:
         """Unit vector downstream along the bed line under each grain, shape (n, 2)."""
-        segments = np.where(self.packing.lee, self.line.lee, self.line.windward)
+        if self.pouring:
+            segments, _ = self.line.nearest(self.packing.centres)
+        else:
+            segments = np.where(self.packing.lee, self.line.lee, self.line.windward)
         return np.asarray(self.line.tangents[segments])
 
     @property
@@ -159,12 +205,37 @@ class LoadedBed:
         )
 
     def alone(self, speed: FloatArray) -> FloatArray:
-        """Undisturbed friction velocity at which each grain's own stress reaches Eq. 3 or 5, m/s.
+        """Undisturbed friction velocity at which each windward grain moves by itself, m/s.
 
-        Infinite for grains in flow that runs back.
+        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it begins to
+        roll out of its own pocket. Infinite for grains in flow that runs back.
         """
+        if self.pouring:
+            ratio = np.zeros(len(self.packing.sizes))
+            ratio[self.packing.windward] = np.maximum(speed, 0)
+            grains = (self.packing.centres, self.packing.sizes)
+            found = peeling.pivots(*grains, self.loading(ratio), self.force_tables)
+            return np.asarray(found[self.packing.windward])
         threshold = float(closed_form(self.scene).friction_velocity)
         return np.where(speed > 0, threshold / np.where(speed > 0, speed, 1), np.inf)
+
+    def leaving(self, ratio: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s.
+
+        Parameters
+        ----------
+        ratio : ndarray, shape (n,)
+            Local friction velocity over the undisturbed one, signed.
+        """
+        found = peeling.flows(
+            self.packing.centres,
+            self.packing.sizes,
+            self.loading(ratio),
+            self.force_tables,
+            along=self.tangents,
+            marker=self.scene.protocol.displacement_criterion,
+        )
+        return np.asarray(found[self.packing.windward])
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """The same, sorted, shape (N,).

@@ -4,7 +4,6 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.grains import peeling
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile_case import PileCase
@@ -39,7 +38,7 @@ class Peeling(Method):
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
-        return Motion.of_flows(peeling.of_bed(self.bed, self.bed.ustar_over_ustar0(cases)))
+        return Motion.of_flows(self.bed.leaving(self.bed.ustar_over_ustar0(cases)))
 
 
 class Dem(Method):

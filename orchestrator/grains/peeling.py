@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.loading import ForceTable, Loading
 
 FloatArray = NDArray[np.float64]
@@ -29,27 +28,6 @@ REACH = 1.4
 of its own diameter."""
 MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
-
-
-def of_bed(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
-    """Undisturbed friction velocity at which each windward grain leaves, m/s, shape (N,).
-
-    Parameters
-    ----------
-    bed : LoadedBed
-        The bed.
-    ratio : ndarray, shape (n,)
-        Local friction velocity over the undisturbed one, signed.
-    """
-    found = flows(
-        bed.packing.centres,
-        bed.packing.sizes,
-        bed.loading(ratio),
-        bed.force_tables,
-        along=bed.tangents,
-        marker=bed.scene.protocol.displacement_criterion,
-    )
-    return np.asarray(found[bed.packing.windward])
 
 
 def flows(

@@ -23,7 +23,7 @@ class Pile(LoadedBed):
     @cached_property
     def runs(self) -> tuple[Case, ...]:
         """The cases that its answer is read from, those of the flow first."""
-        return (*self.model.cases, *self.method.cases)
+        return (*self.model.cases, *self.pouring, *self.method.cases)
 
     @property
     def case(self) -> PileCase:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.grains import deck, motion, peeling, protocol, rest
+from orchestrator.grains import deck, motion, protocol, rest
 from orchestrator.grains.case import GrainCase
 from orchestrator.grains.loaded_bed import FloatArray, LoadedBed
 from orchestrator.runs.case import Case
@@ -33,8 +33,8 @@ class PileCase(GrainCase):
 
     @property
     def needs(self) -> tuple[Case, ...]:
-        """The runs of its flow model."""
-        return self.loaded.model.cases
+        """The runs of its flow model, and the one that pours its bed."""
+        return (*self.loaded.model.cases, *self.loaded.pouring)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -46,77 +46,79 @@ class PileCase(GrainCase):
         """Expected wall time, s."""
         rules, line = self.scene.protocol, self.loaded.line
         # the whole pile is half its rows thick on average
-        layers = min(self.loaded.bed.mobile_layers, line.crest[1] / 2)
-        grains = line.crest_s * (layers + 3)
+        most = self.loaded.bed.poured_depth if self.loaded.pouring else line.crest[1] / 2
+        length = line.x[-2] - line.x[1] if self.loaded.pouring else line.crest_s
+        grains = length * (min(self.loaded.bed.mobile_layers, most) + 3)
         load_steps = np.log(3.5) / np.log1p(rules.load_increment)
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
-        ratio = self.loaded.ustar_over_ustar0(cases)
-        flows = self._flows(ratio)
-        force = self.loaded.loading(ratio).in_steps(flows.tolist())
-        margin = MARGIN * self.scene.grain.diameter
-        deck.write(directory, self._grains, self._numbers, flows, force, margin=margin)
-
-    def _flows(self, ratio: FloatArray) -> FloatArray:
-        """The flow of the settling, then of each load step: from before the first grain goes."""
-        bed, rules = self.loaded, self.scene.protocol
-        thresholds = np.sort(peeling.of_bed(bed, ratio))
-        if not 0 < thresholds[0] < np.inf or self.scene.forces.loaded_grains != "exposed":
-            # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
-            thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
-        last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
-        if not np.isfinite(last):
-            last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-        return protocol.flows(
-            protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment
-        )
-
-    @property
-    def _numbers(self) -> dict[str, float | int]:
-        """The parameters of the deck."""
-        bed, rules, d = self.loaded, self.scene.protocol, self.scene.grain.diameter
-        line = bed.line
-        ceiling = (MARGIN + 0.5) / line.tangents[line.windward, 0]
-        return {
-            "diameter": d,
-            "smallest": self._grains.smallest,
-            "density": self.scene.grain.density,
-            "gravity": self.scene.reduced_gravity,
-            **protocol.contact(self.scene.grain, rules),
-            **protocol.raising(rules, int((1 - rules.final_fraction) * bed.packing.count + 1e-9)),
-            "slope": line.slopes_deg[line.windward],
-            "ceiling_x": line.crest[0] * d,
-            "ceiling_z": (line.crest[1] + ceiling) * d,
-            "behind": self._grains.last_mobile + protocol.AWAY * d,
-        }
+        bed = LoadedBed(self.scene, cases)
+        ratio = bed.ustar_over_ustar0(cases)
+        rising = flows(bed, ratio)
+        force = bed.loading(ratio).in_steps(rising.tolist())
+        grains, margin = table(bed), MARGIN * self.scene.grain.diameter
+        deck.write(directory, grains, _numbers(bed, grains), rising, force, margin=margin)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
-        grain = self.scene.grain
-        rest.check(directory, self._grains, self.scene.weight, grain.stiffness, all_rest=True)
+        grain, grains = self.scene.grain, table(LoadedBed(self.scene, directory.parent))
+        rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
         found = motion.read(
-            directory, self._grains, self.scene.protocol.displacement_criterion, falls_out=False
+            directory, grains, self.scene.protocol.displacement_criterion, falls_out=False
         )
-        found.to_csv(directory, self._grains)
+        found.to_csv(directory, grains)
 
-    @cached_property
-    def _grains(self) -> deck.GrainTable:
-        """The grains of the deck."""
-        bed, d = self.loaded.packing, self.scene.grain.diameter
-        kind = np.select(
-            [~bed.mobile, bed.windward, bed.lee],
-            [deck.FIXED, deck.COUNTED, deck.PUSHED],
-            deck.MOBILE,
-        )
-        x, z = bed.centres.T * d
-        return deck.GrainTable(
-            position=np.column_stack([x, np.zeros_like(x), z]),
-            kind=kind,
-            along=self.loaded.tangents,
-            sizes=bed.sizes,
-            diameter=d,
-            density=self.scene.grain.density,
-        )
+
+def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
+    """The flow of the settling, then of each load step: from before the first grain goes."""
+    rules = bed.scene.protocol
+    thresholds = np.sort(bed.leaving(ratio))
+    if not 0 < thresholds[0] < np.inf or bed.scene.forces.loaded_grains != "exposed":
+        # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
+        thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
+    last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
+    if not np.isfinite(last):
+        last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
+    return protocol.flows(
+        protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment
+    )
+
+
+def table(bed: LoadedBed) -> deck.GrainTable:
+    """The grains of the deck."""
+    packed, d = bed.packing, bed.scene.grain.diameter
+    kind = np.select(
+        [~packed.mobile, packed.windward, packed.lee],
+        [deck.FIXED, deck.COUNTED, deck.PUSHED],
+        deck.MOBILE,
+    )
+    x, z = packed.centres.T * d
+    return deck.GrainTable(
+        position=np.column_stack([x, np.zeros_like(x), z]),
+        kind=kind,
+        along=bed.tangents,
+        sizes=packed.sizes,
+        diameter=d,
+        density=bed.scene.grain.density,
+    )
+
+
+def _numbers(bed: LoadedBed, grains: deck.GrainTable) -> dict[str, float | int]:
+    """The parameters of the deck."""
+    rules, d, line = bed.scene.protocol, bed.scene.grain.diameter, bed.line
+    ceiling = (MARGIN + 0.5) / line.tangents[line.windward, 0]
+    return {
+        "diameter": d,
+        "smallest": grains.smallest,
+        "density": bed.scene.grain.density,
+        "gravity": bed.scene.reduced_gravity,
+        **protocol.contact(bed.scene.grain, rules),
+        **protocol.raising(rules, int((1 - rules.final_fraction) * bed.packing.count + 1e-9)),
+        "slope": line.slopes_deg[line.windward],
+        "ceiling_x": line.crest[0] * d,
+        "ceiling_z": (line.crest[1] + ceiling) * d,
+        "behind": grains.last_mobile + protocol.AWAY * d,
+    }

@@ -12,6 +12,7 @@ from orchestrator.study.info import Info, Scope
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import FIELDS_OF_SHAPES, Scene
+from orchestrator.study.sizes import LogNormal
 
 PARTS: Mapping[str, type[Part]] = {
     "fluid": Fluid,
@@ -74,7 +75,7 @@ def plain(value: Any) -> Any:
     """A value as a cell of a table: what is not a word or a number becomes a text."""
     if isinstance(value, tuple):
         return "; ".join(map(str, value)) or None
-    return str(value) if isinstance(value, Profile) else value
+    return str(value) if isinstance(value, Profile | LogNormal) else value
 
 
 def _is_solved(scene: Scene) -> bool:
@@ -95,8 +96,10 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     ),
     "profiles": lambda scene: isinstance(scene.bed, PileBed) and bool(scene.bed.profile),
     "disordered piles": _is_disordered,
-    "disordered piles and replicas": lambda scene: (
-        isinstance(scene.bed, PileBed) and (_is_disordered(scene) or scene.bed.is_replica)
+    "poured beds": lambda scene: scene.is_poured,
+    "random beds and replicas": lambda scene: (
+        isinstance(scene.bed, PileBed)
+        and (_is_disordered(scene) or scene.is_poured or scene.bed.is_replica)
     ),
     "solved flows": _is_solved,
     "DEM": lambda scene: scene.protocol.method == "dem",

@@ -5,7 +5,7 @@ text under it are what tables, figures and the reference of study files say of i
 degrees and say so in their names; all else is in SI units or in the unit that is declared.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -14,10 +14,12 @@ from pydantic import (
     PlainSerializer,
     PlainValidator,
     field_validator,
+    model_validator,
 )
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
+from orchestrator.study import sizes
 from orchestrator.study.info import Info
 from orchestrator.study.profile import Profile, a_profile
 from orchestrator.study.ranges import (
@@ -40,9 +42,10 @@ from orchestrator.study.ranges import (
     Stiffness,
     Viscosity,
 )
+from orchestrator.study.sizes import Sizes
 
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
-Packing = Literal["aligned", "horizontal", "disordered"]
+Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
 Model = Literal["solve", "hill", "flat"]
@@ -112,6 +115,37 @@ class Grain(Part):
     """spring constant of a contact, normal and tangential, times the diameter over the weight"""
     damping: Annotated[Damping, Info("damping", scope="DEM", about="answer")] = 0.1
     """damping ratio of a collision"""
+    sizes: Annotated[
+        Sizes | None,
+        # scenes of equal grains are what they were before there were mixtures
+        Field(exclude_if=lambda value: value is None),
+        Info("sizes", scope="poured beds"),
+    ] = None
+    """mixture of a poured bed; by default all grains have the diameter. A sieve table: rows of
+    diameter (m, rising) and mass fraction, which gives the diameter as its d50. Or a log-normal
+    distribution by mass about the diameter, { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, with
+    cut-offs in d, two geometric standard deviations by default"""
+
+    @field_validator("sizes", mode="before")
+    @classmethod
+    def _sizes_of_a_file(cls, value: Any) -> Any:
+        try:
+            return sizes.read(value)
+        except ValueError as error:
+            remedy = "write [[5e-4, 0.4], [1e-3, 0.6]], or { sigma_g = 1.3 }"
+            raise UnfitError("grain.sizes", str(error), remedy) from None
+
+    @model_validator(mode="after")
+    def _sizes_fit(self) -> Self:
+        if self.sizes is None:
+            return self
+        if what := sizes.fault(self.sizes):
+            raise UnfitError("grain.sizes", what, "look at the rows")
+        median = sizes.percentile(self.sizes, self.diameter, 0.5)
+        if isinstance(self.sizes, tuple) and abs(self.diameter / median - 1) > 1e-9:
+            what = f"the d50 of grain.sizes is {median:.9g} m"
+            raise UnfitError("grain.diameter", what, "leave it out")
+        return self
 
 
 class Bed(Part):
@@ -262,6 +296,7 @@ class PileBed(Bed):
                 "aligned": "rows along the slope",
                 "horizontal": "level rows",
                 "disordered": "random gaps",
+                "poured": "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
             },
         ),
     ] = "aligned"
@@ -270,13 +305,19 @@ class PileBed(Bed):
         float, Field(ge=1e-6, le=0.2), Info("disorder", unit="d", scope="disordered piles")
     ] = 0.02
     """largest gap between two grains of the row under the four uppermost"""
+    poured_depth: Annotated[
+        float,
+        Field(ge=3, le=100, exclude_if=lambda value: value == 6.0),
+        Info("depth of the mould", unit="d", scope="poured beds"),
+    ] = 6.0
+    """depth of a poured bed under the bed line, along the vertical, to a row of fixed grains"""
     seed: Annotated[
         int,
         Field(ge=0, le=10**9),
-        Info("seed", scope="disordered piles and replicas", about="replica"),
+        Info("seed", scope="random beds and replicas", about="replica"),
     ] = 0
-    """which of the many disordered packings; of a lattice 0 is itself, any other a replica with
-    grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
+    """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
+    replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
     mobile_layers: Annotated[
         int, Field(ge=1, le=1000), Info("mobile layers", scope="piles", about="answer")
     ] = 2
@@ -307,7 +348,7 @@ class PileBed(Bed):
     @property
     def is_replica(self) -> bool:
         """Whether it is a lattice but for shifts that matter to nothing but round-off."""
-        return self.packing != "disordered" and self.seed > 0
+        return self.packing in ("aligned", "horizontal") and self.seed > 0
 
 
 class Flow(Part):

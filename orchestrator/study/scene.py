@@ -23,6 +23,7 @@ from orchestrator.study.parts import (
     Protocol,
     UnfitError,
 )
+from orchestrator.study.sizes import Sizes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
@@ -58,6 +59,9 @@ class Scene(Part):
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
         check_method(self.forces.law, self.protocol.method)
+        if self.grain.sizes is not None and not self.is_poured:
+            what = "a lattice has equal grains: a mixture needs a poured bed"
+            raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
@@ -70,6 +74,11 @@ class Scene(Part):
     def id(self) -> str:
         """Digest of the scene's canonical JSON."""
         return digest_text(canonical_json(self.model_dump(mode="json")))[:12]
+
+    @property
+    def is_poured(self) -> bool:
+        """Whether its bed is poured by LIGGGHTS."""
+        return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
 
     @property
     def reduced_gravity(self) -> float:
@@ -220,12 +229,17 @@ def default_first_cell_height(height: float, roughness: float) -> float:
     return min(max(height / 40, rough), height / 4)
 
 
-def roughness_length(value: Any, diameter: float) -> Any:
-    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``."""
+def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:
+    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``.
+
+    Of a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
+    finer than.
+    """
     if not isinstance(value, str):
         return value
-    match = re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", value)
-    if not match or float(match[1]) == 0:
+    match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", value)
+    if not match or float(match[2]) == 0:
         raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
     # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
-    return float(f"{diameter / float(match[1]):.12g}")
+    of = percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
+    return float(f"{of / float(match[2]):.12g}")

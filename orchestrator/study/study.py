@@ -19,11 +19,13 @@ from pydantic import ValidationError
 
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
+from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.profiles import Profiles
 from orchestrator.study.renamed import RENAMED
 from orchestrator.study.scene import Scene, roughness_length
+from orchestrator.study.sizes import Sizes
 
 PARTS = tuple(Scene.model_fields)
 GROUP_KEYS = (*PARTS, "axes", "name")
@@ -304,13 +306,25 @@ def make_scene(
     if profiles and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
         bed |= profiles.bed(bed, where)
     try:
-        if diameter := _of_the_bed(parts["grain"].get("diameter"), bed.get("relative_size", 1.0)):
-            bed["roughness"] = roughness_length(bed["roughness"], diameter)
-        return Scene.model_validate({**parts, "bed": bed})
+        mixture, grain = _mixture(parts["grain"])
+        if diameter := _of_the_bed(grain.get("diameter"), bed.get("relative_size", 1.0)):
+            bed["roughness"] = roughness_length(bed["roughness"], diameter, mixture)
+        return Scene.model_validate({**parts, "grain": grain, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
         raise _explained(error, where) from None
+
+
+def _mixture(grain: dict[str, Any]) -> tuple[Sizes | None, dict[str, Any]]:
+    """The sizes of a bed's grains, None where they are equal; the grain, a sieve's with its d50."""
+    try:
+        found = sizes.read(grain.get("sizes"))
+    except ValueError:
+        return None, {"diameter": 1e-3, **grain}  # the model will refuse the sizes
+    if not isinstance(found, tuple):
+        return found, grain
+    return found, {"diameter": sizes.percentile(found, 1.0, 0.5), **grain}
 
 
 def _of_the_bed(diameter: Any, relative_size: Any) -> float:

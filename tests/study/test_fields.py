@@ -10,6 +10,7 @@ from orchestrator.fidelity.levels import LEVELS, Level, changed
 from orchestrator.study import fields, reference, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.scene import Scene
+from orchestrator.study.sizes import LogNormal
 from orchestrator.tables import COLUMNS, scenes
 
 PILE = """
@@ -44,6 +45,8 @@ def scene() -> Scene:
 
 def other_value(one: Quantity, scene: Scene) -> Any:
     value = one.used(scene)
+    if one.name == "grain.sizes":
+        return LogNormal(sigma_g=1.3)
     if isinstance(value, str):
         words = one.info.choices or get_args(fields.declared(one).annotation)
         return next(word for word in words if word not in (value, "paper"))
@@ -74,6 +77,8 @@ def test_scenes_that_differ_in_a_field_are_not_equal_in_all_else(
         scene = changed(scene, OF_SHAPES[one.name])
     if one.info.scope == "single grains":
         scene = study.parse("grain = { diameter = 1e-3 }", name="test", where="test").scenes[0]
+    if one.info.scope == "poured beds":
+        scene = changed(scene, {"bed.packing": "poured"})
     other = changed(scene, {one.name: other_value(one, scene)})
     rows = [{**fields.asked(each), **fields.answered(each)} for each in (scene, other)]
     columns = fields.others(rows[0])

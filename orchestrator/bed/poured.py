@@ -1,0 +1,113 @@
+"""The packing of a bed that LIGGGHTS has poured: which grains are exposed, and which may move."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from orchestrator.bed.line import BedLine
+from orchestrator.bed.packing import TIE, Packing
+from orchestrator.bed.poured_case import BED
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+LAYER = np.sin(np.pi / 3)
+"""Thickness of a layer, d: as of a lattice."""
+NEAR = 0.5
+"""Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
+
+
+def read(directory: Path, line: BedLine, *, surface: float, mobile_layers: int) -> Packing:
+    """The packing of a finished case.
+
+    Parameters
+    ----------
+    directory : Path
+        Of the case `PouredBed`.
+    line : BedLine
+        Of the flow, d.
+    surface : float
+        Height over the line, normal to it, of the highest centres.
+    mobile_layers : int
+        Layers of the forms that may move.
+    """
+    rows = pd.read_csv(directory / BED)
+    centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
+    segment, along = line.nearest(centres)
+    height = np.einsum("nk,nk->n", centres - line.corners[segment], line.normals[segment])
+    free = unshadowed(along, height, sizes / 2) & (rows["fixed"] == 0).to_numpy()
+    on_form = (segment > 0) & (segment < len(line.lengths) - 1)
+    in_layers = surface - height < (mobile_layers - 0.5) * LAYER
+    mobile = (in_layers | free) & on_form & (rows["fixed"] == 0).to_numpy()
+    counted = free & on_form & counts(line)[segment]
+    # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
+    order = np.lexsort((along, ~mobile))
+    kept = order[(mobile | _near(centres, sizes, mobile))[order]]
+    return Packing(
+        centres=centres[kept],
+        sizes=sizes[kept],
+        mobile=mobile[kept],
+        windward=counted[kept],
+        lee=(free & on_form & ~counted)[kept],
+        arc_length=along[kept],
+    )
+
+
+def counts(line: BedLine) -> BoolArray:
+    """The segments whose exposed grains are counted: those that rise, or all of a level bed."""
+    rises = line.tangents[:, 1] > 0
+    return np.asarray(rises if rises.any() else np.ones_like(rises))
+
+
+def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> BoolArray:
+    """Which grains are exposed.
+
+    A grain is exposed when the line through its centre, normal to the bed, meets no other grain
+    whose centre lies higher.
+
+    Parameters
+    ----------
+    along, height, radii : ndarray, shape (n,)
+        Place along the bed, height over it, radius, in one unit of length.
+    """
+    order = np.argsort(along, kind="stable")
+    x, z, r = along[order], height[order], radii[order]
+    free = np.ones(len(x), bool)
+    most = float(r.max()) + TIE
+    for apart in range(1, len(x)):
+        gap = x[apart:] - x[:-apart]
+        near = np.flatnonzero(gap <= most)
+        if not len(near):
+            break
+        first, second = near, near + apart
+        free[first] &= (gap[near] > r[second] + TIE) | (z[second] <= z[first] + TIE)
+        free[second] &= (gap[near] > r[first] + TIE) | (z[first] <= z[second] + TIE)
+    found = np.empty_like(free)
+    found[order] = free
+    return found
+
+
+def contacts(centres: FloatArray, sizes: FloatArray, touch: float = 1e-3) -> IntArray:
+    """Pairs of grains that touch, by their numbers, shape (k, 2).
+
+    Two grains touch whose surfaces are nearer than a part of the mean of their diameters.
+    """
+    pairs = cKDTree(centres).query_pairs((1 + touch) * float(sizes.max()), output_type="ndarray")
+    apart = np.hypot(*(centres[pairs[:, 0]] - centres[pairs[:, 1]]).T)
+    reach = (sizes[pairs[:, 0]] + sizes[pairs[:, 1]]) / 2
+    return np.asarray(pairs[apart < (1 + touch) * reach])
+
+
+def _near(centres: FloatArray, sizes: FloatArray, chosen: BoolArray) -> BoolArray:
+    """Which grains lie near one of the chosen ones."""
+    reach = float(sizes.max()) + NEAR
+    numbers, tree = np.flatnonzero(chosen), cKDTree(centres[chosen])
+    found = np.zeros(len(centres), bool)
+    for number, others in enumerate(tree.query_ball_point(centres, reach)):
+        apart = np.hypot(*(centres[numbers[others]] - centres[number]).T)
+        found[number] = bool(np.any(apart < (sizes[numbers[others]] + sizes[number]) / 2 + NEAR))
+    return found

@@ -1,0 +1,216 @@
+"""The run of LIGGGHTS that pours a bed; all scenes with this bed share it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from io import StringIO
+from math import radians, tan
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from orchestrator.bed.line import BedLine
+from orchestrator.bed.pouring import Mould, rows_of
+from orchestrator.errors import Noisy, SolverError
+from orchestrator.runs.case import Case
+from orchestrator.solvers import liggghts
+from orchestrator.study.sizes import Sizes, drawn
+
+FloatArray = NDArray[np.float64]
+
+DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
+"""The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
+CONTACT = {"stiffness": 1e4, "damping": 0.1, "time_step": 0.2}
+"""At a damping of 0.3 equal spheres, which settle into a lattice, jitter at this time step."""
+REST = 1e-3
+"""Kinetic energy of a grain at rest, over W^2/K; decks take ten times as much for rest."""
+MOST_LOOKS = 400
+"""Time that the grains have to come to rest, sqrt(d/g')."""
+SETTLING = "settling.csv"
+DUMP = "poured.dump"
+BED = "bed.csv"
+MOST_GRAINS = 200_000
+"""A quarter of a gigabyte, and an hour of one core."""
+
+
+@dataclass(frozen=True)
+class PouredBed(Case):
+    """A bed that LIGGGHTS pours into a mould of a bed line; lengths in d.
+
+    Attributes
+    ----------
+    line : BedLine
+        Of the flow.
+    depth, surface : float
+        As `Mould` takes them.
+    sizes : LogNormal, sequence of classes, or None
+        Of the grains; None for equal ones.
+    diameter : float
+        The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
+    friction_angle_deg : float
+        Of the grains.
+    seed : int
+        Which of the many.
+    """
+
+    line: BedLine
+    depth: float
+    surface: float
+    sizes: Sizes | None
+    diameter: float
+    friction_angle_deg: float
+    seed: int
+
+    kind: ClassVar[str] = "poured"
+    template: ClassVar[str] = "liggghts/poured"
+    recipe: ClassVar[int] = 1
+    results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
+    derived: ClassVar[tuple[str, ...]] = (BED,)
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The bed line, what is poured, and the seed."""
+        mixture = self.sizes
+        return {
+            "x": list(self.line.x),
+            "z": list(self.line.z),
+            "depth": self.depth,
+            "surface": self.surface,
+            "sizes": mixture if mixture is None or isinstance(mixture, tuple) else str(mixture),
+            "diameter": self.diameter,
+            "friction_angle_deg": self.friction_angle_deg,
+            "seed": self.seed,
+        }
+
+    @cached_property
+    def mould(self) -> Mould:
+        """What the grains rain into."""
+        return Mould(self.line, self.depth, self.surface)
+
+    @property
+    def cost_s(self) -> float:
+        """Expected wall time, s: 100 sqrt(d/g') at 6e6 grain-steps a second."""
+        start, end = self.mould.ends
+        return 1 + (end - start) * (self.depth + 2) * 100 * 500 / 6e6
+
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+        return {liggghts.PROGRAM: liggghts.version()}
+
+    @cached_property
+    def _grains(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of all grains, the fixed first, and their diameters, d."""
+        sample = drawn(self.sizes, self.diameter, 1000, 0)
+        places = self.mould.rain(float(np.mean(sample**2)), float(sample.max()), self.seed)
+        floor = self.mould.floor
+        mixed = drawn(self.sizes, self.diameter, len(places), self.seed)
+        return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), mixed])
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains in the air, the walls and the cut."""
+        start, end = self.mould.ends
+        _, sizes = self._grains
+        numbers = {
+            "diameter": DIAMETER,
+            "smallest": float(sizes.min()),
+            "density": DENSITY,
+            "gravity": GRAVITY,
+            "friction": tan(radians(self.friction_angle_deg)),
+            **CONTACT,
+            "upstream": start * DIAMETER,
+            "downstream": end * DIAMETER,
+            "rest": REST,
+            "most_looks": MOST_LOOKS,
+        }
+        lines = (
+            f"variable        {name} equal {value!r}  # {MEANING[name]}\n"
+            for name, value in numbers.items()
+        )
+        (directory / "parameters.liggghts").write_text("".join(lines))
+        scale = np.array([DIAMETER, DIAMETER, DIAMETER, 1.0])
+        for name, values in rows_of(self.mould.segments * scale):
+            (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in values))
+        (directory / "grains.data").write_text(self._data_file())
+
+    def _data_file(self) -> str:
+        centres, sizes = self._grains
+        margin = float(sizes.max()) + 1
+        low, high = (centres.min(axis=0) - margin).tolist(), (centres.max(axis=0) + margin).tolist()
+        box = [(low[0], high[0]), (-margin, margin), (low[1], high[1])]
+        bounds = "".join(
+            f"{a * DIAMETER!r} {b * DIAMETER!r} {axis}lo {axis}hi\n"
+            for (a, b), axis in zip(box, "xyz", strict=True)
+        )
+        kinds = np.where(np.arange(len(centres)) < len(self.mould.floor), 1, 2).tolist()
+        columns = zip(
+            kinds, (sizes * DIAMETER).tolist(), (centres * DIAMETER).tolist(), strict=True
+        )
+        rows = "".join(
+            f"{number} {kind} {size!r} {DENSITY!r} {x!r} 0.0 {z!r}\n"
+            for number, (kind, size, (x, z)) in enumerate(columns, 1)
+        )
+        head = f"grains: id type diameter density x y z\n\n{len(kinds)} atoms\n4 atom types\n\n"
+        return f"{head}{bounds}\nAtoms\n\n{rows}"
+
+    def collect(self, directory: Path) -> None:
+        """See that the bed came to rest, and write its grains to ``bed.csv``."""
+        liggghts.check_log(directory)
+        self._check_rest(directory)
+        text = (directory / DUMP).read_text().partition("ITEM: ATOMS id x z \n")[2]
+        rows = pd.read_csv(StringIO(text), sep=r"\s+", names=["id", "x", "z"], header=None)
+        if rows.empty or rows.isna().any(axis=None):
+            raise SolverError(
+                "it holds no grains", where=str(directory / DUMP), remedy="run the case again"
+            )
+        _, sizes = self._grains
+        number = rows["id"].to_numpy(np.int64) - 1
+        bed = pd.DataFrame(
+            {
+                "x_over_d": rows["x"] / DIAMETER,
+                "z_over_d": rows["z"] / DIAMETER,
+                "size": sizes[number],
+                "fixed": (number < len(self.mould.floor)).astype(int),
+            }
+        )
+        bed.to_csv(directory / BED, index=False)
+
+    def _check_rest(self, directory: Path) -> None:
+        """Each of the two settlings ended at rest, and left grains."""
+        path = directory / SETTLING
+        try:
+            settling = pd.read_csv(path).astype({"ke": float})
+            last = settling.groupby("stage").last()
+            energy = last["ke"] / last["grains"].clip(lower=1) / WEIGHT**2 * SPRING
+        except (OSError, ValueError, KeyError) as error:
+            what = f"the table of the settling cannot be read: {error}"
+            raise SolverError(what, where=str(path), remedy="run the case again") from None
+        if len(last) < 2 or not (last["grains"] > 0).all():
+            what = "no grain of the poured bed is left"
+            remedy = "a gentler slope, or more of bed.poured_depth"
+            raise SolverError(what, where=str(path), remedy=remedy)
+        if not (energy < REST).all():
+            what = f"the poured bed does not come to rest: {energy.max():.2g} W^2/K a grain"
+            remedy = "a gentler slope, or a larger grain.friction_angle_deg"
+            raise Noisy(what, where=str(path), remedy=remedy)
+
+
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+SPRING = CONTACT["stiffness"] * WEIGHT / DIAMETER
+MEANING = {
+    "diameter": "d of the units below, m",
+    "smallest": "diameter of the smallest grain, d",
+    "density": "kg/m3",
+    "gravity": "m/s2",
+    "friction": "tan(phi)",
+    "stiffness": "K d/W, normal and tangential",
+    "damping": "ratio of a collision",
+    "time_step": "sqrt(m/K)",
+    "upstream": "place along x of the wall before the bed, m",
+    "downstream": "of the wall behind it, m",
+    "rest": "kinetic energy of a grain at rest, W^2/K",
+    "most_looks": "how long the grains may take to come to rest, sqrt(d/g)",
+}
+"""Parameters of the deck, with their units."""

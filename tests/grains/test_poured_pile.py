@@ -1,0 +1,70 @@
+"""Piles of poured grains through the whole line: one bed for all scenes, three methods."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import plan, tables
+from orchestrator.plan import Plan
+from orchestrator.runs import engine
+from orchestrator.study import study
+
+STUDY = """
+fluid = { density = 1000.0, viscosity = 1e-6 }
+grain = { diameter = 1e-3, density = 2650.0, sizes = { sigma_g = 1.25 } }
+bed = { kind = "pile", slope_deg = 15.0, height = 0.006, packing = "poured", poured_depth = 3.0 }
+flow = { model = "flat" }
+[protocol]
+load_increment = 0.05
+waiting_time = 6.0
+final_fraction = 0.5
+fractions = [0.1, 0.3]
+[axes]
+"protocol.method" = ["pivot", "peeling", "dem"]
+"""
+ASKED = study.parse(STUDY, name="poured", where="test")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
+    cases = tmp_path_factory.mktemp("cases")
+    planned = plan.make(ASKED, cases=cases)
+    for one in planned.cases.values():
+        engine.execute(one, cases, 300.0)
+    return planned, cases
+
+
+def test_all_scenes_share_one_poured_bed(finished: tuple[Plan, Path]) -> None:
+    planned, _ = finished
+    kinds = [one.kind for one in planned.cases.values()]
+    assert sorted(kinds) == ["pile", "poured"]
+    assert all(pile.runs[0].kind == "poured" for pile in planned.piles.values())
+    assert len({id(pile.packing) for pile in planned.piles.values()}) == 1
+
+
+def test_each_method_answers(finished: tuple[Plan, Path]) -> None:
+    planned, cases = finished
+    made = tables.make(ASKED, planned, cases, list(planned.cases))
+    rows = made["pile_threshold"].merge(made["scenes"][["scene_id", "method"]], on="scene_id")
+    early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
+    assert set(early.index) == {"pivot", "peeling", "dem"}
+    assert (early > 0.005).all()
+    assert (early < 0.2).all()
+    # no level is known on poured beds: what is not known is not promised
+    assert rows["error_estimate"].isna().all()
+
+
+def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, Path]) -> None:
+    planned, cases = finished
+    pile = next(one for one in planned.piles.values() if one.scene.protocol.method == "dem")
+    packed, d = pile.packing, pile.scene.grain.diameter
+    assert packed.sizes.max() / packed.sizes.min() > 1.5
+    rows = (cases / pile.case.name / "grains.data").read_text().partition("Atoms\n\n")[2]
+    diameters = np.array([row.split()[2] for row in rows.splitlines()], float)
+    np.testing.assert_allclose(diameters, packed.sizes * d, rtol=1e-14)
+    ratio = pile.ustar_over_ustar0(cases)
+    force = np.linalg.norm(pile.loading(ratio).at(0.02), axis=1)[packed.windward]
+    own = packed.sizes[packed.windward]
+    larger = np.argsort(own)
+    assert (np.diff(force[larger]) > 0).all()

@@ -1,0 +1,83 @@
+"""Mixtures of grains: what a study file may write, and what is drawn from it."""
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.study import sizes, study
+from orchestrator.study.scene import Scene
+from orchestrator.study.sizes import LogNormal, Sizes
+
+SIEVE = ((5e-4, 0.2), (1e-3, 0.5), (2e-3, 0.3))
+BED = 'bed = { kind = "pile", slope_deg = 15.0, packing = "poured", roughness = "%s" }'
+
+
+def _grain(text: str, roughness: str = "d/30") -> Scene:
+    (scene,) = study.parse(f"{BED % roughness}\n[grain]\n{text}", name="m", where="m").scenes
+    return scene
+
+
+def test_the_median_of_a_sieve_table_is_the_diameter() -> None:
+    scene = _grain("sizes = [[5e-4, 0.2], [1e-3, 0.5], [2e-3, 0.3]]")
+    assert scene.grain.sizes == SIEVE
+    # half of each class is finer than its diameter: 0.1, 0.45, 0.85 of the mass
+    assert scene.grain.diameter == pytest.approx(1e-3 * 2 ** (0.05 / 0.4), rel=1e-12)
+    assert scene.bed.roughness == pytest.approx(scene.grain.diameter / 30, rel=1e-9)
+
+
+def test_roughness_is_a_part_of_the_percentile_that_it_names() -> None:
+    found = _grain("diameter = 1e-3\nsizes = { sigma_g = 1.5 }", "d84/10").bed.roughness
+    assert found == pytest.approx(sizes.percentile(LogNormal(sigma_g=1.5), 1e-3, 0.84) / 10)
+    assert found > 1.3e-4
+
+
+@pytest.mark.parametrize("mixture", [SIEVE, LogNormal(sigma_g=1.4, smallest=0.5, largest=2.0)])
+def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes) -> None:
+    diameter = 1e-3
+    found = sizes.drawn(mixture, diameter, 100_000, 3) * diameter
+    mass = found**3 / (found**3).sum()
+    for part in (0.2, 0.45, 0.7):
+        exact = sizes.percentile(mixture, diameter, part)
+        finer = mass[found < exact * (1 - 1e-9)].sum()
+        at_most = mass[found <= exact * (1 + 1e-9)].sum()
+        assert finer - 0.26 * (mixture is SIEVE) - 2e-3 <= part
+        assert part <= at_most + 0.26 * (mixture is SIEVE) + 2e-3
+    for size, fraction in SIEVE if mixture is SIEVE else ():
+        assert mass[np.isclose(found, size)].sum() == pytest.approx(fraction, abs=1e-3)
+
+
+def test_the_seed_shuffles_the_grains_and_nothing_else() -> None:
+    one, other = (sizes.drawn(LogNormal(sigma_g=1.3), 1.0, 500, seed) for seed in (1, 2))
+    assert not np.array_equal(one, other)
+    np.testing.assert_array_equal(np.sort(one), np.sort(other))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sizes = [[5e-4, 0.2], [1e-3, 0.5]]", "add up to 0.7, not to 1"),
+        ("sizes = [[1e-3, 0.5], [5e-4, 0.5]]", "do not rise"),
+        ("sizes = [[1e-4, 0.5], [2e-3, 0.5]]", "20 times the smallest"),
+        ("sizes = [[1e-3, 1.0, 2.0]]", "a row is not"),
+        ("sizes = [[1e-3, -1.0]]", "no number above 0"),
+        ("sizes = [1e-3]", "a row is not"),
+        ("sizes = []", "neither rows"),
+        ("sizes = 'sieve'", "neither rows"),
+        ("diameter = 2e-3\nsizes = [[1e-3, 0.5], [2e-3, 0.5]]", "the d50 of grain.sizes is 0.0014"),
+        ("diameter = 1e-3\nsizes = { sigma_g = 0.5 }", "sigma_g"),
+        ("diameter = 1e-3\nsizes = { sigma_g = 2.0 }", "16 times the smallest"),
+        ("diameter = 1e-3\nsizes = { sigma = 2.0 }", "sigma"),
+        ("sizes = { sigma_g = 1.3 }", "is missing"),
+    ],
+)
+def test_bad_mixtures_are_refused_in_one_line(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said) as caught:
+        _grain(text)
+    assert "grain." in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_lattice_takes_no_mixture() -> None:
+    text = "grain = { diameter = 1e-3, sizes = { sigma_g = 1.3 } }"
+    with pytest.raises(InputError, match="a mixture needs a poured bed"):
+        study.parse(text, name="m", where="m")
