@@ -63,11 +63,11 @@ def write(
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
     """The cases whose bulky files the page's pictures are drawn from."""
     with settings.own():
-        from orchestrator.report.pictures import flow, grains
+        from orchestrator.report.pictures import bed, flow
         from orchestrator.report.results import Results
 
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:
         return []
-    shown = [one for pile in grains.chosen(results) for one in pile.runs]
+    shown = [one for pile in bed.chosen(results) for one in pile.runs]
     return [*shown, *(pile.flow for pile in flow.chosen(results))]

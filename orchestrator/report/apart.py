@@ -13,7 +13,7 @@ from orchestrator.study import fields
 
 SHAPES = "os^DvP<X>p8hd*"
 """Markers that are told from each other."""
-SHAPE = "shape"
+SHAPE = "marker"
 """The column that holds a row's marker."""
 
 

@@ -5,15 +5,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from orchestrator.grains import motion
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.protocol import SAMPLING_INTERVAL
 from orchestrator.physics import curves
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, laws, reference
 from orchestrator.report.apart import varying
 from orchestrator.report.fits import Fit
-from orchestrator.report.pictures.snapshot import Snapshot
 from orchestrator.report.results import Results, valid
 from orchestrator.study import fields
 
@@ -58,22 +55,25 @@ def _hollow(rows: pd.DataFrame) -> str:
     return "" if valid(rows).all() else f"{HOLLOW} "
 
 
-def overview(results: Results, found: Sequence[Fit]) -> str:
-    """Of the one picture of all laws."""
-    flat, piles = results.beds("grain"), results.joined("pile_threshold")
-    heaps = (
-        "Markers: piles, lines join the fractions n/N = "
-        f"{', '.join(f'{f:.0%}' for f in sorted(set(piles['fraction'])))} of one; "
-        f"{labels.methods(piles)}, forces: {force_laws(piles)}, β = "
-        f"{listed(piles['beta_deg'])}°. {low_regime(piles)}"
-        if len(piles)
-        else ""
-    )
+def overview(
+    results: Results, found: Sequence[Fit], piles: pd.DataFrame, grains: pd.DataFrame
+) -> str:
+    """Of the one diagram of a study."""
+    scenes = results.scenes
+    points = []
+    if len(piles):
+        points.append(
+            "Squares: mean wall stress over the grains of a pile that had moved when their "
+            f"fraction was first {', '.join(f'{f:.0%}' for f in sorted(set(piles['fraction'])))}; "
+            f"{labels.methods(piles)}. {low_regime(piles)}"
+        )
+    if len(grains):
+        points.append(f"Dots: one grain; {labels.methods(grains)}.")
+    told = "" if all(valid(one).all() for one in (piles, grains) if len(one)) else HOLLOW
+    lines = "; ".join(fit.name for fit in found)
     return (
-        "Threshold stress against the friction Reynolds number: one grain on a flat bed, each "
-        "force law at those β and z₀ of this study at which it is within the measured range over "
-        f"most Re* ({'; '.join(fit.name for fit in found)}). Dotted: beyond the range of the law. "
-        f"{heaps}{_references(flat, 'beta_deg')}"
+        f"{' '.join(points)} Bars are intervals. {told} Lines: one grain on a flat bed ({lines}); "
+        f"dotted beyond the range of the law. {_references(scenes, 'beta_deg')}"
     )
 
 
@@ -102,20 +102,23 @@ def _references(scenes: pd.DataFrame, by: str) -> str:
             f"Dashed: the curve of {reference.SLOPED} for horizontal beds in air, times "
             "√(cos α + sin α/tan φ) on u*. "
         )
-        return (sloped if air else "") + "Curves for water are for horizontal beds: none is drawn."
-    water = (
+        return sloped if air else f"{_water()} They are for horizontal beds."
+    brown = (
+        " Brown: curves for grains in air, of this study’s grains and gas over the same diameters "
+        f"({', '.join(air)}; the latter two include cohesion, Bagnold’s holds for Re* > "
+        f"{reference.BAGNOLD_FROM:g})."
+    )
+    return _water() + (brown if air else "")
+
+
+def _water() -> str:
+    return (
         "Blue: the spread of published curves for water, between the lowest and the highest "
         "wherever at least two were published for that Re*; thin lines are the curves themselves "
         f"({'; '.join(curve.name for curve in curves.WATER)}). They are fits, not measured points. "
         f"Black: {MEASURED_SOURCE}; the median of each range of Re*, and from the tenth to the "
         "ninetieth percentile."
     )
-    brown = (
-        " Brown: curves for grains in air, of this study’s grains and gas over the same diameters "
-        f"({', '.join(air)}; the latter two include cohesion, Bagnold’s holds for Re* > "
-        f"{reference.BAGNOLD_FROM:g})."
-    )
-    return water + (brown if air else "")
 
 
 def _values(column: str, piles: Iterable[Pile]) -> str:
@@ -206,9 +209,8 @@ def fractions(rows: pd.DataFrame) -> str:
     """Of n/N against the flow."""
     return (
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
-        "had moved by the end of each load step (one marker), against Re* (left) and τ (right) of "
-        "the mean signed wall stress over the grains that had moved, as in the paper: the mean "
-        "falls where the next grains to move feel less. "
+        "had moved at a flow (a marker), against τ of the mean signed wall stress over the grains "
+        "that had moved, as in the paper: the mean falls where the next grains to move feel less. "
         f"Forces: {force_laws(rows)}. {hold_protocol(rows)} {_hollow(rows)}{low_regime(rows)}"
     )
 
@@ -260,32 +262,14 @@ def mesh(pile: Pile) -> str:
     )
 
 
-def grains(results: Results, pile: Pile, found: Snapshot, fraction: float) -> str:
-    """Of the picture of the grains."""
+def bed(results: Results, pile: Pile) -> str:
+    """Of the picture of the bed."""
     return (
-        f"After Fig. 13 of the paper. The first sample at which {fraction:.0%} of the N = "
-        f"{pile.packing.count} exposed windward grains had moved ({found.moved}): load step "
-        f"{found.load_step}, u*₀ = {found.ustar0:.3g} m/s, {_pile(results, pile)} Above, colour is "
-        "the distance from the grain’s place in the packing; a grain counts as moved from "
-        f"{_values('displacement_criterion', [pile])} downstream along the bed. Below, colour and "
-        f"symbol are how it moved: {_modes()} Behind them is the flow’s speed by OpenFOAM, which "
-        "does not see the grains: its bed line lies z₀ under the exposed ones. Hollow: grains that "
-        "had left the box, where they lay (without a symbol: not counted as moved). Other mobile "
-        "grains, most of which hardly move, are drawn at the end of the load step. Plain grey: the "
-        "inside of the pile, which touches no mobile grain and is left out of the case."
-    )
-
-
-def crest(results: Results, pile: Pile, frames: int) -> str:
-    """Of the animation."""
-    return (
-        f"Exposed windward grains near the crest, u*₀ rising in load steps; {_pile(results, pile)} "
-        "Colour and symbol: how a grain moved, from "
-        f"{_values('displacement_criterion', [pile])} on: {_modes()} Hollow: left the box, where "
-        f"it lay (without a symbol: not counted as moved). The {frames} frames are samples of the "
-        f"deck, {SAMPLING_INTERVAL:g} √(d/g′) apart. Samples in which no grain moves near its "
-        "place are left out, so that grains jump or vanish there. Other mobile grains are drawn at "
-        "the end of each load step."
+        "After Fig. 13 of the paper. Grains at the end of a load step; orange: moved, that is "
+        f"{_values('displacement_criterion', [pile])} downstream along the bed; hollow: left the "
+        "box, where it lay; pale yellow: exposed, has not moved; beige: mobile under it; grey: "
+        "fixed. The shade of blue is the speed of the flow by OpenFOAM, over that at the lid; it "
+        f"does not see the grains. d is one diameter. {_pile(results, pile)}"
     )
 
 
@@ -295,10 +279,3 @@ def _pile(results: Results, pile: Pile) -> str:
     columns += varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
     used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
     return ", ".join(labels.plain(c, value) for c, value in used.items() if value is not None) + "."
-
-
-def _modes() -> str:
-    return (
-        f"lifted when it rose by more than {motion.LIFTED:g} d over the bed, else rolled when its "
-        f"spin made at least {motion.ROLLED:.0%} of its speed, else slid."
-    )

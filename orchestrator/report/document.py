@@ -1,12 +1,12 @@
 """A page of sections, for experiments and the benchmark; one file like a study's page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pandas as pd
 
-from orchestrator.report import drawing, facts, page
+from orchestrator.report import facts, page, style
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
 from orchestrator.runs.folder import Folder
@@ -69,10 +69,16 @@ def write(
 
 def _drawn(section: Section, folder: Folder) -> dict[str, Any]:
     """A section as the template needs it, its figures as entries with images."""
-    drawn = (drawing.saved(figure, folder) for figure in section.figures)
+    drawn = (_saved(figure, folder) for figure in section.figures)
     names = ("title", "text", "tables", "limits")
     parts = {name: getattr(section, name) for name in names}
     return {**parts, "figures": [page.entry(figure) for figure in drawn]}
+
+
+def _saved(figure: Figure, folder: Folder) -> Figure:
+    """As a study's, with a PNG beside the SVG, for documents elsewhere."""
+    image = style.save(figure.canvas, folder, figure.name) if figure.canvas else figure.image
+    return replace(figure, canvas=None, image=image)
 
 
 def sheet(table: pd.DataFrame) -> Sheet:

@@ -9,20 +9,22 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.report import FIGURES, compared, piles, single, stress, style
+from orchestrator.report import FIGURES, compared, overview, piles, single, stress, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.pictures import animation, flow, grains, mesh
+from orchestrator.report.pictures import bed, flow, mesh
 from orchestrator.report.results import Results
 from orchestrator.runs import process, retry
 from orchestrator.runs.folder import Folder
 
 Draw = Callable[[Results], Iterable[Figure]]
 SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
-    (1, (mesh.draw, flow.draw, grains.draw, animation.draw)),
+    (2, (piles.extended,)),
     (3, (piles.fractions,)),
-    (4, (piles.extended,)),
-    (0, (compared.draw, single.draw)),
-    (2, (stress.draw,)),
+    (4, (compared.draw, single.draw)),
+    (0, (bed.draw,)),
+    (5, (stress.draw,)),
+    (6, (flow.draw, mesh.draw)),
+    (1, (overview.draw,)),
 )
 """What is drawn in one process, the dearest first, and its place on the page."""
 
@@ -44,7 +46,8 @@ def draw(results: Results, folder: Folder) -> list[Figure]:
         _shared.clear()
     places = [place for place, _ in SECTIONS]
     order = sorted(zip(places, parts, strict=True), key=lambda pair: pair[0])
-    return [figure for _, part in order for figure in part]
+    figures = [figure for _, part in order for figure in part]
+    return sorted(figures, key=lambda figure: not figure.leads)
 
 
 def _parts(folder: Folder) -> list[list[Figure]]:
@@ -74,9 +77,7 @@ def _section(number: int, folder: Folder) -> list[Figure]:
 
 
 def saved(figure: Figure, folder: Folder) -> Figure:
-    """The figure with its image in place of its canvas, its files written."""
-    if figure.canvas:
-        image = style.save(figure.canvas, folder, figure.name)
-        return replace(figure, canvas=None, image=image)
-    folder.put(f"{FIGURES}/{figure.name}.gif", figure.image)
-    return figure
+    """The figure with its image in place of its canvas, its file written."""
+    image = style.svg(figure.canvas) if figure.canvas else figure.image
+    folder.put(f"{FIGURES}/{figure.name}.svg", image)
+    return replace(figure, canvas=None, image=image)

@@ -1,6 +1,7 @@
 """One figure of the page."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.figure import Figure as Canvas
 
@@ -18,9 +19,13 @@ class Figure:
     cases : tuple of str
         Directories of the cases behind it.
     canvas : matplotlib.figure.Figure or None
-        The drawing; None once its files are written, and of an animation.
+        The drawing; None once its files are written.
     image : bytes
-        The picture that the page shows, PNG or GIF, once it is made.
+        The picture that the page shows, SVG or PNG, once it is made.
+    data : object
+        What the page's script needs to answer a pointer or a slider, as JSON; None if nothing.
+    fold : bool
+        Whether the page shows it on demand alone.
     """
 
     name: str
@@ -29,3 +34,10 @@ class Figure:
     cases: tuple[str, ...]
     canvas: Canvas | None
     image: bytes = b""
+    data: Any = None
+    fold: bool = False
+
+    @property
+    def leads(self) -> bool:
+        """Whether it stands at the head of the page."""
+        return self.data is not None and not self.fold

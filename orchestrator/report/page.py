@@ -1,9 +1,11 @@
 """The page of a study: one file that needs no other and no network."""
 
 import base64
+import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -13,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from orchestrator.physics.measured import MEASURED_SOURCE
-from orchestrator.report import captions, facts, fits, laws, measured
+from orchestrator.report import answer, captions, facts, fits, laws, measured
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 
@@ -57,7 +59,9 @@ def render(
         force_laws=facts.force_laws(results),
         measured=measured_section(results),
         sections=sections,
-        figures=[entry(figure) for figure in figures],
+        figures=[{**entry(one), "number": n} for n, one in enumerate(figures, 1)],
+        answer=answer.sentences(results),
+        short=answer.sheet(results),
         failures=failures,
         links=links(results),
         tables=list(results.tables),
@@ -70,9 +74,16 @@ def render(
 
 
 def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
-    """The HTML of a template, by default of one beside this file."""
-    css = Markup((FOLDER / "page.css").read_text(encoding="utf-8"))
-    return _template(template, folder).render(css=css, **values)
+    """The text of a template, by default of one beside this file."""
+    css, script = (Markup(_text(name)) for name in ("page.css", "page.js"))
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
+    given = {"css": css, "script": script, "script_digest": f"sha256-{digest}", **values}
+    return _template(template, folder).render(**given)
+
+
+@cache
+def _text(name: str) -> str:
+    return (FOLDER / name).read_text(encoding="utf-8")
 
 
 @cache
@@ -84,6 +95,7 @@ def _template(name: str, folder: Path) -> Template:
         trim_blocks=True,
     )
     environment.filters["typeset"] = typeset
+    environment.filters["json"] = _json
     return environment.get_template(name)
 
 
@@ -92,11 +104,29 @@ def typeset(text: str) -> Markup:
     return Markup(re.sub(r"(?<=\w)_([A-Za-z]+)", r"<sub>\1</sub>", str(escape(text))))
 
 
+def _json(data: Any) -> Markup:
+    """JSON that no browser takes for the end of its element."""
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c"))
+
+
 def entry(figure: Figure) -> dict[str, Any]:
-    """What the templates need of a figure with its image."""
-    data = base64.b64encode(figure.image).decode("ascii")
-    kept = ("name", "title", "caption", "cases")
-    return {"data": data, **{name: getattr(figure, name) for name in kept}}
+    """What the templates need of a figure with its image; one that answers is inline."""
+    kept = ("name", "title", "caption", "cases", "data", "fold", "leads")
+    drawn = {
+        "type": "svg+xml" if figure.image.lstrip().startswith((b"<svg", b"<?xml")) else "png",
+        "base64": base64.b64encode(figure.image).decode("ascii"),
+        "svg": Markup("" if figure.data is None else _inline(figure)),
+    }
+    return {**drawn, **{name: getattr(figure, name) for name in kept}}
+
+
+def _inline(figure: Figure) -> str:
+    """The SVG as a part of a page: without its prolog and metadata, with a title."""
+    text = figure.image.decode("utf-8")
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    label = f'<svg role="img" aria-label="{escape(figure.title)}"'
+    return text if 'role="img"' in text[:400] else text.replace("<svg", label, 1)
 
 
 def links(results: Results) -> dict[str, str]:

@@ -16,61 +16,84 @@ TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """What figures, panels, axes, colours and markers tell apart."""
 
+MOST = 6
+"""Panels of a figure."""
 MARKERS = 30
 """Most of a curve: peeling gives one for each grain."""
 
 
 def fractions(results: Results) -> Iterator[Figure]:
-    """Fig. 14, one for each slope."""
+    """Fig. 14: n/N against tau, figures of each slope."""
     curve = results.joined("pile_curve")
     moved = curve[curve["moved"] > 0] if len(curve) else curve
+    # of the piles alone: single grains have more diameters than there are colours
+    colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
     for (alpha,), rows in split(moved, "alpha_deg"):
-        yield Figure(
-            f"fractions-alpha{alpha:g}",
-            f"Fraction of moving grains, α = {alpha:g}°",
-            captions.fractions(rows),
-            tuple(sorted(set(rows["case"].dropna()))),
-            _fractions(results, rows),
-        )
+        choices, rows, variants = parted(rows, *SHOWN)
+        keys = ["z0_over_d", *choices]
+        for number, panels in enumerate(_sixes(rows, keys)):
+            some = pd.concat(panels)
+            yield Figure(
+                f"fractions-alpha{alpha:g}" + (f"-{number + 1}" if number else ""),
+                f"Fraction of moving grains, α = {alpha:g}°" + _part(number),
+                captions.fractions(some),
+                tuple(sorted(set(some["case"].dropna()))),
+                _fractions(panels, keys, colours, variants),
+                fold=number > 0 or alpha != moved["alpha_deg"].min(),
+            )
 
 
 def extended(results: Results) -> Iterator[Figure]:
-    """Figs. 15 and 16, the extended Shields diagram, one for each z0/d."""
+    """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
     found = results.joined("pile_threshold")
     reached = found[found["shields"].notna()] if len(found) else found
+    colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
     for (ratio,), rows in split(reached, "z0_over_d"):
         written = labels.ratio_of(float(str(ratio)), "d")
-        yield Figure(
-            f"extended-shields-{written.replace('/', '').replace(' ', '')}",
-            f"Extended Shields diagram, z₀ = {written}",
-            captions.extended(rows),
-            tuple(sorted(set(rows["case"].dropna()))),
-            _extended(results, rows),
-        )
+        choices, rows, variants = parted(rows, *SHOWN, "fraction")
+        keys = ["alpha_deg", *choices]
+        for number, panels in enumerate(_sixes(rows, keys)):
+            some = pd.concat(panels)
+            yield Figure(
+                f"extended-shields-{written.replace('/', '').replace(' ', '')}"
+                + (f"-{number + 1}" if number else ""),
+                f"Thresholds of piles by slope, z₀ = {written}" + _part(number),
+                captions.extended(some),
+                tuple(sorted(set(some["case"].dropna()))),
+                _extended(results, panels, keys, colours, variants),
+                fold=number > 0 or ratio != reached["z0_over_d"].min(),
+            )
 
 
-def _fractions(results: Results, rows: pd.DataFrame) -> Canvas:
-    """n/N against Re* and against tau, a row of panels for each z0/d."""
-    choices, rows, variants = parted(rows, *SHOWN)
-    keys = ["z0_over_d", *choices]
-    panels = [part for _, part in split(rows, *keys)][::-1]
-    figure = style.canvas(2.3 * len(panels) + 0.9)
-    axes = figure.subplots(len(panels), 2, sharex="col", sharey=True, squeeze=False)
-    # of the piles alone: single grains have more diameters than there are colours
-    diameters = sorted(set(results.beds("pile")["d_m"]))
-    colours = style.palette("d_m", diameters)
-    for row, part in zip(axes, panels, strict=True):
+def _part(number: int) -> str:
+    return f", more panels ({number})" if number else ""
+
+
+def _sixes(rows: pd.DataFrame, keys: list[str]) -> Iterator[list[pd.DataFrame]]:
+    """The panels by six, those of the most piles in the first figure, in each by rising keys."""
+    panels = [part for _, part in split(rows, *keys)]
+    order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
+    for start in range(0, len(panels), MOST):
+        yield [panels[i] for i in sorted(order[start : start + MOST])]
+
+
+def _fractions(
+    panels: list[pd.DataFrame],
+    keys: list[str],
+    colours: dict[float, str],
+    variants: list[style.Sample],
+) -> Canvas:
+    """n/N against tau of the grains that had moved, a panel for each z0/d and variant."""
+    figure, axes = style.grid(len(panels), 2.3)
+    for ax, part in zip(axes, panels, strict=True):
         for _, curve in split(part, "scene_id"):
-            colour = colours[float(curve["d_m"].iloc[0])]
-            _curve(row[0], curve, "reynolds", colour)
-            _curve(row[1], curve, "shields", colour)
-        row[0].set_title(labels.panel(part.iloc[0], ("alpha_deg", *keys)), loc="left")
-        row[0].set(ylabel="$n/N$", xscale="log", ylim=(0, 1))
-    for ax in axes[:, 0]:
-        style.plain_ticks(ax.xaxis)
-        shields.shade_transition(ax, rows)
-    shields.label_lowest(list(axes[:, 0]), labels.RE_AXIS)
-    shields.label_lowest(list(axes[:, 1]), labels.TAU_AXIS)
+            _curve(ax, curve, "shields", colours[float(curve["d_m"].iloc[0])])
+        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+        ax.set(ylim=(0, 1))
+        if (place := ax.get_subplotspec()) is None or place.is_first_col():
+            ax.set_ylabel("$n/N$")
+    shields.label_lowest(axes, labels.TAU_AXIS)
+    rows = pd.concat(panels)
     used = set(rows["d_m"])
     entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
     style.legends(figure, entries, [*shields.point_entries(rows), *variants])
@@ -93,19 +116,16 @@ def _curve(ax: Axes, curve: pd.DataFrame, column: str, colour: str) -> None:
     )
 
 
-def _extended(results: Results, rows: pd.DataFrame) -> Canvas:
-    """tau_c against Re* by fraction, a panel for each slope, the single grain's line beside it."""
-    choices, rows, variants = parted(rows, *SHOWN, "fraction")
-    keys = ["alpha_deg", *choices]
-    panels = [part for _, part in split(rows, *keys)]
-    columns = min(len(panels), 2)
-    lines = -(-len(panels) // columns)
-    figure = style.canvas((2.6 if columns == 2 else 3.4) * lines + 0.9)
-    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    axes = list(grid[: len(panels)])
-    for unused in grid[len(panels) :]:
-        unused.remove()
-    colours = style.palette("fraction", sorted(set(rows["fraction"])))
+def _extended(
+    results: Results,
+    panels: list[pd.DataFrame],
+    keys: list[str],
+    colours: dict[float, str],
+    variants: list[style.Sample],
+) -> Canvas:
+    """tau_c against Re* by fraction, the single grain's line beside it."""
+    rows = pd.concat(panels)
+    figure, axes = style.grid(len(panels), 2.6 if len(panels) > 1 else 3.4)
     dashes = laws.dashes(rows["force_law"])
     for ax, part in zip(axes, panels, strict=True):
         references = _panel(ax, results, part, colours, dashes)
@@ -142,4 +162,5 @@ def _panel(
                 ordered = series.sort_values("reynolds")
                 ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
         shields.draw_points(ax, points, colour, TAU)
-    return shields.draw_sloped_air(ax, piles, style.AIR)
+    in_air = shields.draw_sloped_air(ax, piles, style.AIR)
+    return in_air or [*shields.draw_water(ax), *shields.draw_measured(ax)]

@@ -55,11 +55,14 @@ def _extent(axes: Sequence[Axes], xlim: tuple[float, float]) -> tuple[float, flo
 
 
 def label_lowest(axes: Sequence[Axes], label: str) -> None:
-    """Name the x axis of the panels that have none below them."""
+    """Name and number the x axis of the lowest panel of each column; panels go row by row."""
+    lowest = {}
     for ax in axes:
         place = ax.get_subplotspec()
-        if place is None or place.is_last_row():
-            ax.set_xlabel(label)
+        lowest[place.colspan.start if place else 0] = ax
+    for ax in lowest.values():
+        ax.set_xlabel(label)
+        ax.tick_params(axis="x", which="both", labelbottom=True)
 
 
 def shade_transition(ax: Axes, rows: pd.DataFrame) -> None:

@@ -39,25 +39,20 @@ def draw(results: Results) -> Iterator[Figure]:
 def _pair(
     results: Results, scenes: pd.DataFrame, dem: pd.DataFrame, by: str, bed: str
 ) -> Iterator[Figure]:
-    """The closed form alone and, where there are results, with DEM on it."""
+    """The closed form and, where there are results, DEM on it."""
     stem = "horizontal" if by == "beta_deg" else f"slope-beta{scenes['beta_deg'].iloc[0]:g}"
     number = 5 if by == "beta_deg" else 7
-    yield Figure(
-        f"closed-form-{stem}",
-        f"Closed form: one grain on a {bed}",
-        captions.closed_form(scenes, by, number),
-        (),
-        _diagram(results, scenes, pd.DataFrame(), by),
-    )
     points = dem[dem["scene_id"].isin(scenes["scene_id"])] if len(dem) else dem
-    if len(points):
-        yield Figure(
-            f"dem-{stem}",
-            f"DEM: one grain on a {bed}",
-            captions.grain_dem(points, number + 1),
-            tuple(sorted(set(points["case"].dropna()))),
-            _diagram(results, scenes, points, by),
-        )
+    alone = points.empty
+    yield Figure(
+        f"closed-form-{stem}" if alone else f"dem-{stem}",
+        f"One grain on a {bed}: closed form" + ("" if alone else " and DEM"),
+        captions.closed_form(scenes, by, number)
+        + ("" if alone else f" {captions.grain_dem(points, number + 1)}"),
+        () if alone else tuple(sorted(set(points["case"].dropna()))),
+        _diagram(results, scenes, points, by),
+        fold=by == "alpha_deg",
+    )
 
 
 def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: str) -> Canvas:
@@ -67,8 +62,7 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
         points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id", validate="one_to_one")
     keys = ["z0_over_d", *choices]
     panels = [part for _, part in split(scenes, *keys)][::-1]
-    figure = style.canvas(2.4 * len(panels) + 1.1)
-    axes = list(figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0])
+    figure, axes = style.grid(len(panels), 2.4)
     colours, dashes = style.palette(by, results.values(by)), laws.dashes(scenes["force_law"])
     for ax, part in zip(axes, panels, strict=True):
         references = _panel(ax, part, points, by, colours, dashes)
@@ -159,7 +153,9 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
     entries = _colour_entries(rows, "alpha_deg", colours)
     style.legends(figure, entries, [*shields.point_entries(rows), *variants])
     cases = tuple(sorted(set(dem["case"])))
-    return Figure("accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure)
+    return Figure(
+        "accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure, fold=True
+    )
 
 
 def _ratios(ax: Axes, rows: pd.DataFrame, colours: dict[float, str]) -> None:

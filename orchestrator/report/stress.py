@@ -52,7 +52,9 @@ def draw(results: Results) -> Iterator[Figure]:
     _legend(figure, felt="pile_grain" in results.tables)
     names = tuple(pile.flow.name for pile in chosen)
     caption = captions.stress(results, chosen)
-    yield Figure("wall-stress", "Friction velocity over the pile", caption, names, figure)
+    yield Figure(
+        "wall-stress", "Friction velocity over the pile", caption, names, figure, fold=True
+    )
 
 
 def choose(results: Results) -> list[Pile]:

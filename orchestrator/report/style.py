@@ -25,8 +25,9 @@ SHADES = {
     "beta_deg": ("viridis", 0.0, 0.85),
     "alpha_deg": ("plasma", 0.0, 0.82),
     "fraction": ("YlGnBu", 0.35, 1.0),
+    "d_m": ("turbo", 0.05, 0.95),
 }
-"""Colour maps of what rises in steps; diameters have colours that are told apart more easily."""
+"""Colour maps of what rises in steps; few diameters have colours that are told apart better."""
 DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
 WATER = "#74aed6"
 AIR = "#8c6d46"
@@ -42,8 +43,8 @@ MINOR_TICK: Look = {"color": "black", "ms": 2, "mew": 0.6}
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
     """A colour for each value of a column, the same in every figure of a study."""
-    if column == "d_m":
-        return {v: DIAMETERS[i % len(DIAMETERS)] for i, v in enumerate(values)}
+    if column == "d_m" and len(values) <= len(DIAMETERS):
+        return dict(zip(values, DIAMETERS, strict=False))
     name, first, last = SHADES[column]
     steps = max(len(values) - 1, 1)
     shades = (first + (last - first) * i / steps for i in range(len(values)))
@@ -53,6 +54,17 @@ def palette(column: str, values: Sequence[float]) -> dict[float, str]:
 def canvas(height: float) -> Canvas:
     """An empty figure of full width; height in inches."""
     return Canvas(figsize=(WIDTH, height), layout="compressed")
+
+
+def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
+    """A figure of some panels of a height (inches), in two columns where there are several."""
+    columns = min(count, 2)
+    lines = -(-count // columns)
+    figure = canvas(height * lines + 0.9)
+    axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for unused in axes[count:]:
+        unused.remove()
+    return figure, list(axes[:count])
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
@@ -115,12 +127,18 @@ def _leading(x: float, digits: str) -> str:
     return text if text.strip("0.")[0] in digits else ""
 
 
+def svg(figure: Canvas) -> bytes:
+    """A figure as SVG, without a date in it."""
+    out = BytesIO()
+    figure.savefig(out, format="svg", metadata={"Date": None})
+    return out.getvalue()
+
+
 def save(figure: Canvas, folder: Folder, name: str) -> bytes:
     """Put a figure as PNG and SVG, without dates in them, and return the PNG."""
-    png, svg = BytesIO(), BytesIO()
+    png = BytesIO()
     figure.savefig(png, format="png", metadata={"Software": None})
     figure.set_layout_engine("none")  # it is laid out now
-    figure.savefig(svg, format="svg", metadata={"Date": None})
     folder.put(f"{FIGURES}/{name}.png", png.getvalue())
-    folder.put(f"{FIGURES}/{name}.svg", svg.getvalue())
+    folder.put(f"{FIGURES}/{name}.svg", svg(figure))
     return png.getvalue()

@@ -49,7 +49,7 @@ OF_A_STUDY = (
     "report.json",
     "report.html",
     "written.sha256",
-    "figures/closed-form-horizontal.png",
+    "figures/shields.svg",
     "timings/timings.csv",
     "tables/scenes.csv",
     "tables/single_grain.parquet",

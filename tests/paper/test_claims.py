@@ -266,7 +266,7 @@ def test_grains_that_never_moved_are_counted(results: Results) -> None:
 
 
 def test_card_names_the_figures_by_number(judged: dict[str, Claim]) -> None:
-    card = claims.card(list(judged.values()), ["flow", "dem-horizontal", "grains-alpha15"])
+    card = claims.card(list(judged.values()), ["flow", "dem-horizontal", "bed-alpha15"])
     shown = {entry["claim"].says: entry["figures"] for entry in card["entries"]}
     assert shown[judged["single.compacity"].says] == [2]
     assert shown[judged["motion.order"].says] == [3]

@@ -100,8 +100,9 @@ def test_rows_of_two_layers_are_told_apart(two: Results) -> None:
 def test_page_lists_every_parameter(results: Results) -> None:
     sheet = facts.parameters(results)
     listed = [row[2] for row in sheet.rows]
-    unused = {"bed.disorder", "bed.seed", "protocol.fractions"}
-    assert set(listed) >= {one.name for one in fields.FIELDS} - unused
+    scenes = results.scenes
+    asked_for = [column for column in fields.COLUMNS if scenes[column].notna().any()]
+    assert set(listed) >= {fields.COLUMNS[column].name or column for column in asked_for}
     asked = dict(zip(listed, sheet.rows, strict=True))
     assert asked["flow.turbulence_model"][3:] == ("kEpsilon", "")
     assert asked["flow.first_cell_height"][3] == "default"
@@ -123,7 +124,7 @@ def test_captions_say_what_the_scene_has(results: Results) -> None:
 def test_caption_of_grains_says_which_of_the_piles_they_are(two: Results) -> None:
     (pile,) = two.plan.piles.values()
     assert "z₀ = d/30, rows along the slope, Eq. 4 (high Re*), mobile layers = 1." in (
-        captions.crest(two, pile, 9)
+        captions.bed(two, pile)
     )
 
 
@@ -131,7 +132,7 @@ def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     rows = results.joined("pile_threshold")
     assert "rises by 5 %" in captions.hold_protocol(rows)
     without = rows.assign(
-        answered_method="pivot", answered_load_increment=None, shape="s", usable=True
+        answered_method="pivot", answered_load_increment=None, marker="s", usable=True
     )
     said = captions.hold_protocol(without)
     assert "Holding protocol" not in said

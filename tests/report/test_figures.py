@@ -58,10 +58,7 @@ def heaps(results: Results) -> dict[str, list[Axes]]:
 
 
 def test_study_has_the_figures_of_its_beds(results: Results) -> None:
-    names = {
-        "closed-form-horizontal", "dem-horizontal", "closed-form-slope-beta60",
-        "dem-slope-beta60", "accuracy",
-    }  # fmt: skip
+    names = {"dem-horizontal", "dem-slope-beta60", "accuracy"}
     one = only(results, "grain")
     assert {figure.name for figure in single.draw(one)} == names
     assert list(pile_figures(one)) == list(stress.draw(one)) == []
@@ -118,7 +115,7 @@ def test_bars_are_the_intervals_of_the_table(
 
 
 def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Axes]]) -> None:
-    lines = [line for ax in grains["closed-form-horizontal"] for line in marked(ax, LINE)]
+    lines = [line for ax in grains["dem-horizontal"] for line in marked(ax, LINE)]
     solid = np.concatenate([line.get_xdata() for line in lines if line.get_linestyle() == "-"])
     solid = solid[np.isfinite(solid)]
     assert ((solid < 3) | (solid >= 30)).all()
@@ -169,9 +166,9 @@ def test_accuracy_is_the_ratio_of_the_friction_velocities(
 def test_fractions_are_those_of_the_holds(results: Results, heaps: dict[str, list[Axes]]) -> None:
     table = results.joined("pile_curve")
     moved = table[table["moved"] > 0]
-    for ax, column in zip(heaps["fractions-alpha15"], ("reynolds", "shields"), strict=True):
-        assert points(marked(ax, *moved["scene_id"])) == rows(moved, column, "fraction_moved")
-        assert ax.get_ylim() == (0, 1)
+    (ax,) = heaps["fractions-alpha15"]
+    assert points(marked(ax, *moved["scene_id"])) == rows(moved, "shields", "fraction_moved")
+    assert ax.get_ylim() == (0, 1)
 
 
 def test_extended_diagram_shows_each_fraction_that_was_reached(
@@ -239,3 +236,49 @@ def test_diameters_beyond_the_papers_are_crossed(results: Results) -> None:
         for marks in ((SOLID, HOLLOW), (single.CROSS,))
     )
     assert points == crosses > 0
+
+
+def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
+    several_piles: Results,
+) -> None:
+    figures = [*piles.fractions(several_piles), *piles.extended(several_piles)]
+    assert [figure.fold for figure in figures] == [False, True, False, True]
+    for figure in figures:
+        axes = drawn([figure])[figure.name]
+        assert 0 < len(axes) <= piles.MOST
+        numbered = {}
+        for ax in axes:
+            place = ax.get_subplotspec()
+            assert place is not None
+            numbered[place.colspan.start] = any(t.get_visible() for t in ax.get_xticklabels())
+        assert all(numbered.values())
+    count = sum(len(drawn([figure])[figure.name]) for figure in figures[2:])
+    assert count == 7
+
+
+@pytest.fixture
+def several_piles(results: Results) -> Results:
+    """The study's pile at seven settings of what parts panels."""
+    heap = only(results, "pile")
+    tables = {}
+    for name, own in heap.tables.items():
+        if "scene_id" in own:
+            copies = [own.assign(scene_id=f"copy {i}") for i in range(7)]
+            if name == "scenes":
+                copies = [one.assign(averaging_length=i + 1.0) for i, one in enumerate(copies)]
+            own = pd.concat(copies, ignore_index=True)
+        tables[name] = own
+    return replace(heap, tables=tables)
+
+
+def test_no_colour_stands_for_two_diameters() -> None:
+    many = [1e-4 * (i + 1) for i in range(20)]
+    assert len(set(style.palette("d_m", many).values())) == 20
+
+
+def test_piles_in_water_are_held_against_the_shields_curve(results: Results) -> None:
+    water = results.tables["scenes"].assign(rho_f_kg_m3=1000.0, rho_sol_kg_m3=2650.0)
+    wet = replace(results, tables={**results.tables, "scenes": water})
+    (ax,) = drawn(piles.extended(wet))["extended-shields-d30"]
+    assert marked(ax, shields.WATER)
+    assert marked(ax, shields.MEASURED)

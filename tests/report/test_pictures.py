@@ -1,41 +1,19 @@
-"""Pictures of the flow and of the grains at an instant."""
+"""Pictures of the flow, of its mesh, and of the bed with its grains."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from orchestrator.errors import SolverError
-from orchestrator.grains import motion
 from orchestrator.report.figure import Figure
-from orchestrator.report.pictures import flow, flow_field, grains, mesh, snapshot, spheres
-from orchestrator.report.pictures.snapshot import Passage
+from orchestrator.report.pictures import bed, flow, flow_field, mesh
+from orchestrator.report.pictures.bed import Steps
 from orchestrator.report.results import Results
-
-WINDOW = (-1.0, 3.0, -1.0, 1.0)
-
-
-def test_spheres_lie_where_they_are() -> None:
-    centres = np.array([[0.0, 0.0], [2.0, 0.25]])
-    colours = np.array([[0.8, 0.0, 0.0], [0.0, 0.0, 0.8]])
-    image = spheres.picture(centres, colours, WINDOW, 400)
-    assert image.shape == (200, 400, 4)
-    opacity = image[..., 3] / 255
-    assert opacity.sum() == pytest.approx(2 * np.pi / 4 * 100**2, rel=1e-3)
-    red = np.argwhere(opacity[:, :200] > 0.5)
-    assert red.mean(axis=0) + 0.5 == pytest.approx([100, 100], abs=0.01)
-    assert image[100, 100].tolist() == [204, 0, 0, 255]
-    assert image[75, 300].tolist() == [0, 0, 204, 255]
-    # the rim turns away from the light
-    assert image[100, 148, 0] == pytest.approx(255 * 0.8 * (0.45 + 0.6 * 0.24), abs=3)
-    assert image[5, 5].tolist() == [0, 0, 0, 0]
-
-
-def test_spheres_are_cut_at_the_edges_of_the_window() -> None:
-    window = (0.0, 1.0, 0.0, 1.0)
-    image = spheres.picture(np.array([[0.0, 0.0], [5.0, 5.0]]), np.ones((2, 3)), window, 100)
-    assert (image[..., 3] / 255).sum() == pytest.approx(np.pi / 16 * 100**2, rel=1e-2)
-    assert np.flatnonzero(image[..., 3].max(axis=1)).min() == 50
+from tests.report.conftest import only
 
 
 def test_field_is_that_of_the_flow(results: Results) -> None:
@@ -64,13 +42,13 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     assert len(edges) == (2 * rows + 1) * faces + rows
     assert edges[..., 1].max() == pytest.approx(10 * pile.bed.height)
     middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
-    bed = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
-    assert len(middles.intersection(bed)) > 0.9 * faces
+    line = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
+    assert len(middles.intersection(line)) > 0.9 * faces
     (figure,) = mesh.draw(results)
     assert figure.canvas is not None
     for ax in figure.canvas.axes:
-        (line,) = (line for line in ax.lines if line.get_gid() == "mesh")
-        assert 30 < len(np.asarray(line.get_xdata())) // 3 < len(edges)
+        (line_,) = (line for line in ax.lines if line.get_gid() == "mesh")
+        assert 30 < len(np.asarray(line_.get_xdata())) // 3 < len(edges)
 
 
 def test_a_case_without_results_is_named(tmp_path: Path) -> None:
@@ -79,75 +57,64 @@ def test_a_case_without_results_is_named(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def passage(results: Results) -> Passage:
+def steps(results: Results) -> Steps:
     (pile,) = results.plan.piles.values()
-    return snapshot.read(pile, results.cases)
-
-
-def test_grains_have_passed_as_the_tables_say(results: Results, passage: Passage) -> None:
-    curve = results.tables["pile_curve"]
-    ends = np.flatnonzero(np.diff(passage.samples["load_step"], append=0))
-    assert passage.passed.sum(axis=1)[ends].tolist() == curve["moved"].tolist()[-len(ends) :]
-    lost = passage.at(len(passage.samples) - 1)
-    table = results.tables["pile_grain"]
-    modes = [motion.MODES[mode] for mode in lost.mode[passage.pile.packing.windward]]
-    assert modes == table["mode"].tolist()
-    assert not (lost.mode[~lost.exposed] > 0).any()
-
-
-def test_snapshot_is_the_first_look_with_enough_grains_moved(
-    results: Results, passage: Passage
-) -> None:
-    for fraction in (0.3, 0.7):
-        sample = passage.first(fraction)
-        assert sample is not None
-        found, before = passage.at(sample), passage.at(sample - 1)
-        needed = int(np.ceil(fraction * passage.pile.packing.count))
-        assert before.moved < needed <= found.moved
-        along = ((found.place - found.start) * passage.pile.tangents).sum(axis=1)
-        assert (found.mode[found.exposed & (found.gone | (along >= 0.31))] > 0).all()
-        curve = results.tables["pile_curve"]
-        assert found.load_step == curve[curve["moved"] >= needed]["load_step"].iloc[0]
-        assert not found.gone[~found.mobile].any()
-        assert (found.displacement[~found.mobile] == 0).all()
-
-
-def test_no_snapshot_of_what_was_not_reached(passage: Passage) -> None:
-    assert passage.first(1.0) is None
+    return bed.read(pile, results.cases)
 
 
 @pytest.fixture(scope="module")
 def figure(results: Results) -> Figure:
-    """The picture of the grains."""
-    (drawn,) = grains.draw(results)
+    """The picture of the bed."""
+    (drawn,) = bed.draw(results)
     return drawn
 
 
-def test_picture_shows_grains_that_are_gone_where_they_lay(
-    passage: Passage, figure: Figure
-) -> None:
-    assert figure.canvas is not None
-    sample = passage.first(0.3)
-    assert sample is not None
-    found = passage.at(sample)
-    for ax in figure.canvas.axes[:3]:
-        (gone,) = [c for c in ax.collections if c.get_gid() == "gone"]
-        offsets = np.asarray(gone.get_offsets())
-        assert offsets == pytest.approx(found.start[found.gone])
-    assert 0 < len(offsets) <= 0.3 * passage.pile.packing.count + 2
-    lines = figure.canvas.axes[2].lines
-    drawn = {line.get_gid(): len(np.asarray(line.get_xydata())) for line in lines}
-    for number, name in enumerate(motion.MODES[1:], 1):
-        assert drawn[f"{name}, here"] == (~found.gone[found.mode == number]).sum()
-        assert drawn[f"{name}, gone"] == found.gone[found.mode == number].sum()
-    assert "30%" in figure.title
+def test_grains_have_moved_as_the_tables_say(results: Results, steps: Steps) -> None:
+    curve = results.tables["pile_curve"]
+    counts = [steps.moved(k) for k in range(len(steps.places))]
+    assert counts == curve["moved"].tolist()[: len(counts)]
+    assert steps.flow == pytest.approx(curve["ustar0_m_s"][: len(counts)])
+    shown = steps.first(0.3)
+    assert counts[shown - 1] < 0.3 * steps.pile.packing.count <= counts[shown]
 
 
-def test_flow_behind_the_grains_is_faster_above_than_near_the_bed(figure: Figure) -> None:
-    assert figure.canvas is not None
-    image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[2].images[0].get_array()))
-    speed = np.ma.filled(image, np.nan)
-    column = speed[:, speed.shape[1] // 4]
-    above = column[~np.isnan(column)]
-    assert 0 <= above[0] < 0.5 < above[-1] < 1.2
-    assert len(above) < len(column)
+def test_fixed_grains_stay_and_moved_ones_do_not(steps: Steps) -> None:
+    packing, last = steps.pile.packing, steps.places[-1]
+    assert (last[~packing.mobile] == packing.centres[~packing.mobile]).all()
+    moved = steps.level > 0
+    gone = np.isnan(last[:, 0])
+    assert not (gone & ~packing.mobile).any()
+    along = np.linalg.norm(last - packing.centres, axis=1)
+    assert (along[moved & ~gone] > 0.3).all()
+
+
+def test_the_slider_has_every_place_of_every_load_step(steps: Steps, figure: Figure) -> None:
+    data = figure.data
+    assert len(data["frames"]) == len(steps.places) - 1
+    assert data["moved"][data["shown"]] >= 0.3 * data["count"]
+    mobile = steps.pile.packing.mobile
+    now = np.array(data["start"])
+    for frame, places in zip(data["frames"], steps.places[1:, mobile], strict=True):
+        for number, x, y in np.array(frame, float).reshape(-1, 3):
+            now[int(number)] = x, y
+        assert np.isnan(now[:, 0]).tolist() == np.isnan(places[:, 0]).tolist()
+        known = ~np.isnan(now[:, 0])
+        assert np.abs(now[known] * [1, -1] - places[known]).max() <= bed.SHIFT + 0.011
+
+
+def test_the_drawing_shows_the_load_step_of_its_title(steps: Steps, figure: Figure) -> None:
+    text = figure.image.decode()
+    shown = figure.data["shown"]
+    assert text.count('class="v"') + text.count('class="v g"') == steps.moved(shown)
+    grains = re.findall(r"<circle", text[text.index('class="grains"') :])
+    assert len(grains) == steps.pile.packing.mobile.sum()
+    share = steps.moved(shown) / steps.pile.packing.count
+    assert f"{share:.0%}" in figure.title
+    assert f'data-case="{steps.pile.case.name}"' in text
+    assert "data:image/png" in text
+
+
+def test_a_bed_without_results_has_no_picture(results: Results) -> None:
+    assert list(bed.draw(only(results, "grain"))) == []
+    none = replace(results, tables={**results.tables, "pile_threshold": pd.DataFrame()})
+    assert list(bed.draw(none)) == []

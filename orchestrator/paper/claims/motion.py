@@ -37,7 +37,7 @@ def order(evidence: Evidence) -> Claim:
         by_share(answers),
         "The stress is largest at the crest and a grain needs its downstream neighbour gone: one "
         "frees the next.",
-        ("grains", "wall-stress"),
+        ("bed", "wall-stress"),
     )
 
 

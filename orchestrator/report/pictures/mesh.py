@@ -31,7 +31,9 @@ def draw(results: Results) -> Iterator[Figure]:
     for pile in flow.chosen(results)[:1]:
         edges = read_edges(results.cases / pile.flow.name) / pile.bed.height
         canvas = _frame(pile, edges, stress.title(results, pile))
-        yield Figure("mesh", "Mesh of the flow", captions.mesh(pile), (pile.flow.name,), canvas)
+        yield Figure(
+            "mesh", "Mesh of the flow", captions.mesh(pile), (pile.flow.name,), canvas, fold=True
+        )
 
 
 def read_edges(case: Path) -> FloatArray:

@@ -1,0 +1,179 @@
+"""The answer of a study in few words: sentences, and a short table of its thresholds."""
+
+from collections.abc import Iterator
+
+import pandas as pd
+
+from orchestrator.physics.log_law import log_law_speed
+from orchestrator.report import labels
+from orchestrator.report.facts import Sheet
+from orchestrator.report.overview import nearest_fraction
+from orchestrator.report.results import Results, split, valid
+from orchestrator.study.closed_form import closed_form
+
+GAS_BELOW = 100.0
+"""Density that tells gases from liquids, kg/m3: a gas has a wind."""
+FEW = 12
+"""Piles that have a row each; of more, a row tells the range of many."""
+
+
+def sentences(results: Results) -> list[str]:
+    """What was found, from the least slope to the largest; a warning where little is usable."""
+    piles = results.joined("pile_threshold")
+    if len(piles):
+        found = [_of_pile(row, results) for row in _ends(piles)]
+        return [*found, *_warnings(piles)]
+    grains = results.joined("single_grain")
+    return [*map(_of_grain, _grain_ends(grains)), *_warnings(grains)] if len(grains) else []
+
+
+def _ends(piles: pd.DataFrame) -> list[pd.Series]:
+    """The piles of the least and of the largest slope that the study's picture shows, too."""
+    here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
+    order = here.assign(valid=valid(here)).sort_values(
+        ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
+    )
+    firsts = order.drop_duplicates("alpha_deg").sort_values("alpha_deg")
+    return (
+        [row for _, row in firsts.iloc[sorted({0, len(firsts) - 1})].iterrows()]
+        if len(firsts)
+        else []
+    )
+
+
+def _of_pile(row: pd.Series, results: Results) -> str:
+    single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
+    ratio = f"{row['shields'] / single:.2g} times the stress of a single one"
+    pile = f"{row['alpha_deg']:g}°, d = {labels.millimetres(row['d_m'])}"
+    return (
+        f"{pile}: {row['fraction']:.0%} of the exposed grains move at {ratio}, τ_c = "
+        f"{row['shields']:.3g}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
+    )
+
+
+def _grain_ends(grains: pd.DataFrame) -> list[pd.Series]:
+    """The finest and the coarsest grain of the least slope."""
+    table = grains.assign(valid=valid(grains))
+    here = table[table["alpha_deg"] == table["alpha_deg"].min()].sort_values(
+        ["valid", "d_m"], ascending=[False, True], kind="stable"
+    )
+    here = here[here["valid"]] if here["valid"].any() else here
+    return [here.iloc[i] for i in sorted({0, len(here) - 1})]
+
+
+def _of_grain(row: pd.Series) -> str:
+    by_dem = pd.notna(row["ustar_m_s"])
+    ustar = "ustar_m_s" if by_dem else "ustar_closed_form_m_s"
+    shields = row["shields_dem" if by_dem else "shields_closed_form"]
+    return (
+        f"One grain of {labels.millimetres(row['d_m'])} on {row['alpha_deg']:g}° starts to move at "
+        f"{_flow(row, ustar)}, τ_c = {shields:.3g}{_unless(row)}."
+    )
+
+
+def _flow(row: pd.Series, column: str) -> str:
+    ustar = row[column]
+    wind = ""
+    if row["rho_f_kg_m3"] < GAS_BELOW:
+        wind = f", {float(log_law_speed(ustar, 1.0, row['z0_m'])):.2g} m/s wind at 1 m"
+    return f"u* {ustar:.2g} m/s{wind}"
+
+
+def _unless(row: pd.Series) -> str:
+    return "" if row["usable"] else f" (not usable: {row['why_not']})"
+
+
+def _warnings(table: pd.DataFrame) -> Iterator[str]:
+    usable = int(valid(table).sum())
+    if usable < len(table):
+        yield f"Usable: {usable} of {len(table)} thresholds."
+
+
+def sheet(results: Results) -> Sheet | None:
+    """The thresholds in at most a screen: of few piles each, of many their range by slope."""
+    piles = results.joined("pile_threshold")
+    if len(piles):
+        here = piles[piles["fraction"] == nearest_fraction(piles)]
+        return _each(here) if len(here) <= FEW else _ranges(here)
+    grains = results.joined("single_grain")
+    return _grains(grains) if len(grains) else None
+
+
+HEAD = ("τ_c", "interval", "u*₀, m/s", "usable")
+
+
+def _each(rows: pd.DataFrame) -> Sheet:
+    cells = [
+        (
+            f"{row['alpha_deg']:g}°",
+            labels.millimetres(row["d_m"]),
+            labels.value("force_law", row["force_law"]),
+            *_threshold(row),
+        )
+        for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows()
+    ]
+    fraction = rows["fraction"].iloc[0]
+    tau, *others = HEAD
+    return Sheet(("slope", "d", "forces", f"{tau} at n/N = {fraction:.0%}", *others), tuple(cells))
+
+
+def _threshold(row: pd.Series) -> tuple[str, str, str, str]:
+    usable = "yes" if row["usable"] else f"no: {row['why_not']}"
+    if pd.isna(row["shields"]):
+        return "—", "—", "—", usable
+    low, high = sorted((row["shields_low"], row["shields_high"]))
+    return f"{row['shields']:.4f}", f"{low:.4f} … {high:.4f}", f"{row['ustar0_m_s']:.3f}", usable
+
+
+def _ranges(rows: pd.DataFrame) -> Sheet:
+    cells = []
+    for (alpha, law), own in split(rows, "alpha_deg", "force_law"):
+        usable = own[valid(own)]
+        cells.append(
+            (
+                f"{alpha:g}°",
+                _span(own["d_m"] * 1e3, "g") + " mm",
+                labels.value("force_law", law),
+                _span(usable["shields"], ".4f"),
+                f"{usable['shields_low'].min():.4f} … {usable['shields_high'].max():.4f}"
+                if len(usable)
+                else "—",
+                _span(usable["ustar0_m_s"], ".3f"),
+                f"{len(usable)} of {len(own)}",
+            )
+        )
+    fraction = rows["fraction"].iloc[0]
+    tau, *others = HEAD
+    return Sheet(("slope", "d", "forces", f"{tau} at n/N = {fraction:.0%}", *others), tuple(cells))
+
+
+def _grains(rows: pd.DataFrame) -> Sheet:
+    """By slope, force law and method: the range of the thresholds of single grains."""
+    cells = []
+    for (alpha, law, method), own in split(rows, "alpha_deg", "force_law", "answered_method"):
+        usable = own[valid(own)]
+        name = "shields_dem" if method == "dem" else "shields_closed_form"
+        ustar = "ustar_m_s" if method == "dem" else "ustar_closed_form_m_s"
+        low, high = (f"{name}_low", f"{name}_high") if method == "dem" else (name, name)
+        cells.append(
+            (
+                f"{alpha:g}°",
+                _span(own["d_m"] * 1e3, "g") + " mm",
+                labels.value("force_law", law),
+                "DEM" if method == "dem" else "closed form",
+                _span(usable[name], ".4f"),
+                f"{usable[low].min():.4f} … {usable[high].max():.4f}" if len(usable) else "—",
+                _span(usable[ustar], ".3f"),
+                f"{len(usable)} of {len(own)}",
+            )
+        )
+    tau, interval, ustar0, usable_ = HEAD
+    return Sheet(("slope", "d", "forces", "by", tau, interval, ustar0, usable_), tuple(cells))
+
+
+def _span(values: pd.Series, form: str) -> str:
+    known = values.dropna()
+    if known.empty:
+        return "—"
+    ends = dict.fromkeys(format(float(value), form) for value in (known.min(), known.max()))
+    return " … ".join(ends)

@@ -1,0 +1,212 @@
+"""The bed of a pile with its grains and the flow: one SVG, and the grains at each load step."""
+
+import base64
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image
+
+from orchestrator.grains import dump, motion
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.pile import Pile
+from orchestrator.report import captions, labels, page
+from orchestrator.report.figure import Figure
+from orchestrator.report.pictures import flow
+from orchestrator.report.results import Results, split, valid
+
+FloatArray = NDArray[np.float64]
+Window = tuple[float, float, float, float]
+"""Left, right, bottom, top, d."""
+
+FRACTION = 0.3
+"""n/N of the state that is shown first."""
+LONG = 100.0
+"""Length of a face, d, beyond which its upper end is shown alone: grains must be seen."""
+SHIFT = 0.02
+"""Grains that have moved by less since they were last drawn stay, d."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The n grains of a pile at the end of each of its K load steps, lengths in d.
+
+    Attributes
+    ----------
+    pile : Pile
+        The pile.
+    places : ndarray, shape (K + 1, n, 2)
+        x and z, first as packed; NaN of a grain that has left the box.
+    level : ndarray of int, shape (n,)
+        Load step in which a grain moved; 0 if it never did, or is not counted.
+    flow : ndarray, shape (K + 1,)
+        Undisturbed friction velocity, m/s.
+    """
+
+    pile: Pile
+    places: FloatArray
+    level: NDArray[np.int64]
+    flow: FloatArray
+
+    def moved(self, step: int) -> int:
+        """How many of the counted grains have moved by the end of a load step."""
+        return int(((self.level > 0) & (self.level <= step)).sum())
+
+    def first(self, fraction: float) -> int:
+        """The first load step at whose end a fraction has moved; the last if none has."""
+        needed = fraction * self.pile.packing.count - 1e-9
+        steps = range(len(self.places))
+        return next((k for k in steps if self.moved(k) >= needed), len(self.places) - 1)
+
+
+def read(pile: Pile, cases: Path) -> Steps:
+    """Read the dumps of a finished pile."""
+    directory, packing = cases / pile.case.name, pile.packing
+    samples = pd.read_csv(directory / motion.SAMPLES)
+    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
+    rows = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS).rows
+    places = np.full((len(ends) + 1, len(packing.centres), 2), np.nan)
+    places[:] = np.where(packing.mobile[:, None], np.nan, packing.centres)
+    places[0] = packing.centres
+    d = pile.scene.grain.diameter
+    places[np.searchsorted(ends, rows["step"]) + 1, rows["id"] - 1] = rows[["x", "z"]] / d
+    found, level = Motion.from_csv(directory), np.zeros(len(packing.centres), np.int64)
+    level[packing.windward] = found.level
+    return Steps(pile, places, level, found.flow[: len(places)])
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """One figure for each slope, by rising slope; the first stands for the study."""
+    for number, pile in enumerate(chosen(results)):
+        steps = read(pile, results.cases)
+        shown = steps.first(FRACTION)
+        yield Figure(
+            f"bed-alpha{pile.bed.slope_deg:g}",
+            f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
+            f"{labels.plain('alpha_deg', pile.bed.slope_deg)}, "
+            f"{labels.plain('d_m', pile.scene.grain.diameter)}",
+            captions.bed(results, pile),
+            tuple(one.name for one in reversed(pile.runs)),
+            None,
+            _svg(steps, shown, results.cases).encode(),
+            data(steps, shown),
+            fold=number > 0,
+        )
+
+
+def chosen(results: Results) -> Iterator[Pile]:
+    """The pile that stands for all of its slope: of the largest grains, usable if any is.
+
+    A pile whose files were pruned stands for nothing.
+    """
+    for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
+        order = rows.assign(valid=valid(rows)).sort_values(
+            ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
+        )
+        piles = (results.shown(str(scene_id)) for scene_id in order["scene_id"])
+        yield from itertools.islice(filter(results.has_files, piles), 1)
+
+
+def data(steps: Steps, shown: int) -> dict[str, Any]:
+    """What a slider through the load steps needs: of each, the mobile grains whose place is new.
+
+    ``frames`` has three numbers for each such grain: its number, x and -z; null if it has left.
+    """
+    mobile = steps.pile.packing.mobile
+    last, frames = steps.places[0, mobile].copy(), []
+    for places in steps.places[1:, mobile]:
+        gone = np.isnan(places[:, 0])
+        new = (gone != np.isnan(last[:, 0])) | (np.abs(places - last).max(axis=1) > SHIFT)
+        frames.append([_triple(i, places[i]) for i in np.flatnonzero(new).tolist()])
+        last[new] = places[new]
+    return {
+        "shown": shown,
+        "count": steps.pile.packing.count,
+        "flow": [float(f"{flow:.4g}") for flow in steps.flow],
+        "moved": [steps.moved(k) for k in range(len(steps.places))],
+        "level": steps.level[mobile].tolist(),
+        "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
+        "frames": [list(itertools.chain(*frame)) for frame in frames],
+    }
+
+
+def _triple(number: int, place: FloatArray) -> tuple[int, float | None, float | None]:
+    if np.isnan(place[0]):
+        return int(number), None, None
+    return int(number), round(float(place[0]), 2), round(-float(place[1]), 2)
+
+
+def window(pile: Pile) -> Window:
+    """What is shown: the whole pile, or of a long one the upper end of its face."""
+    (x, z), toe = pile.line.crest, float(pile.line.toe[0])
+    beside = 0.06 * toe
+    if x <= LONG:
+        return -beside, toe + beside, -2.0, float(z) + max(0.5 * z, 6.0)
+    return float(x) - 0.7 * LONG, float(x) + 0.3 * LONG, float(z) - 0.2 * LONG, float(z) + 12.0
+
+
+def _svg(steps: Steps, shown: int, cases: Path) -> str:
+    pile, (left, right, bottom, top) = steps.pile, window(steps.pile)
+    packing, places = pile.packing, steps.places[shown]
+    here = np.where(np.isnan(places), packing.centres, places)
+    inside = (packing.centres[:, 0] > left - 1) & (packing.centres[:, 1] > bottom - 1)
+    base = np.where(packing.windward, "e", "m")
+    moved = (steps.level > 0) & (steps.level <= shown)
+    look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
+    ground = np.unique([left, *np.clip(pile.line.x, left, right), right])
+    path = " ".join(
+        f"L{x:.2f} {-z:.2f}" for x, z in zip(ground, pile.line.height(ground), strict=True)
+    )
+    return page.fill(
+        "bed.svg.j2",
+        box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
+        left=left,
+        right=right,
+        top=top,
+        bottom=bottom,
+        ground=f"M{left:.2f} {-bottom:.2f} {path} L{right:.2f} {-bottom:.2f}Z",
+        flow=_flow(pile, cases, (left, right, bottom, top)),
+        fixed=_circles(packing.centres, packing.sizes, ~packing.mobile & inside),
+        mobile=zip(
+            _circles(here, packing.sizes, packing.mobile),
+            look[packing.mobile],
+            base[packing.mobile],
+            strict=True,
+        ),
+        bar=_bar(right - left),
+        d=labels.millimetres(pile.scene.grain.diameter),
+        case=pile.case.name,
+        title=labels.plain("alpha_deg", pile.bed.slope_deg),
+    )
+
+
+def _circles(
+    places: FloatArray, sizes: FloatArray, chosen: NDArray[np.bool_]
+) -> list[tuple[str, str, str]]:
+    rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
+    return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
+
+
+def _bar(width: float) -> int:
+    """Length of a scale bar, d."""
+    return next(n for n in (1, 2, 5, 10, 20, 50, 100) if n > width / 25)
+
+
+def _flow(pile: Pile, cases: Path, window: Window) -> str:
+    """The flow's speed as a pale picture; none of a theory, which has no field."""
+    if not pile.model.cases:
+        return ""
+    velocity = flow.sampled(pile, cases, window, pile.scene.grain.diameter)
+    speed = np.linalg.norm(velocity, axis=-1)[::-1]
+    colours = colormaps["Blues"](0.6 * np.clip(np.nan_to_num(speed), 0, 1), bytes=True)
+    colours[np.isnan(speed), 3] = 0
+    out = BytesIO()
+    Image.fromarray(colours).quantize(200).save(out, "PNG", optimize=True)
+    return base64.b64encode(out.getvalue()).decode("ascii")
