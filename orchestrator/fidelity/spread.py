@@ -49,6 +49,8 @@ class Spread:
     dominant: str
 
 
+PACKING = "packing"
+"""The choice whose share says nothing of a bed whose packing is known."""
 UNKNOWN = Spread(math.nan, math.nan, "")
 
 
@@ -64,6 +66,16 @@ def spread(scene: Scene, fraction: float) -> Spread:
         return UNKNOWN
     # between the fractions that were measured the nearest one speaks
     return _of(rows[min(rows, key=lambda known: abs(known - fraction))])
+
+
+def floor(scene: Scene) -> float:
+    """Half the model's interval of a pile whose packing is known, relative; NaN if not measured.
+
+    It is the smallest over the fractions: an error of the numerics below it buys nothing.
+    """
+    rows = _measured().get(calibration.model_class(scene), {})
+    known = (_of(tuple(one for one in row if one.choice != PACKING)) for row in rows.values())
+    return min(((one.low + one.high) / 2 for one in known), default=math.nan)
 
 
 def _of(shares: tuple[Share, ...]) -> Spread:

@@ -1,12 +1,13 @@
 """The page of the budget: a tornado for each scene, the shares, the alternatives."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from orchestrator.experiments.budget import tornado
+from orchestrator.experiments.budget import curves, tornado
 from orchestrator.experiments.budget.choices import CHOICES
-from orchestrator.experiments.budget.shares import QUANTITIES
+from orchestrator.experiments.budget.shares import FROZEN, QUANTITIES
+from orchestrator.experiments.budget.wear import Wear
 from orchestrator.fidelity.spread import together
 from orchestrator.report import document
 from orchestrator.report.document import Section
@@ -25,6 +26,16 @@ CAPTION = (
     "feels. The Shields number is that of the mean stress on the grains that moved; u*₀ is that of "
     "the flow far from the bed."
 )
+CHANGING = (
+    "The levels keep the flow over the whole pile until the end, as the paper does. Here the bed "
+    "line is drawn anew after each tenth of the counted grains, the flow is solved again, and the "
+    "grains go on by peeling. The table has the threshold on the bed that changes over that on the "
+    "frozen one, less 1."
+)
+WEAR = (
+    "Left: the grains that have left. Right: the bed line at the start and after each tenth, "
+    "darker as it wears; its edges are rounded over 2 d. Grains that come to light are not loaded."
+)
 SYMBOLS = {"shields": "θ", "ustar0": "u*₀"}
 LIMITS = (
     "The ranges of the choices are judgements, with the reason beside each; no statistics.",
@@ -35,16 +46,21 @@ LIMITS = (
 def write(
     tables: Mapping[str, pd.DataFrame],
     lost: pd.DataFrame,
+    worn: Sequence[Wear],
     space: Workspace,
     solvers: Mapping[str, str],
 ) -> None:
-    """Write the page from the tables ``changes`` and ``shares``; `lost` has no answer."""
+    """Write the page from the tables ``changes`` and ``shares``; `lost` has no answer.
+
+    The piles that wore are drawn as well.
+    """
     shared = tables["shares"]
     scenes = [
         _scene(number, rows)
         for number, (_, rows) in enumerate(shared.groupby("scene_id", sort=False), 1)
     ]
-    sections = [_all(shared), *scenes, _choices(tables["changes"], lost)]
+    changing = [_changing(tables["changes"], worn)] if worn else []
+    sections = [_all(shared), *changing, *scenes, _choices(tables["changes"], lost)]
     document.write(TITLE, sections, space.folder, space.page.name, solvers)
 
 
@@ -64,6 +80,20 @@ def _all(shared: pd.DataFrame) -> Section:
     return Section(
         "All choices together", TEXT, tables=(document.sheet(pd.DataFrame(rows)),), limits=LIMITS
     )
+
+
+def _changing(moved: pd.DataFrame, worn: Sequence[Wear]) -> Section:
+    drawing = Figure("wear", "Frozen bed and bed that changes", WEAR, (), curves.draw(worn))
+    rows = moved[moved["choice"] == FROZEN]
+    table = pd.DataFrame(
+        {
+            "scene": rows["scene"],
+            "n/N": rows["fraction"],
+            "θ, %": 100 * rows["shields"],
+            "u*₀, %": 100 * rows["ustar0"],
+        }
+    )
+    return Section("The bed that changes", CHANGING, (drawing,), (document.sheet(table),))
 
 
 def _scene(number: int, rows: pd.DataFrame) -> Section:
@@ -91,6 +121,9 @@ def _choices(moved: pd.DataFrame, lost: pd.DataFrame) -> Section:
         for one in CHOICES
         if one.name in tried
     ]
+    if FROZEN in tried:
+        why = "The paper, and every level, keeps the flow of the whole pile."
+        rows.append({"choice": FROZEN, "alternatives": tried[FROZEN], "why": why})
     listed = [pd.DataFrame(rows), *([] if lost.empty else [lost])]
     text = "" if lost.empty else "The alternatives of the second table have no answer."
     return Section(

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.experiments.budget.choices import CHOICES, Choice, label
+from orchestrator.experiments.budget.wear import UPDATE, Wear
 from orchestrator.fidelity import calibration
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import Levels
@@ -20,6 +21,8 @@ QUANTITIES = ("shields", "ustar0")
 """What moves: the Shields number of the mean stress on the grains that moved, and the undisturbed
 friction velocity at which they did."""
 BASE = "as asked"
+FROZEN = "frozen bed"
+"""What the choice is called that the flow of the whole pile acts until the end."""
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -100,6 +103,28 @@ def _thresholds(pile: Pile, cases: Path) -> dict[float, dict[str, float]]:
         one = of_pile(motion, speed, fraction, scene.fluid.density)
         found[fraction] = {"shields": one.tau, "ustar0": one.ustar0}
     return found
+
+
+def of_wear(piles: Mapping[str, Wear]) -> pd.DataFrame:
+    """The same rows for the choice to keep the flow of the whole pile until the end."""
+    rows: list[dict[str, Any]] = []
+    for scene_id, one in piles.items():
+        scene = one.bed.scene
+        for fraction in (at for at in scene.protocol.fractions if at <= one.fraction):
+            frozen, worn = one.thresholds(fraction)
+            rows.append(
+                {
+                    "scene_id": scene_id,
+                    "scene": label(scene),
+                    "model_class": calibration.model_class(scene),
+                    "choice": FROZEN,
+                    "alternative": f"drawn anew after each {UPDATE:.0%} of N",
+                    "fraction": fraction,
+                    "shields": worn.tau / frozen.tau - 1,
+                    "ustar0": worn.ustar0 / frozen.ustar0 - 1,
+                }
+            )
+    return pd.DataFrame(rows)
 
 
 def shares(moved: pd.DataFrame) -> pd.DataFrame:

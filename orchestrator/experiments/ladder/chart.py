@@ -30,6 +30,7 @@ TOLERANCES = (0.05, 0.2)
 HIGH, LOW, MISSING = "^", "v", "X"
 """Markers: the threshold is too high, too low; a fraction was not reached."""
 REFERENCE: Look = {"color": "0.88", "lw": 0}
+MODEL: Look = {"color": "#fdf3dc", "lw": 0}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
 PAIR = ["flow_level", "grain_level"]
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
@@ -46,7 +47,8 @@ def against_cost(pairs: pd.DataFrame) -> Canvas:
         A row for each pair of levels and packing: packing, flow_level, grain_level; piles, how many
         it was run on; cost_core_s, s of one core; error_10 … error_70 and error_curve, relative and
         signed, of the threshold stress at a fraction and of the whole curve, NaN where it is not
-        reached; reference_error, how well the reference itself is known; same_model, whether the
+        reached; reference_error, how well the reference itself is known; model_floor, half the
+        model's own interval, NaN if not measured; same_model, whether the
         turbulence model is the reference's; pareto, whether no other pair is both cheaper and
         better.
     """
@@ -141,7 +143,10 @@ def _points(ax: Axes, rows: pd.DataFrame) -> None:
         ax.plot(own["x"], own["y"], ls="", ms=5, mew=0.9, zorder=3, gid="point", **look)
     reference = float(rows["reference_error"].max())
     if reference > FLOOR:
-        ax.axhspan(0, reference, zorder=0, gid="reference", **REFERENCE)
+        ax.axhspan(0, reference, zorder=0.1, gid="reference", **REFERENCE)
+    model = float(rows["model_floor"].min())
+    if model > FLOOR:
+        ax.axhspan(0, model, zorder=0, gid="model", **MODEL)
 
 
 def _front(ax: Axes, rows: pd.DataFrame) -> None:
@@ -246,4 +251,7 @@ def _look_entries(parts: Sequence[pd.DataFrame]) -> list[Artist]:
         entries.append(Line2D([], [], marker=HIGH, mfc="white", label=label, **shared))
     if (rows["reference_error"] > FLOOR).any():
         entries.append(Patch(label="error of the reference itself", **REFERENCE))
+    if (rows["model_floor"] > FLOOR).any():
+        label = "the model's own spread: better numerics buy nothing"
+        entries.append(Patch(label=label, **MODEL))
     return entries

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.fidelity import calibration
+from orchestrator.fidelity import calibration, spread
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import LEVELS, Level, Part, level
 from orchestrator.grains.pile import Pile
@@ -131,6 +131,7 @@ def _point(decision: Decision, pile: Pile, cases: Path, cpu_s: Mapping[str, floa
         "flow_level": flow,
         "grain_level": grains,
         "same_model": level("flow", flow).same_model,
+        "model_floor": spread.floor(scene),
         "flow_s": sum(cpu_s[run.name] for run in pile.model.cases),
         "grains_s": own + sum(cpu_s[run.name] for run in pile.method.cases),
         **{f"tau_{n:g}": of_pile(motion, speed, n, density).tau for n in asked},

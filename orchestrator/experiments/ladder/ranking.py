@@ -77,6 +77,7 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
         piles=groups.size(),
         cost_core_s=groups["cost_core_s"].mean(),
         reference_error=groups["reference_error"].max(),
+        model_floor=groups["model_floor"].min(),
         same_model=groups["same_model"].first(),
         pareto=groups["pareto"].first(),
     )

@@ -30,6 +30,7 @@ def pairs() -> pd.DataFrame:
                 {
                     "packing": packing, "flow_level": flow, "grain_level": grain, "piles": 4,
                     "cost_core_s": 3e3 / 3.0**number, **errors, "reference_error": 0.002,
+                    "model_floor": 0.2 if packing == "aligned" else float("nan"),
                     "same_model": flow != "coarse", "pareto": number % 2 == 0,
                 }
             )  # fmt: skip
@@ -117,3 +118,12 @@ def test_a_ladder_without_pairs_says_so(pairs: pd.DataFrame, draw: type, tmp_pat
         figure = draw(table)
         assert chart.NOTHING in [text.get_text() for text in figure.axes[0].texts]
         assert style.save(figure, Folder(tmp_path), "empty").startswith(b"\x89PNG")
+
+
+def test_the_models_own_spread_is_a_band(pairs: pd.DataFrame) -> None:
+    aligned, disordered = chart.against_cost(pairs).axes
+    bands = [patch for patch in aligned.patches if patch.get_gid() == "model"]
+    (top,) = {float(np.asarray(patch.get_extents().get_points())[1, 1]) for patch in bands}
+    assert aligned.transData.inverted().transform((0, top))[1] == pytest.approx(0.2)
+    # where it was not measured there is none
+    assert not [patch for patch in disordered.patches if patch.get_gid() == "model"]
