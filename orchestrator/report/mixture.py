@@ -15,12 +15,11 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics import hiding
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.pictures import marks
 from orchestrator.report.results import Results, split
 
 SHOWN = 45.0
 """Longest part of a bed that is drawn in one row, d: of a longer one its middle."""
-NEVER = "#3b0f4a"
+LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
 LINES = (
     ("Wilcock and Crowe", hiding.wilcock_crowe, "-"),
     ("Egiazaroff", hiding.egiazaroff, "--"),
@@ -60,12 +59,12 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
     flows = grains["ustar0_m_s"].to_numpy(float)
     reached = flows[np.isfinite(flows)]
     scale = ScalarMappable(LogNorm(reached.min(), reached.max() * 1.001), colormaps["viridis_r"])
-    colours = np.where(packed.mobile, marks.LYING, marks.FIXED).astype(object)
+    colours = np.where(packed.mobile, LYING, FIXED).astype(object)
     for place, flow in zip(np.flatnonzero(packed.windward), flows, strict=True):
         colours[place] = scale.to_rgba(flow) if np.isfinite(flow) else "white"
     discs = EllipseCollection(
         packed.sizes, packed.sizes, np.zeros_like(x), units="xy", offsets=packed.centres,
-        offset_transform=ax.transData, facecolors=list(colours), edgecolors=marks.EDGE, lw=0.3,
+        offset_transform=ax.transData, facecolors=list(colours), edgecolors=EDGE, lw=0.3,
     )  # fmt: skip
     ax.add_collection(discs)
     ax.set(xlim=window, ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel="$z/d$")

@@ -66,12 +66,7 @@ class Results:
 
     def has_files(self, pile: Pile) -> bool:
         """Whether a pile was run, and it and its flow still have the files of pictures."""
-        # pictures have spheres of one size: those of a poured bed are drawn by `mixture`
-        return (
-            not pile.pouring
-            and pile.method.cases != ()
-            and all(is_whole(one, self.cases) for one in pile.runs)
-        )
+        return pile.method.cases != () and all(is_whole(one, self.cases) for one in pile.runs)
 
     @cached_property
     def flows(self) -> dict[str, Pile]:
