@@ -42,8 +42,12 @@ class OrchestratorError(Exception):
 
 def one_line(text: str) -> str:
     """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
-    cut = text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)
+    return printable(text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}")
+
+
+def printable(text: str) -> str:
+    """A text that moves no cursor, and that any file can hold: no control letters, no bytes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class InputError(OrchestratorError):
