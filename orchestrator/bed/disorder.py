@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.bed.line import BedLine
+
 FloatArray = NDArray[np.float64]
 
 OFFSET = 0.125
@@ -49,6 +51,51 @@ def rows(columns: int, layers: int, *, beta: float, size: float, seed: int) -> l
         found = _stack(spacing, offset, layers)
     middle = found[0][len(found[0]) // 2]
     return [row - middle for row in found]
+
+
+def rows_on(
+    curve: BedLine, count: int, layers: int, *, spacing: float, size: float, seed: int
+) -> list[FloatArray]:
+    """Rows along a curve, the uppermost first; the lowest lies on the curve.
+
+    Where two grains of a row would overlap, on the inside of a bend, the row below them is opened.
+
+    Parameters
+    ----------
+    curve : BedLine
+        Diameters.
+    count, layers : int
+        Grains of the lowest row, and rows above it.
+    spacing, size : float
+        Distance of two neighbours of the lowest row, and the largest gap that is added to it.
+    seed : int
+        The same seed gives the same bed.
+    """
+    rng = np.random.default_rng(seed)
+    gaps = rng.uniform(0, size, count) if size else np.zeros(count)
+    aside = rng.uniform(-OFFSET * size, OFFSET * size, count + 1)
+    along = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
+    while True:
+        found = [_on(curve, along, aside)]
+        for _ in range(layers):
+            found.insert(0, _pockets(found[0]))
+        wide = np.zeros(count)
+        for above, row in enumerate(found):
+            more = np.maximum(_overlap(row), 0.0)
+            for place in range(layers - above + 1):
+                there = wide[place : place + len(more)]
+                np.maximum(there, more, out=there)
+        if not wide.any():
+            return found
+        along = along + np.concatenate([[0.0], np.cumsum(1.1 * wide)])
+
+
+def _on(curve: BedLine, along: FloatArray, aside: FloatArray) -> FloatArray:
+    """Places on a curve by the distance from its beginning, and so far aside."""
+    arc = curve.arc_lengths - curve.arc_lengths[0]
+    segment = np.clip(np.searchsorted(arc, along, side="right") - 1, 0, len(arc) - 2)
+    into = (along - arc[segment])[:, None] * curve.tangents[segment]
+    return np.asarray(curve.corners[segment] + into + aside[:, None] * curve.normals[segment])
 
 
 def _stack(spacing: FloatArray, offset: FloatArray, layers: int) -> list[FloatArray]:

@@ -15,6 +15,10 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+SOME = 50
+"""Points whose nearest places are looked for at a time."""
+
+
 @dataclass(frozen=True)
 class BedLine:
     """A bed line of n corners, which go downstream.
@@ -116,6 +120,19 @@ class BedLine:
         """Height of the line at some places along x."""
         return np.asarray(np.interp(x, self.x, self.z))
 
+    def under(self, points: FloatArray) -> IntArray:
+        """The segment under each of some points over the bed; at a top that on their own side."""
+        segment, s = self.nearest(points)
+        last = s >= self.arc_lengths[segment + 1] - 1e-9 * self.lengths.max()
+        behind = last & (points[:, 0] > self.corners[segment + 1, 0] + 1e-9 * self.lengths.max())
+        return np.asarray(np.minimum(segment + behind, len(self.lengths) - 1))
+
+    def roof(self, clearance: float) -> tuple[float, FloatArray]:
+        """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""
+        apart = np.delete(self.corners[1:-1], self.top - 1, axis=0) - self.crest
+        steep = np.arctan2(-apart[:, 1], np.abs(apart[:, 0])).min()
+        return float(np.degrees(steep)), self.crest + np.array([0, clearance / np.cos(steep)])
+
     def depth(self, points: FloatArray, segment: int) -> FloatArray:
         """Signed distance of points (m, 2) below the straight line of a segment, shape (m,)."""
         return np.asarray(-(points - self.corners[segment]) @ self.normals[segment])
@@ -125,11 +142,24 @@ class BedLine:
 
         Of two that are as near the one further up counts: the face, where it meets the flat bed.
         """
-        along = np.einsum("mnk,nk->mn", points[:, None] - self.corners[:-1], self.tangents)
-        along = np.clip(along, 0.0, self.lengths)
-        places = self.corners[:-1] + along[..., None] * self.tangents
+        order = np.argsort(points[:, 0], kind="stable")
+        chosen, arc_length = np.empty(len(points), np.int64), np.empty(len(points))
+        for some in np.array_split(order, max(len(points) // SOME, 1)):
+            chosen[some], arc_length[some] = self._nearest(points[some])
+        return chosen, arc_length
+
+    def _nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The same for a few neighbours, among the segments that can be near to them."""
+        x, away = points[:, 0], np.abs(points[:, 1] - self.height(points[:, 0])).max()
+        low = max(int(np.searchsorted(self.x, x.min() - away)) - 1, 0)
+        high = int(np.searchsorted(self.x, x.max() + away, side="right")) + 1
+        corners, tangents = self.corners[low : high - 1][: len(self.lengths) - low], self.tangents
+        tangents, lengths = tangents[low : high - 1], self.lengths[low : high - 1]
+        along = np.einsum("mnk,nk->mn", points[:, None] - corners, tangents)
+        along = np.clip(along, 0.0, lengths)
+        places = corners + along[..., None] * tangents
         distance = np.linalg.norm(points[:, None] - places, axis=2)
         tied = distance <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
         chosen = np.argmax(np.where(tied, places[..., 1], -np.inf), axis=1)
         rows = np.arange(len(points))
-        return chosen, np.asarray(self.arc_lengths[chosen] + along[rows, chosen])
+        return chosen + low, np.asarray(self.arc_lengths[chosen + low] + along[rows, chosen])

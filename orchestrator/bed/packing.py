@@ -48,7 +48,7 @@ class Packing:
     mobile : ndarray of bool, shape (n,)
         May move; the others are fixed.
     windward, lee : ndarray of bool, shape (n,)
-        Exposed on that face.
+        Exposed and counted, by default on windward sides; exposed elsewhere.
     arc_length : ndarray, shape (n,)
         Position along the bed line; it means something for exposed grains.
     """
@@ -115,16 +115,20 @@ def pile(
     mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
     centres = np.vstack([body, _apron(body, surface)])
     rest = np.zeros(len(centres) - len(body), bool)
-    aside = PERTURBATION if pattern != "disordered" and seed else 0.0
-    shift = np.random.default_rng(seed).uniform(-aside, aside, centres.shape)
     return Packing(
-        centres=centres + shift,
+        centres=centres + replica(len(centres), 0 if pattern == "disordered" else seed),
         sizes=np.ones(len(centres)),
         mobile=np.append(mobile, rest),
         windward=np.append(windward, rest),
         lee=np.append(lee, rest),
         arc_length=line.nearest(centres)[1],
     )
+
+
+def replica(count: int, seed: int) -> FloatArray:
+    """How far the grains of a replica lie aside; 0 is the lattice itself."""
+    aside = PERTURBATION if seed else 0.0
+    return np.random.default_rng(seed).uniform(-aside, aside, (count, 2))
 
 
 def _points(

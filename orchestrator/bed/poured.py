@@ -7,9 +7,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from orchestrator.bed.cover import counted_segments, within
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import TIE, Packing
 from orchestrator.bed.poured_case import BED
+from orchestrator.study.parts import Range
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -21,7 +23,9 @@ NEAR = 0.5
 """Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
 
 
-def read(directory: Path, line: BedLine, *, surface: float, mobile_layers: int) -> Packing:
+def read(
+    directory: Path, line: BedLine, counts: str | Range, *, surface: float, mobile_layers: int
+) -> Packing:
     """The packing of a finished case.
 
     Parameters
@@ -30,6 +34,8 @@ def read(directory: Path, line: BedLine, *, surface: float, mobile_layers: int) 
         Of the case `PouredBed`.
     line : BedLine
         Of the flow, d.
+    counts : {"windward", "all"} or (float, float)
+        Which exposed grains are counted: those of segments that rise, all, or a range of x.
     surface : float
         Height over the line, normal to it, of the highest centres.
     mobile_layers : int
@@ -43,7 +49,7 @@ def read(directory: Path, line: BedLine, *, surface: float, mobile_layers: int) 
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
     in_layers = surface - height < (mobile_layers - 0.5) * LAYER
     mobile = (in_layers | free) & on_form & (rows["fixed"] == 0).to_numpy()
-    counted = free & on_form & counts(line)[segment]
+    counted = free & counted_segments(line, counts)[segment] & within(centres[:, 0], counts)
     # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
     order = np.lexsort((along, ~mobile))
     kept = order[(mobile | _near(centres, sizes, mobile))[order]]
@@ -55,12 +61,6 @@ def read(directory: Path, line: BedLine, *, surface: float, mobile_layers: int) 
         lee=(free & on_form & ~counted)[kept],
         arc_length=along[kept],
     )
-
-
-def counts(line: BedLine) -> BoolArray:
-    """The segments whose exposed grains are counted: those that rise, or all of a level bed."""
-    rises = line.tangents[:, 1] > 0
-    return np.asarray(rises if rises.any() else np.ones_like(rises))
 
 
 def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> BoolArray:

@@ -8,10 +8,14 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
+from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import LID_OVER_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
+from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import Scene
@@ -86,7 +90,8 @@ def _solved(scene: Scene) -> PileBed | None:
 
 def _slope(scene: Scene) -> str | None:
     slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
-    if slope <= limit + 1e-9:
+    bed = _pile(scene)
+    if slope <= limit + 1e-9 or (bed and not bed.is_wedge):
         return None
     return (
         f"{slope:g} deg is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
@@ -95,23 +100,32 @@ def _slope(scene: Scene) -> str | None:
 
 def _pile_slope(scene: Scene) -> str | None:
     bed, (low, high) = _pile(scene), PILE_SLOPES_DEG
-    if not bed or bed.profile or bed.shape in ("flat", "step down"):
+    if not bed or not bed.is_wedge:
         return None
     return None if low <= bed.slope_deg <= high else f"a pile of {bed.slope_deg:g} deg"
 
 
 def _bed_line(scene: Scene) -> str | None:
+    """What is wrong with the bed line; most often nothing."""
     if not (bed := _pile(scene)):
         return None
     try:
-        of_bed(bed)
+        line = of_bed(bed)
+        if bed.packing == "poured" and bed.obstacles:
+            return "no grains can be poured around obstacles"
+        if not bed.is_wedge and bed.packing != "poured":
+            _ = LoadedBed(scene).packing
     except UnfitError as error:
         return str(error)
-    if bed.packing == "poured":
-        return "no grains can be poured around obstacles" if bed.obstacles else None
-    if bed.shape != "triangle" or bed.profile or bed.obstacles or bed.forms > 1:
-        return f"no grains lie on a bed like this one yet: {bed.profile or bed.shape}"
-    return None
+    limit = scene.limiting_slope_deg
+    slopes = np.where(counted_segments(line, bed.counts), np.abs(line.slopes_deg), 0.0)
+    for start, end in line.bare:
+        slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
+    steep = int(np.argmax(slopes))
+    if bed.is_wedge or bed.packing == "poured" or slopes[steep] <= limit + 1e-6:
+        return None
+    where = f"{slopes[steep]:.3g} deg at x = {line.x[steep]:.4g} ... {line.x[steep + 1]:.4g} m"
+    return f"{where} is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
 
 
 def _first_cell(scene: Scene) -> str | None:
@@ -213,8 +227,8 @@ LIMITS = (
         "slope",
         "bed",
         _bed_line,
-        "Forms and obstacles do not overlap.",
-        "give them room",
+        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope.",
+        "smooth a profile, give forms room, or count another part of the bed",
     ),
     Limit(
         "slope",

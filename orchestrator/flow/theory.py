@@ -119,7 +119,7 @@ def _half_length(x: Array, z: Array, height_m: float) -> float:
 
 
 def _edges(line: BedLine) -> Array:
-    height = line.h
+    height = float(line.crest[1])
     parts = [
         np.linspace(start, end, ceil((end - start) / height * FACES) + 1)[:-1]
         for start, end in pairwise(line.x)

@@ -26,8 +26,8 @@ class Track:
     Attributes
     ----------
     travel, rise : ndarray
-        Displacement since the settling, along the bed downstream and normal to it, in the grain's
-        own diameter.
+        Displacement since the settling, along the bed as the flow goes and normal to it, in the
+        grain's own diameter.
     roll : ndarray
         Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
     """
@@ -119,7 +119,8 @@ def _track(state: FloatArray, along: FloatArray, diameter: FloatArray) -> Track:
         roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
     return Track(
         travel=right * along[:, 0] + up * along[:, 1],
-        rise=up * along[:, 0] - right * along[:, 1],
+        # out of the bed, whichever way is along it
+        rise=np.sign(along[:, 0]) * (up * along[:, 0] - right * along[:, 1]),
         roll=roll,
     )
 

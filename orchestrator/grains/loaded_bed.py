@@ -3,21 +3,24 @@
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.bed import packing, poured
+from orchestrator.bed.cover import cover
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
 from orchestrator.bed.poured_case import PouredBed
+from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling
 from orchestrator.grains.loading import ForceTable, Loading
-from orchestrator.study.closed_form import closed_form, forces
+from orchestrator.study.closed_form import closed_form, forces, on_slopes
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
@@ -30,6 +33,7 @@ DIGITS = 9
 """Of lengths in d that a poured bed depends on: beds that differ in their scale alone share it."""
 
 _packed = cache(packing.pile)
+_covered = cache(cover)
 _poured = cache(poured.read)
 
 
@@ -116,28 +120,38 @@ class LoadedBed:
     @cached_property
     def packing(self) -> Packing:
         """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        bed, d = self.bed, self.scene.grain.diameter
+        counts = bed.counts
+        if not isinstance(counts, str):
+            counts = (counts[0] / d, counts[1] / d)
         for run in self.pouring:
             assert self.cases is not None, "a poured bed is known when its run is done"
             where, layers = self.cases / run.name, self.bed.mobile_layers
-            return _poured(where, self.line, surface=self.surface, mobile_layers=layers)
-        return _packed(
-            self.line,
-            entrainment_angle_deg=self.bed.entrainment_angle_deg,
-            gap=self.bed.roughness / self.scene.grain.diameter,
-            pattern=self.bed.packing,
-            mobile_layers=self.bed.mobile_layers,
-            disorder=self.bed.disorder if self.bed.packing == "disordered" else 0.0,
-            seed=self.bed.seed,
-        )
+            return _poured(where, self.line, counts, surface=self.surface, mobile_layers=layers)
+        how: dict[str, Any] = {
+            "entrainment_angle_deg": bed.entrainment_angle_deg,
+            "gap": bed.roughness / d,
+            "pattern": bed.packing,
+            "mobile_layers": bed.mobile_layers,
+            "disorder": bed.disorder if bed.packing == "disordered" else 0.0,
+            "seed": bed.seed,
+        }
+        if bed.is_wedge:
+            return _packed(self.line, **how)
+        ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
+        return _covered(self.line, ground, counts, **how)
 
     @cached_property
     def tangents(self) -> FloatArray:
         """Unit vector downstream along the bed line under each grain, shape (n, 2)."""
-        if self.pouring:
-            segments, _ = self.line.nearest(self.packing.centres)
-        else:
-            segments = np.where(self.packing.lee, self.line.lee, self.line.windward)
-        return np.asarray(self.line.tangents[segments])
+        return np.asarray(self.line.tangents[self.line.under(self.packing.centres)])
+
+    def downflow(self, ratio: FloatArray) -> FloatArray:
+        """Unit vector along the bed, the way that the flow pushes each grain, shape (n, 2).
+
+        `ratio` is what `ustar_over_ustar0` gives.
+        """
+        return np.where(ratio < 0, -1.0, 1.0)[:, None] * self.tangents
 
     @property
     def normals(self) -> FloatArray:
@@ -208,23 +222,19 @@ class LoadedBed:
         """Undisturbed friction velocity at which each windward grain moves by itself, m/s.
 
         In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it begins to
-        roll out of its own pocket. Infinite for grains in flow that runs back.
+        roll out of its own pocket. Where the flow runs back it pushes the grain upstream. Infinite
+        for grains without flow.
         """
+        counted = self.packing.windward
         if self.pouring:
             ratio = np.zeros(len(self.packing.sizes))
-            ratio[self.packing.windward] = np.maximum(speed, 0)
+            ratio[counted] = speed
             grains = (self.packing.centres, self.packing.sizes)
             found = peeling.pivots(*grains, self.loading(ratio), self.force_tables)
-            return np.asarray(found[self.packing.windward])
-        threshold = float(closed_form(self.scene).friction_velocity)
-        return np.where(speed > 0, threshold / np.where(speed > 0, speed, 1), np.inf)
-
-    @cached_property
-    def pivot_angles_deg(self) -> FloatArray:
-        """Angle of each counted grain's foremost contact from the bed's normal, shape (N,)."""
-        packed = self.packing
-        found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
-        return np.asarray(found[packed.windward])
+            return np.asarray(found[counted])
+        slopes = np.degrees(np.arctan2(self.tangents[counted, 1], self.tangents[counted, 0]))
+        threshold = on_slopes(self.scene, np.where(speed < 0, -slopes, slopes))
+        return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
 
     def leaving(self, ratio: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s.
@@ -239,7 +249,7 @@ class LoadedBed:
             self.packing.sizes,
             self.loading(ratio),
             self.force_tables,
-            along=self.tangents,
+            along=self.downflow(ratio),
             marker=self.scene.protocol.displacement_criterion,
         )
         return np.asarray(found[self.packing.windward])
@@ -250,11 +260,11 @@ class LoadedBed:
         Raises
         ------
         InputError
-            If no grain feels a flow up the slope.
+            If no grain feels a flow.
         """
-        if not np.any(speed > 0):
+        if not np.any(speed != 0):
             raise InputError(
-                "no grain of the windward face feels a flow up the slope",
+                "no counted grain feels a flow",
                 where=f"scene {self.scene.id}: flow",
                 remedy="look at the flow case; the mesh or the stress is wrong",
             )

@@ -30,19 +30,6 @@ MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
 
 
-class Disc(NamedTuple):
-    """A grain in the plane."""
-
-    x: float
-    z: float
-    radius: float
-
-    @property
-    def place(self) -> Place:
-        """Its centre."""
-        return self.x, self.z
-
-
 def flows(
     centres: FloatArray,
     sizes: FloatArray,
@@ -65,7 +52,7 @@ def flows(
     tables : sequence of ForceTable
         For each grain its force law over its own submerged weight.
     along : ndarray, shape (n, 2)
-        Unit vectors downstream along the bed.
+        Unit vectors along the bed, the way that the flow pushes the grain.
     marker : float
         Displacement along it that counts as motion, of the grain's own diameter.
 
@@ -85,9 +72,13 @@ def flows(
     ways: dict[int, list[Disc]] = {}
 
     def sample(i: int) -> None:
-        others = [grains[k] for k in near[i] if present[k]]
-        push = _Push(tables[i], ratio[i], tangents[i], normals[i])
-        next_flow[i], ways[i] = _Climb(grains[i], others, push, ups[i], marker).needed()
+        # a grain that is pushed upstream is seen from behind, where that is downstream
+        side = math.copysign(1.0, ratio[i])
+        others = {grains[k].seen(side): grains[k] for k in near[i] if present[k]}
+        push = _Push(tables[i], ratio[i], tangents[i], normals[i]).seen(side)
+        climb = _Climb(grains[i].seen(side), list(others), push, _seen(ups[i], side), marker)
+        next_flow[i], way = climb.needed()
+        ways[i] = [others[one] for one in way]
 
     for i in near:
         sample(i)
@@ -117,34 +108,12 @@ def pivots(
     grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
     found = np.full(len(centres), np.inf)
     for i, near in _neighbours(centres, sizes, loading.ratio != 0):
+        side = math.copysign(1.0, loading.ratio[i])
         push = _Push(tables[i], *(float(loading.ratio[i]), loading.along[i], loading.outward[i]))
-        climb = _Climb(grains[i], [grains[k] for k in near], push, loading.along[i], 0.0)
+        others = [grains[k].seen(side) for k in near]
+        climb = _Climb(grains[i].seen(side), others, push.seen(side), loading.along[i], 0.0)
         found[i] = climb.first()
     return found
-
-
-def pivot_angles_deg(centres: FloatArray, sizes: FloatArray, along: FloatArray) -> FloatArray:
-    """Angle of each grain's foremost contact from the normal of the bed, shape (n,).
-
-    NaN for a grain that touches none. Arguments as in `flows`.
-    """
-    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
-    found = np.full(len(centres), np.nan)
-    for i, near in _neighbours(centres, sizes, np.ones(len(centres), bool)):
-        pivot = foremost(grains[i], [grains[k] for k in near])
-        if pivot:
-            slope = math.atan2(along[i, 1], along[i, 0])
-            found[i] = math.degrees(_lean(grains[i].place, pivot.place) - slope)
-    return found
-
-
-def foremost(grain: Disc, others: Sequence[Disc]) -> Disc | None:
-    """The contact of a grain that lies farthest round towards downstream, from below."""
-    here = grain.place
-    touching = (
-        k for k in others if math.dist(k.place, here) < (1 + TOUCH) * (grain.radius + k.radius)
-    )
-    return max(touching, key=lambda k: _lean(here, k.place), default=None)
 
 
 def _neighbours(
@@ -163,6 +132,23 @@ def _neighbours(
         yield int(order[rank]), np.sort(order[a:b][near]).tolist()
 
 
+class Disc(NamedTuple):
+    """A grain in the plane."""
+
+    x: float
+    z: float
+    radius: float
+
+    @property
+    def place(self) -> Place:
+        """Its centre."""
+        return self.x, self.z
+
+    def seen(self, side: float) -> "Disc":
+        """The grain as it is seen from the front, 1, or from behind, -1."""
+        return Disc(self.x * side, self.z, self.radius)
+
+
 @dataclass(frozen=True)
 class _Push:
     """The flow's force on one grain."""
@@ -171,6 +157,12 @@ class _Push:
     ratio: float
     tangent: Sequence[float]
     normal: Sequence[float]
+
+    def seen(self, side: float) -> "_Push":
+        """The force as it is seen from the front, 1, or from behind, -1."""
+        # from behind, downstream along the bed is the other way
+        back = [self.tangent[0], self.tangent[1] * side]
+        return _Push(self.table, self.ratio * side, back, _seen(self.normal, side))
 
     def flow_to_reach(self, x: float, z: float, goal: float) -> float:
         """The flow at which the force over W along a direction reaches a goal."""
@@ -210,7 +202,12 @@ class _Climb:
         return flow, way
 
     def _foremost(self) -> Disc | None:
-        return foremost(self.start, self.others)
+        """The contact that lies farthest round towards downstream, from below."""
+        here = self.start.place
+        touching = (
+            k for k in self.others if math.dist(k.place, here) < (1 + TOUCH) * self._reach(k)
+        )
+        return max(touching, key=lambda k: _lean(here, k.place), default=None)
 
     def _reach(self, other: Disc) -> float:
         """Distance of the centres where the grain touches another."""
@@ -245,6 +242,10 @@ class _Climb:
                 cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
                 angle = direction + math.acos(cosine)
                 yield (angle if angle <= math.pi else angle - 2 * math.pi), other
+
+
+def _seen(vector: Sequence[float], side: float) -> list[float]:
+    return [vector[0] * side, vector[1]]
 
 
 def _lean(place: Place, neighbour: Place) -> float:

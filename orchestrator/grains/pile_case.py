@@ -46,8 +46,8 @@ class PileCase(GrainCase):
         """Expected wall time, s."""
         rules, line = self.scene.protocol, self.loaded.line
         # the whole pile is half its rows thick on average
-        most = self.loaded.bed.poured_depth if self.loaded.pouring else line.crest[1] / 2
-        length = line.x[-2] - line.x[1] if self.loaded.pouring else line.crest_s
+        most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
+        length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
         grains = length * (min(self.loaded.bed.mobile_layers, most) + 3)
         load_steps = np.log(3.5) / np.log1p(rules.load_increment)
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
@@ -58,13 +58,15 @@ class PileCase(GrainCase):
         ratio = bed.ustar_over_ustar0(cases)
         rising = flows(bed, ratio)
         force = bed.loading(ratio).in_steps(rising.tolist())
-        grains, margin = table(bed), MARGIN * self.scene.grain.diameter
+        grains, margin = table(bed, ratio), MARGIN * self.scene.grain.diameter
         deck.write(directory, grains, _numbers(bed, grains), rising, force, margin=margin)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
-        grain, grains = self.scene.grain, table(LoadedBed(self.scene, directory.parent))
+        grain, cases = self.scene.grain, directory.parent
+        bed = LoadedBed(self.scene, cases)
+        grains = table(bed, bed.ustar_over_ustar0(cases))
         rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
         found = motion.read(
             directory, grains, self.scene.protocol.displacement_criterion, falls_out=False
@@ -76,19 +78,22 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     """The flow of the settling, then of each load step: from before the first grain goes."""
     rules = bed.scene.protocol
     thresholds = np.sort(bed.leaving(ratio))
+    first = thresholds[0]
+    if not bed.bed.is_wedge:
+        # a row without an edge holds its grains until they push one another out of it
+        first = min(first, bed.pivot_thresholds(ratio[bed.packing.windward])[0])
     if not 0 < thresholds[0] < np.inf or bed.scene.forces.loaded_grains != "exposed":
         # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
         thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
+        first = thresholds[0]
     last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
-    return protocol.flows(
-        protocol.START * thresholds[0], protocol.BEYOND * last, rules.load_increment
-    )
+    return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
 
 
-def table(bed: LoadedBed) -> deck.GrainTable:
-    """The grains of the deck."""
+def table(bed: LoadedBed, ratio: FloatArray) -> deck.GrainTable:
+    """The grains of the deck; `ratio` as `flows` takes it."""
     packed, d = bed.packing, bed.scene.grain.diameter
     kind = np.select(
         [~packed.mobile, packed.windward, packed.lee],
@@ -99,7 +104,7 @@ def table(bed: LoadedBed) -> deck.GrainTable:
     return deck.GrainTable(
         position=np.column_stack([x, np.zeros_like(x), z]),
         kind=kind,
-        along=bed.tangents,
+        along=bed.downflow(ratio),
         sizes=packed.sizes,
         diameter=d,
         density=bed.scene.grain.density,
@@ -108,8 +113,8 @@ def table(bed: LoadedBed) -> deck.GrainTable:
 
 def _numbers(bed: LoadedBed, grains: deck.GrainTable) -> dict[str, float | int]:
     """The parameters of the deck."""
-    rules, d, line = bed.scene.protocol, bed.scene.grain.diameter, bed.line
-    ceiling = (MARGIN + 0.5) / line.tangents[line.windward, 0]
+    rules, d = bed.scene.protocol, bed.scene.grain.diameter
+    slope, ridge = bed.line.roof(MARGIN + 0.5)
     return {
         "diameter": d,
         "smallest": grains.smallest,
@@ -117,8 +122,8 @@ def _numbers(bed: LoadedBed, grains: deck.GrainTable) -> dict[str, float | int]:
         "gravity": bed.scene.reduced_gravity,
         **protocol.contact(bed.scene.grain, rules),
         **protocol.raising(rules, int((1 - rules.final_fraction) * bed.packing.count + 1e-9)),
-        "slope": line.slopes_deg[line.windward],
-        "ceiling_x": line.crest[0] * d,
-        "ceiling_z": (line.crest[1] + ceiling) * d,
+        "slope": slope,
+        "ceiling_x": ridge[0] * d,
+        "ceiling_z": ridge[1] * d,
         "behind": grains.last_mobile + protocol.AWAY * d,
     }

@@ -100,13 +100,13 @@ def of_pile(
     motion: Motion, speed: FloatArray, fraction: float, fluid_density: float
 ) -> PileThreshold:
     """tau_c of a pile at a fraction; arguments as in `curve`."""
-    level = first_level(motion, fraction)
+    level = _first_level(motion, fraction)
     if level is None:
         return PileThreshold(fraction, *(math.nan,) * 5)
     half_a_grain = 0.5 / motion.count
-    below = first_level(motion, fraction - half_a_grain) or level
+    below = _first_level(motion, fraction - half_a_grain) or level
     # where half a grain more was not reached, the interval is open: it ends at the last load step
-    above = first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
+    above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.low[level] * motion.flow[level])
 
     def stress(at: int, ustar0: float) -> float:
@@ -122,8 +122,7 @@ def of_pile(
     )
 
 
-def first_level(motion: Motion, fraction: float) -> int | None:
-    """The first load step by whose end a fraction of the grains had moved, if any."""
+def _first_level(motion: Motion, fraction: float) -> int | None:
     needed = max(math.ceil(fraction * motion.count - 1e-9), 1)
     reached = np.flatnonzero(motion.fraction * motion.count >= needed - 1e-9)
     return int(reached[0]) if len(reached) else None

@@ -75,6 +75,19 @@ def closed_forms(scenes: Sequence[Scene], name: str) -> list[Threshold]:
     return [_KNOWN[key] for key in keys]
 
 
+def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
+    """Friction velocity at which a grain of a scene leaves on other slopes, m/s.
+
+    It is 0 on slopes down which a grain rolls by itself.
+    """
+    *others, _, angle_deg, gravity = _grain(scene)
+    slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
+    columns = [np.full(len(slopes), value) for value in others]
+    ends = [np.full(len(slopes), value) for value in (angle_deg, gravity)]
+    found = _threshold(law(scene), *columns, slopes, *ends).friction_velocity
+    return np.asarray(np.nan_to_num(found, nan=0.0, posinf=np.inf)[place])
+
+
 def _grain(scene: Scene) -> tuple[float, ...]:
     """All numbers that the closed form depends on."""
     return (

@@ -222,6 +222,7 @@ class PileBed(Bed):
         _unless("triangle"),
         Info(
             "shape",
+            column="bed_shape",
             scope="piles",
             choices={
                 "triangle": "two straight faces",
@@ -344,6 +345,15 @@ class PileBed(Bed):
         """Which exposed grains are counted."""
         everywhere = self.profile or self.shape in ("flat", "step down")
         return self.counted or ("all" if everywhere else "windward")
+
+    @property
+    def is_wedge(self) -> bool:
+        """Whether it is one form of two straight faces, of which the windward one is counted."""
+        faces = self.shape == "triangle" or (
+            self.shape == "dune" and self.windward == "straight" and not self.brink_radius
+        )
+        one = faces and self.forms == 1 and not self.profile and not self.obstacles
+        return one and self.counts == "windward"
 
     @property
     def is_replica(self) -> bool:

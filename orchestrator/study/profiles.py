@@ -41,7 +41,9 @@ class Profiles:
         for name in OWN:
             if name in bed:
                 raise InputError(
-                    "a profile has its own", where=f"{where}: bed.{name}", remedy="leave it out"
+                    f"it has its own {name}",
+                    where=f"{where}: bed.profile",
+                    remedy=f"leave out bed.{name}",
                 )
         name, smoothing = bed["profile"], bed.get("smoothing", 0.0)
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:

@@ -63,6 +63,27 @@ def _row(count: int, beta_deg: float, slope_deg: float) -> tuple[FloatArray, int
     return np.vstack([upper, lower - math.sin(beta) * outward]), count
 
 
+@pytest.mark.parametrize("slope_deg", [-20.0, 0.0, 20.0])
+def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(slope_deg: float) -> None:
+    centres, count = _row(5, 60, slope_deg)
+    alpha = math.radians(slope_deg)
+    along = np.tile([math.cos(alpha), math.sin(alpha)], (len(centres), 1))
+    outward = np.column_stack([-along[:, 1], along[:, 0]])
+    ratio = np.append(np.linspace(1.5, 0.5, count), np.zeros(count + 1))
+    tables = [ForceTable(np.square, np.square, weight=1.0, unit=1.0)] * len(centres)
+    sizes, turn = np.ones(len(centres)), np.array([-1.0, 1.0])
+
+    def leaving(places: FloatArray, by: FloatArray, way: FloatArray, out: FloatArray) -> FloatArray:
+        loading = Loading(np.square, np.square, by, way, out)
+        push = np.where(by < 0, -1.0, 1.0)[:, None] * way
+        return peeling.flows(places, sizes, loading, tables, along=push, marker=MARKER)
+
+    back = leaving(centres, -ratio, along, outward)
+    turned = leaving(centres * turn, ratio, -along * turn, outward * turn)
+    np.testing.assert_allclose(back, turned, rtol=1e-12)
+    assert np.isfinite(back[:count]).all()
+
+
 @given(
     slope_deg=st.floats(0, 29),
     beta_deg=st.floats(45, 60),
