@@ -12,7 +12,7 @@ from typing import Any
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
-from orchestrator.errors import OrchestratorError, of_shortage, of_system
+from orchestrator.errors import OrchestratorError, is_of_import, of_shortage, of_system
 from orchestrator.runs import signals, streams
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
@@ -23,8 +23,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
     signals.listen()
     streams.take()
-    # of builds; but libraries read it when they are imported, and fail where it is no number
-    os.environ.pop("SOURCE_DATE_EPOCH", None)
     warnings.showwarning = _show_warning
     options = _parser().parse_args(_plain(sys.argv[1:] if arguments is None else arguments))
     code = _code(options)
@@ -47,7 +45,9 @@ def _code(options: argparse.Namespace) -> int:
     except OSError as error:
         print(f"orchestrator: {of_system(error)}", file=sys.stderr)
         return 1
-    except (MemoryError, ImportError) as error:
+    except Exception as error:
+        if not isinstance(error, MemoryError | ImportError) and not is_of_import(error):
+            raise
         print(f"orchestrator: {of_shortage(error)}", file=sys.stderr)
         return 1
 

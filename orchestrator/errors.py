@@ -42,8 +42,12 @@ class OrchestratorError(Exception):
 
 def one_line(text: str) -> str:
     """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
-    cut = text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in cut)
+    return printable(text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}")
+
+
+def printable(text: str) -> str:
+    """A text that moves no cursor, and that any file can hold: no control letters, no bytes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 class InputError(OrchestratorError):
@@ -115,9 +119,15 @@ def _path(name: str | bytes | int | None) -> str:
     return "" if name is None or isinstance(name, int) else os.fsdecode(name)
 
 
-def of_shortage(error: MemoryError | ImportError) -> OrchestratorError:
+def is_of_import(error: Exception) -> bool:
+    """Whether an exception came from a module that was being imported."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return isinstance(error, SyntaxError) or any(one.name == "<module>" for one in frames)
+
+
+def of_shortage(error: Exception) -> OrchestratorError:
     """The message of memory that is not there, or of a library that does not load."""
-    if isinstance(error, ImportError) and "failed to map" not in str(error):
+    if not isinstance(error, MemoryError) and "failed to map" not in str(error):
         return OrchestratorError(
             f"a library does not load: {error}", remedy="`orchestrator doctor` says what is missing"
         )

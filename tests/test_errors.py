@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import InputError, of_system
+from orchestrator.runs.status import Status
+from orchestrator.runs.status import text as status_text
 from tests.conftest import Command
+
+
+def test_a_name_moves_no_cursor() -> None:
+    status = Status("a\x1b[2J\nb", False, (), (), ("c\x9b",), {"d": "\r"}, None, {}, {})
+    text = status_text(status)
+    assert all(c.isprintable() or c == "\n" for c in text)
+    assert "study a\\x1b[2J\\nb: " in text
 
 
 def test_a_message_says_what_where_and_what_to_do() -> None:

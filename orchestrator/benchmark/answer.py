@@ -19,8 +19,12 @@ COLUMNS = ("quantity", "at", "value")
 FILE = "answer.csv"
 MOST = 4 * 2**20
 """Size of an answer, bytes: more numbers than any pack asks."""
+LARGEST = 1e30
+"""Of a number in SI units, or of one without a unit."""
 Key = tuple[str, str]
 """Quantity, and the text of its `at` with seven digits."""
+COUNTS = ("moved", "not_moved", "carried_off")
+"""Whole numbers, which may be small."""
 STEPS: Key = ("steps", "")
 """What a solver may add to any answer: how many time steps it took."""
 
@@ -79,7 +83,8 @@ def parsed(text: bytes) -> dict[Key, float]:
         If it is not whole.
     """
     try:
-        return dict(_rows(text.decode()))
+        # some programs begin a text with a mark of its encoding
+        return dict(_rows(text.decode("utf-8-sig")))
     except UnicodeDecodeError:
         raise AnswerError(f"{FILE} is no text") from None
     except csv.Error as error:
@@ -123,7 +128,7 @@ def content(path: Path | str, *, folder: int | None = None) -> bytes:
 
 def _rows(text: str) -> list[tuple[Key, float]]:
     lines = text.splitlines()
-    if not lines or tuple(lines[0].strip().split(",")) != COLUMNS:
+    if not lines or tuple(word.strip() for word in lines[0].split(",")) != COLUMNS:
         start = f"begins with {lines[0][:60]!r}" if lines else "is empty"
         raise AnswerError(f"{FILE} {start}, not with {','.join(COLUMNS)}")
     rows = [_row(number, row) for number, row in enumerate(csv.reader(lines[1:]), 2) if row]
@@ -138,15 +143,24 @@ def _rows(text: str) -> list[tuple[Key, float]]:
 
 def _row(number: int, row: Sequence[str]) -> tuple[Key, float]:
     if len(row) != len(COLUMNS):
-        raise AnswerError(f"{FILE} is cut short: line {number} has {len(row)} of 3 fields")
+        why = "is cut short" if len(row) < len(COLUMNS) else "has decimal commas, or another form"
+        raise AnswerError(f"{FILE} {why}: line {number} has {len(row)} of 3 fields")
     try:
         where = key(row[0].strip(), row[1])
-        value = float(row[2])
+        value = _number(row[2])
     except ValueError:
         raise AnswerError(f"{FILE}, line {number}: {','.join(row)!r} holds no number") from None
     if not math.isfinite(value):
         raise AnswerError(f"{FILE}, line {number}: {_said(where)} is {row[2].strip()}, not finite")
+    if abs(value) > LARGEST:
+        raise AnswerError(f"{FILE}, line {number}: {_said(where)} is {value:g}, which nothing is")
     return where, value
+
+
+def _number(text: str) -> float:
+    if "_" in text or not text.isascii():  # Python reads more than other programs write
+        raise ValueError(text)
+    return float(text)
 
 
 def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
@@ -162,6 +176,9 @@ def _check_complete(found: Mapping[Key, float], asked: Sequence[Key]) -> None:
 
 def _check_counts(found: Mapping[Key, float], count: float | None) -> None:
     total = found.get(("count", ""), count)
+    for one, n in found.items():
+        if one[0] in COUNTS and not (n >= 0 and n.is_integer()):
+            raise AnswerError(f"{_said(one)} is {n:g}: it counts grains")
     moved = sorted(
         (float(at), n) for (quantity, at), n in found.items() if quantity == "moved" and at
     )

@@ -53,9 +53,10 @@ def hint(told: Told, rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
     kind, quantity = str(told["kind"]), str(wrong["quantity"].iloc[0])
     if not np.isfinite(wrong["found"]).all():
         return ""
-    cause = _formula(told, wrong) if kind == "closed-form" else _counting(rows, wrong)
-    same = rows[rows["quantity"] == quantity]
-    return cause or _factor(kind, told, quantity, (same["found"] / same["value"]).tolist())
+    with np.errstate(all="ignore"):  # a mistake may make numbers that are none
+        cause = _formula(told, wrong) if kind == "closed-form" else _counting(rows, wrong)
+        same = rows[rows["quantity"] == quantity]
+        return cause or _factor(kind, told, quantity, (same["found"] / same["value"]).tolist())
 
 
 def _factor(kind: str, told: Told, quantity: str, ratios: Sequence[float]) -> str:

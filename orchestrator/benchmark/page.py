@@ -8,6 +8,7 @@ import pandas as pd
 from orchestrator.benchmark import charts, sheets
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, failures
+from orchestrator.errors import printable
 from orchestrator.report import document
 from orchestrator.report.document import Section
 from orchestrator.report.facts import Sheet
@@ -35,7 +36,7 @@ def write(
 ) -> None:
     """Put the page and its figures into a directory; `levels` is the summary."""
     names = ", ".join(one.name for one in contenders)
-    title = f"Against the pack “{pack.root.name}”: {names}"
+    title = f"Against the pack “{printable(pack.root.name)}”: {names}"
     sections = list(_sections(pack, contenders, levels, notes))
     document.write(title, sections, folder, name, pack.manifest.get("programs", {}))
 

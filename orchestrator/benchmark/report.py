@@ -1,6 +1,8 @@
 """The page and the tables of a comparison."""
 
+import contextlib
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -57,7 +59,7 @@ def write(
     """
     numbers = pd.concat([one.rows.assign(solver=one.name) for one in contenders])
     levels = summary(contenders)
-    with settings.own(), folder.renewed(NUMBERS, VERDICTS, PAGE, FIGURES):
+    with settings.own(), _any_letters(), folder.renewed(NUMBERS, VERDICTS, PAGE, FIGURES):
         folder.put(NUMBERS, _text(numbers, "%.9g"))
         folder.put(VERDICTS, _text(pd.DataFrame(_verdicts(contenders)), "%.6g"))
         # the drawing libraries take half a second to import: only who draws waits for them
@@ -65,6 +67,14 @@ def write(
 
         page.write(pack, contenders, levels, folder, PAGE, notes)
     return Found(_failures(contenders), levels.to_string(index=False), folder.root / PAGE)
+
+
+@contextlib.contextmanager
+def _any_letters() -> Iterator[None]:
+    """Draw a solver's name without a word about letters that the font has not."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        yield
 
 
 def _text(table: pd.DataFrame, digits: str) -> str:

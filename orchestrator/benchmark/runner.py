@@ -118,7 +118,7 @@ def _check_names(names: Sequence[str]) -> None:
 
 
 def _check_apart(out: Path, chosen: Pack) -> None:
-    if out == chosen.root or chosen.root in out.parents:
+    if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", where=str(out), remedy="use --out")
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import shlex
 import shutil
 import stat
@@ -17,6 +18,9 @@ from orchestrator.errors import InputError
 from orchestrator.runs import confined
 from orchestrator.runs.confined import Limits, Used
 from orchestrator.runs.files import digest_file
+
+OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
+"""Words that mean something to a shell, and nothing to a program."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +122,26 @@ def split(command: str) -> list[str]:
                 where="--solver",
                 remedy="such as 'my-solver {case} {out}'",
             )
-    if shutil.which(words[0]) is None:
-        raise InputError(
-            f"there is no program {words[0]}", where="--solver", remedy="give its path"
-        )
+    _check_words(words)
     return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
+
+
+def _check_words(words: Sequence[str]) -> None:
+    """See that a command is one program with its arguments."""
+    shell = next((word for word in words if OPERATORS.fullmatch(word)), None)
+    if shell:
+        raise InputError(
+            f"no shell reads the command: {shell} would be an argument",
+            where="--solver",
+            remedy="put the line into a script, or write: sh -c '...'",
+        )
+    if shutil.which(words[0]) is None:
+        there = os.path.isfile(words[0])
+        raise InputError(
+            f"{words[0]} may not be run" if there else f"there is no program {words[0]}",
+            where="--solver",
+            remedy=f"chmod +x {words[0]}" if there else "give its path",
+        )
 
 
 def _filled(word: str, given: dict[str, str]) -> str:

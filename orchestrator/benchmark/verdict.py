@@ -12,18 +12,16 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark import answer
-from orchestrator.benchmark.answer import FILE, STEPS, AnswerError
+from orchestrator.benchmark.answer import COUNTS, FILE, STEPS, AnswerError
 from orchestrator.benchmark.mistakes import hint
 from orchestrator.benchmark.pack import Pack
-from orchestrator.errors import InputError, one_line
+from orchestrator.errors import InputError, one_line, printable
 from orchestrator.runs.files import read_json
 
 USED = "used.json"
 """What a solver took for a scene, beside its answer."""
 OURS = "ours"
 """Our own answers, in a directory beside the solver's."""
-COUNTS = ("moved", "not_moved", "carried_off")
-"""Whole numbers, which may be small: they are judged, but a relative error says little of them."""
 ROUND = 1e-8
 """Relative: the digits of a pack's tables."""
 NUMBERS = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
@@ -166,7 +164,7 @@ def compared(pack: Pack, names: Sequence[str], results: Path) -> Contender:
         for name in names
     ]
     rows = pd.concat([part for _, part in judged], ignore_index=True)
-    return Contender(results.absolute().name, [verdict for verdict, _ in judged], rows)
+    return Contender(printable(results.absolute().name), [verdict for verdict, _ in judged], rows)
 
 
 def _judged(

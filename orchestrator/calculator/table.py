@@ -25,6 +25,8 @@ PAPER = "paper"
 """The paper's rule: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
+DEEPEST = 2e4
+"""Of a liquid, m: twice the deepest sea."""
 Values = Mapping[str, FloatArray]
 
 
@@ -133,8 +135,14 @@ def _depths(points: pd.DataFrame, given: Values) -> FloatArray:
     if DEPTH.name not in points:
         return np.full(len(points), np.nan)
     depths = points[DEPTH.name].to_numpy(float)
-    bad = ~(np.isfinite(depths) & (depths > given["diameter"]))
+    bad = ~(depths > given["diameter"])
     where = f"threshold: {DEPTH.name}"
+    if (depths > DEEPEST).any():
+        raise InputError(
+            f"{depths.max():g} m is deeper than any liquid, {DEEPEST:g} m",
+            where=where,
+            remedy="give the depth of the liquid in m",
+        )
     if bad.any():
         raise InputError(
             f"a depth of {depths[bad][0]:g} m does not cover a grain of"

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import PARTS, make_scene
 
 Part = Literal["flow", "grains"]
 Levels = Mapping[Part, str]
@@ -69,15 +70,18 @@ class Level:
 
 
 def changed(scene: Scene, fields: Fields) -> Scene:
-    """A scene with some fields changed."""
-    updates: dict[str, dict[str, Any]] = {}
+    """A scene with some fields changed.
+
+    Raises
+    ------
+    InputError
+        For a field that there is none of, or a value that it cannot have.
+    """
+    parts: dict[str, dict[str, Any]] = {name: dict(getattr(scene, name)) for name in PARTS}
     for key, value in fields.items():
         part, _, field = key.partition(".")
-        updates.setdefault(part, {})[field] = value
-    parts = {name: getattr(scene, name) for name in Scene.model_fields}
-    for part, update in updates.items():
-        parts[part] = parts[part].model_copy(update=update)
-    return Scene(**parts)
+        parts.setdefault(part, {})[field] = value
+    return make_scene(parts, "fields that are changed")
 
 
 def level(part: Part, name: str) -> Level:

@@ -119,7 +119,7 @@ def _half_length(x: Array, z: Array, height_m: float) -> float:
 
 
 def _edges(line: BedLine) -> Array:
-    height = float(line.crest[1])
+    height = line.h
     parts = [
         np.linspace(start, end, ceil((end - start) / height * FACES) + 1)[:-1]
         for start, end in pairwise(line.x)

@@ -236,6 +236,13 @@ class LoadedBed:
         threshold = on_slopes(self.scene, np.where(speed < 0, -slopes, slopes))
         return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
 
+    @cached_property
+    def pivot_angles_deg(self) -> FloatArray:
+        """Angle of each counted grain's foremost contact from the bed's normal, shape (N,)."""
+        packed = self.packing
+        found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
+        return np.asarray(found[packed.windward])
+
     def leaving(self, ratio: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s.
 

@@ -30,6 +30,23 @@ MOST_STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
 
 
+class Disc(NamedTuple):
+    """A grain in the plane."""
+
+    x: float
+    z: float
+    radius: float
+
+    @property
+    def place(self) -> Place:
+        """Its centre."""
+        return self.x, self.z
+
+    def seen(self, side: float) -> "Disc":
+        """The grain as it is seen from the front, 1, or from behind, -1."""
+        return Disc(self.x * side, self.z, self.radius)
+
+
 def flows(
     centres: FloatArray,
     sizes: FloatArray,
@@ -116,6 +133,30 @@ def pivots(
     return found
 
 
+def pivot_angles_deg(centres: FloatArray, sizes: FloatArray, along: FloatArray) -> FloatArray:
+    """Angle of each grain's foremost contact from the normal of the bed, shape (n,).
+
+    NaN for a grain that touches none. Arguments as in `flows`.
+    """
+    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
+    found = np.full(len(centres), np.nan)
+    for i, near in _neighbours(centres, sizes, np.ones(len(centres), bool)):
+        pivot = foremost(grains[i], [grains[k] for k in near])
+        if pivot:
+            slope = math.atan2(along[i, 1], along[i, 0])
+            found[i] = math.degrees(_lean(grains[i].place, pivot.place) - slope)
+    return found
+
+
+def foremost(grain: Disc, others: Sequence[Disc]) -> Disc | None:
+    """The contact of a grain that lies farthest round towards downstream, from below."""
+    here = grain.place
+    touching = (
+        k for k in others if math.dist(k.place, here) < (1 + TOUCH) * (grain.radius + k.radius)
+    )
+    return max(touching, key=lambda k: _lean(here, k.place), default=None)
+
+
 def _neighbours(
     centres: FloatArray, sizes: FloatArray, chosen: BoolArray
 ) -> Iterator[tuple[int, list[int]]]:
@@ -130,23 +171,6 @@ def _neighbours(
         near = apart < REACH * own[rank] + (own[a:b] + own[rank]) / 2
         near[rank - a] = False
         yield int(order[rank]), np.sort(order[a:b][near]).tolist()
-
-
-class Disc(NamedTuple):
-    """A grain in the plane."""
-
-    x: float
-    z: float
-    radius: float
-
-    @property
-    def place(self) -> Place:
-        """Its centre."""
-        return self.x, self.z
-
-    def seen(self, side: float) -> "Disc":
-        """The grain as it is seen from the front, 1, or from behind, -1."""
-        return Disc(self.x * side, self.z, self.radius)
 
 
 @dataclass(frozen=True)
@@ -202,12 +226,7 @@ class _Climb:
         return flow, way
 
     def _foremost(self) -> Disc | None:
-        """The contact that lies farthest round towards downstream, from below."""
-        here = self.start.place
-        touching = (
-            k for k in self.others if math.dist(k.place, here) < (1 + TOUCH) * self._reach(k)
-        )
-        return max(touching, key=lambda k: _lean(here, k.place), default=None)
+        return foremost(self.start, self.others)
 
     def _reach(self, other: Disc) -> float:
         """Distance of the centres where the grain touches another."""

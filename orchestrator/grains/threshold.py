@@ -100,13 +100,13 @@ def of_pile(
     motion: Motion, speed: FloatArray, fraction: float, fluid_density: float
 ) -> PileThreshold:
     """tau_c of a pile at a fraction; arguments as in `curve`."""
-    level = _first_level(motion, fraction)
+    level = first_level(motion, fraction)
     if level is None:
         return PileThreshold(fraction, *(math.nan,) * 5)
     half_a_grain = 0.5 / motion.count
-    below = _first_level(motion, fraction - half_a_grain) or level
+    below = first_level(motion, fraction - half_a_grain) or level
     # where half a grain more was not reached, the interval is open: it ends at the last load step
-    above = _first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
+    above = first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.low[level] * motion.flow[level])
 
     def stress(at: int, ustar0: float) -> float:
@@ -122,7 +122,8 @@ def of_pile(
     )
 
 
-def _first_level(motion: Motion, fraction: float) -> int | None:
+def first_level(motion: Motion, fraction: float) -> int | None:
+    """The first load step by whose end a fraction of the grains had moved, if any."""
     needed = max(math.ceil(fraction * motion.count - 1e-9), 1)
     reached = np.flatnonzero(motion.fraction * motion.count >= needed - 1e-9)
     return int(reached[0]) if len(reached) else None

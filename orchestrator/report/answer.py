@@ -99,6 +99,7 @@ def sheet(results: Results) -> Sheet | None:
     return _grains(grains) if len(grains) else None
 
 
+MODEL = "model's interval"
 HEAD = ("τ_c", "interval", "u*₀, m/s", "usable")
 
 
@@ -113,16 +114,24 @@ def _each(rows: pd.DataFrame) -> Sheet:
         for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows()
     ]
     fraction = rows["fraction"].iloc[0]
-    tau, *others = HEAD
-    return Sheet(("slope", "d", "forces", f"{tau} at n/N = {fraction:.0%}", *others), tuple(cells))
+    tau, interval, *others = HEAD
+    value = f"{tau} at n/N = {fraction:.0%}"
+    return Sheet(("slope", "d", "forces", value, interval, MODEL, *others), tuple(cells))
 
 
-def _threshold(row: pd.Series) -> tuple[str, str, str, str]:
+def _threshold(row: pd.Series) -> tuple[str, str, str, str, str]:
     usable = "yes" if row["usable"] else f"no: {row['why_not']}"
     if pd.isna(row["shields"]):
-        return "—", "—", "—", usable
+        return "—", "—", "—", "—", usable
     low, high = sorted((row["shields_low"], row["shields_high"]))
-    return f"{row['shields']:.4f}", f"{low:.4f} … {high:.4f}", f"{row['ustar0_m_s']:.3f}", usable
+    value, interval = f"{row['shields']:.4f}", f"{low:.4f} … {high:.4f}"
+    return value, interval, _model(row), f"{row['ustar0_m_s']:.3f}", usable
+
+
+def _model(row: pd.Series) -> str:
+    """The model's own interval, and the choice behind most of it."""
+    low, high = row["shields_model_low"], row["shields_model_high"]
+    return "—" if pd.isna(low) else f"{low:.3f} … {high:.3f}, most by {row['model_share']}"
 
 
 def _ranges(rows: pd.DataFrame) -> Sheet:

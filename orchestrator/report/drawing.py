@@ -9,7 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.report import FIGURES, compared, overview, piles, single, stress, style
+from orchestrator.report import FIGURES, compared, mixture, overview, piles, single, stress, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import bed, flow, mesh
 from orchestrator.report.results import Results
@@ -20,6 +20,7 @@ Draw = Callable[[Results], Iterable[Figure]]
 SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (2, (piles.extended,)),
     (3, (piles.fractions,)),
+    (7, (mixture.draw,)),
     (4, (compared.draw, single.draw)),
     (0, (bed.draw,)),
     (5, (stress.draw,)),

@@ -6,6 +6,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
+from orchestrator.errors import OrchestratorError
 from orchestrator.runs.files import canonical_json, digest_text
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -55,6 +56,12 @@ def template_digest(name: str) -> str:
 def _files(name: str) -> tuple[tuple[str, int, bytes], ...]:
     """Path, mode and content of each file; read once, so that all copies are what was digested."""
     root = templates() / name
+    if not root.is_dir():
+        raise OrchestratorError(
+            "the package lacks this directory of templates",
+            where=str(root),
+            remedy="install the package again",
+        )
     paths = (path.relative_to(root) for path in sorted(root.rglob("*")) if path.is_file())
     own = [path for path in paths if not any(map(_is_generated, path.parts))]
     modes = (stat.S_IMODE((root / path).stat().st_mode) for path in own)

@@ -11,6 +11,7 @@ import json
 import os
 import resource
 import signal
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -24,6 +25,8 @@ FAREWELL_S = 10.0
 """Most that is spent on ending processes that start others."""
 FILES = 100_000
 """Most files of a program: a look at them must end."""
+THREADS = 16
+"""Most threads for each process that a program may have."""
 ENTRY = 4096
 """A file takes this much of a disk even if it is empty, bytes."""
 _SET_DEATH_SIGNAL, _SET_DUMPABLE, _SET_SUBREAPER = 1, 4, 36
@@ -113,12 +116,14 @@ def _broken(order: dict[str, Any], *, walk: bool) -> str:
     family = _family()
     if len(family) > order["processes"]:
         return f"it ran more than {order['processes']} processes at once"
+    if sum(map(_threads, family)) > THREADS * order["processes"]:
+        return f"it ran more than {THREADS * order['processes']} threads at once"
     # what processes share is counted with each of them: only then is the slow look worth it
     if all(sum(sizes) > order["memory"] for sizes in (family.values(), _parts(family))):
         return f"it took more than {_said(order['memory'])} of memory"
     if os.fstat(sys.stdout.fileno()).st_size > order["printed"]:
         return f"it printed more than {_said(order['printed'])}"
-    if walk and not _fits(order["disk"]):
+    if walk and not _fits(order["disk"], _nameless(family)):
         return f"its files took more than {_said(order['disk'])}, or were too many or too deep"
     return ""
 
@@ -157,9 +162,28 @@ def _parts(family: dict[int, int]) -> Iterator[int]:
             yield most
 
 
-def _fits(most: int) -> bool:
-    """Whether the files of the working directory are within a size, bytes."""
-    size, count, folders = 0, 0, ["."]
+def _threads(pid: int) -> int:
+    with contextlib.suppress(OSError):
+        return len(os.listdir(f"/proc/{pid}/task"))
+    return 1
+
+
+def _nameless(family: dict[int, int]) -> int:
+    """Size of the files without a name that processes hold open, of a disk or of memory, bytes."""
+    sizes = {}
+    for folder in (f"/proc/{pid}/fd" for pid in family):
+        with contextlib.suppress(OSError):
+            for name in os.listdir(folder):
+                with contextlib.suppress(OSError):
+                    state = os.stat(f"{folder}/{name}")
+                    if stat.S_ISREG(state.st_mode) and not state.st_nlink:
+                        sizes[state.st_dev, state.st_ino] = 512 * state.st_blocks
+    return sum(sizes.values())
+
+
+def _fits(most: int, size: int) -> bool:
+    """Whether the files of the working directory, and others of a size, are within one, bytes."""
+    count, folders = 0, ["."]
     while folders:
         try:
             with os.scandir(folders.pop()) as entries:
@@ -174,7 +198,7 @@ def _fits(most: int) -> bool:
             continue
         except OSError:  # it nests too deep, or may not be read: what is there is not known
             return False
-    return True
+    return size <= most
 
 
 def _end_family() -> None:

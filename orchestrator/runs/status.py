@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import printable
 from orchestrator.runs.case import DONE, failure, names_in, size
 from orchestrator.runs.files import read_json, size_of
 from orchestrator.runs.workspace import Workspace
@@ -130,7 +131,7 @@ def text(status: Status) -> str:
         lines.append(f"page: {status.page}")
     elif not status.running:
         lines.append("the same study command continues it")
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))  # a study's name may come from anywhere
 
 
 def left_text(left: Mapping[str, int]) -> str:

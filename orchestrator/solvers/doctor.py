@@ -1,7 +1,9 @@
 """Is everything here that a study needs, and what to install if not."""
 
 import importlib.metadata
+import os
 import shutil
+import subprocess
 import sys
 import warnings
 from collections.abc import Callable
@@ -12,8 +14,13 @@ from orchestrator.errors import OrchestratorError
 from orchestrator.runs import resources
 from orchestrator.solvers import liggghts, openfoam
 
-LIBRARIES = ("numpy", "pandas", "pyarrow", "meshio", "gmsh", "pyvista", "matplotlib", "pydantic")
+LIBRARIES = (
+    *("numpy", "scipy", "pandas", "pyarrow", "pydantic"),
+    *("gmsh", "meshio", "pyvista", "matplotlib"),
+)
 TOOLS = ("stdbuf", "sha256sum", "setpriv")
+_NEEDS = {"gmsh": "apt-get install libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"}
+"""What a library needs beside itself."""
 FREE_GIB = 1.0
 
 
@@ -43,7 +50,6 @@ def examine() -> list[Finding]:
         *(_solver(name, ask) for name, ask in _SOLVERS.items()),
         *(_library(name) for name in LIBRARIES),
         *(_tool(name) for name in TOOLS),
-        _gmsh(),
         _limits(),
         _disk(Path.cwd()),
     ]
@@ -67,23 +73,27 @@ def _solver(name: str, ask: Callable[[], str]) -> Finding:
 
 def _library(name: str) -> Finding:
     try:
-        return Finding(name, True, importlib.metadata.version(name))
+        version = importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return Finding(name, False, f"missing: pip install {name}")
+    # in a process of its own: a broken library may end it
+    loaded = subprocess.run(
+        [sys.executable, "-c", f"import {name}"],
+        env={**os.environ, "MATPLOTLIBRC": os.devnull},
+        capture_output=True,
+        text=True,
+        errors="replace",
+    )
+    if loaded.returncode == 0:
+        return Finding(name, True, version)
+    said = (loaded.stderr.strip().splitlines() or [f"it ended with {loaded.returncode}"])[-1]
+    remedy = _NEEDS.get(name, f"pip install --force-reinstall {name}")
+    return Finding(name, False, f"does not load: {said}: {remedy}")
 
 
 def _tool(name: str) -> Finding:
     path = shutil.which(name)
     return Finding(name, path is not None, path or "missing: install coreutils and util-linux")
-
-
-def _gmsh() -> Finding:
-    try:
-        import gmsh  # noqa: F401 - its shared libraries are looked for at import
-    except (ImportError, OSError) as error:
-        libraries = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
-        return Finding("meshing", False, f"{error}: apt-get install {libraries}")
-    return Finding("meshing", True, "gmsh loads")
 
 
 def _limits() -> Finding:

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
+from orchestrator.runs.files import opened
 from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.parts import PileBed, UnfitError
@@ -36,6 +37,8 @@ LONGEST_S = 1e8
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 MOST_SCENES = 100_000
+MOST_BYTES = 2**24
+"""Of a study file: what lists every scene that there may be is shorter."""
 
 
 @dataclass(frozen=True)
@@ -125,9 +128,13 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
         )
     try:
         # some editors begin a text with a mark of its encoding
-        text = path.read_text(encoding="utf-8-sig")
+        with opened(path) as stream:
+            content = stream.read(MOST_BYTES + 1)
+        text = content.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None
+    if len(content) > MOST_BYTES:
+        raise InputError(f"it is larger than {MOST_BYTES // 2**20} MiB", where=source)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":

@@ -47,6 +47,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "pile_grain": _concat(map(piles.grains, ready)),
         "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
+        "size_class": pd.DataFrame(row for one in ready for row in piles.size_class_rows(one)),
         "check": pd.DataFrame(_checks(study, plan, cases, done)),
     }
     return {name: table for name, table in made.items() if not table.empty}

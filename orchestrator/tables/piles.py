@@ -11,11 +11,12 @@ import pandas as pd
 from orchestrator.fidelity import checks
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.spread import spread
-from orchestrator.grains import threshold
+from orchestrator.grains import classes, threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
+from orchestrator.physics import hiding
 from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
@@ -65,7 +66,7 @@ def grains(answer: Answer) -> pd.DataFrame:
     """The windward grains of a pile: the stress on each, when and how it moved."""
     motion, face = answer.motion, answer.face
     found = threshold.of_grains(motion)
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
             "scene_id": answer.scene_id,
             "grain_id": face.ids,
@@ -78,6 +79,53 @@ def grains(answer: Answer) -> pd.DataFrame:
             "ustar0_m_s": found.value,
         }
     )
+    return table.assign(**_of_its_own(answer.pile)) if answer.pile.pouring else table
+
+
+def _of_its_own(pile: Pile) -> Row:
+    """What differs from grain to grain of a poured bed."""
+    chosen = pile.packing.windward
+    return {
+        "size_over_d": pile.packing.sizes[chosen],
+        "pivot_deg": pile.pivot_angles_deg,
+    }
+
+
+def size_class_rows(answer: Answer) -> Iterator[Row]:
+    """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
+    pile, scene = answer.pile, answer.pile.scene
+    if not pile.pouring:
+        return
+    listed = list(classes.classes(pile.packing.sizes[pile.packing.windward]))
+    for fraction in scene.protocol.fractions:
+        found = {one.number: _of_class(answer, one, fraction) for one in listed}
+        middle = found[0]["shields_own"] if 0 in found else np.nan
+        whole = threshold.first_level(answer.motion, fraction)
+        for one in listed:
+            moved = answer.motion.moved_by(whole or 0)[one.chosen]
+            yield {
+                "scene_id": answer.scene_id,
+                "fraction": fraction,
+                "size_over_d": one.size,
+                "count": int(one.chosen.sum()),
+                "class_moved": moved.mean() if whole else np.nan,
+                **found[one.number],
+                "hiding": found[one.number]["shields_own"] / middle,
+                "hiding_wilcock_crowe": float(hiding.wilcock_crowe(one.size)),
+                "hiding_egiazaroff": float(hiding.egiazaroff(one.size)),
+            }
+
+
+def _of_class(answer: Answer, one: classes.SizeClass, fraction: float) -> Row:
+    scene, speed = answer.pile.scene, answer.face.speed[one.chosen]
+    motion = classes.of(answer.motion, one.chosen)
+    found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
+    names = ("shields_own", "shields_own_low", "shields_own_high")
+    stresses = (found.tau, found.tau_low, found.tau_high)
+    return {
+        "ustar0_m_s": found.ustar0,
+        **{n: _shields(scene, tau) / one.size for n, tau in zip(names, stresses, strict=True)},
+    }
 
 
 def curve(answer: Answer) -> pd.DataFrame:

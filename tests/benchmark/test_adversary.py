@@ -227,6 +227,20 @@ ANSWERS = {
         "for i in range(9): open(str(i), 'w').write('x' * 9 * 2**20)\ntime.sleep(9)",
         "its files took more than 32 MiB",
     ),
+    "files of memory": (
+        "for i in range(40):\n    os.write(os.memfd_create(str(i)), bytes(2**20))\ntime.sleep(9)",
+        "its files took more than 32 MiB",
+    ),
+    "files without a name": (
+        "for i in range(40):\n    os.write(os.open('f', 66), bytes(2**20)); os.unlink('f')\n"
+        "time.sleep(9)",
+        "its files took more than 32 MiB",
+    ),
+    "threads": (
+        "import threading\nfor _ in range(700):\n"
+        "    threading.Thread(target=time.sleep, args=(9,), daemon=True).start()\ntime.sleep(9)",
+        "more than 640 threads",
+    ),
     "forks": (
         "for _ in range(99): os.fork() or time.sleep(9)\ntime.sleep(9)",
         "more than 40 processes",
@@ -353,6 +367,28 @@ def test_a_solver_that_lies_where_it_may_not_see(formulas: Path, tmp_path: Path)
     shutil.copy(NATIVE / "solver.py", pack / "solver.py")
     with pytest.raises(InputError, match=r"solver\.py lies in .*, which is hidden from the solver"):
         runner.run(pack, f"python3 {pack}/solver.py {{case}} {{out}}", None, TWO, SMALL)
+
+
+@pytest.mark.parametrize(
+    ("tail", "words"),
+    [
+        (">log.txt", "no shell reads the command: >log.txt"),
+        ("| tee log", "no shell reads the command: |"),
+        ("&& true", "no shell reads the command: &&"),
+        ("2>&1", "sh -c"),
+    ],
+)
+def test_a_command_for_a_shell_is_refused(tail: str, words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        split(f"true {{case}} {{out}} {tail}")
+    split("true -c 'import this;' {case} {out}")
+
+
+def test_a_program_that_may_not_be_run(tmp_path: Path) -> None:
+    path = tmp_path / "solver"
+    path.write_text("#!/bin/sh\n")
+    with pytest.raises(InputError, match=r"solver may not be run \(chmod \+x"):
+        split(f"{path} {{case}} {{out}}")
 
 
 @pytest.mark.parametrize("limit", ["nan", "-1", "0", "inf", "soon"])

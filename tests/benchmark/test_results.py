@@ -1,11 +1,15 @@
 """Directories of results: of one solver and one pack, and never through a link."""
 
+import os
+import re
 import shutil
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
-from orchestrator.benchmark import runner
+from orchestrator.benchmark import answer, runner
+from orchestrator.benchmark.answer import AnswerError
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import claim
@@ -32,6 +36,10 @@ def test_results_go_nowhere_else(formulas: Path, finished: Path, tmp_path: Path)
     shutil.copytree(formulas, pack)
     _refused(formulas, pack, "holds the benchmark pack")
     _refused(formulas, formulas / "results", "may not lie in the pack")
+    (tmp_path / "link").symlink_to(formulas)
+    _refused(formulas, tmp_path / "link" / "results", "may not lie in the pack")
+    with pytest.raises(InputError, match="may not lie in the pack"):
+        runner.compare(formulas, [mine], tmp_path / "link" / "results", TWO)
     with pytest.raises(InputError, match="something that is not"):
         runner.compare(formulas, [mine], mine, TWO)
     with pytest.raises(InputError, match=r"holds .*(study|cases)"):
@@ -107,3 +115,55 @@ def test_results_of_a_stranger(formulas: Path, tmp_path: Path, text: str) -> Non
     (given / "ours" / "2-incline-5" / "answer.csv").write_text("junk")
     with pytest.raises(InputError, match=r"ours/2-incline-5/answer\.csv"):
         runner.compare(formulas, [given], None, Choice(patterns=("2-incline-5",)))
+
+
+INCLINE = "quantity,at,value\nacceleration_over_g,,0.06225\n"
+FORMS = {
+    "a mark of its encoding": ("\ufeff" + INCLINE, ""),
+    "spaces": (INCLINE.replace(",", ", "), ""),
+    "lines of another system": (INCLINE.replace("\n", "\r\n"), ""),
+    "a decimal comma": (INCLINE.replace("0.0", "0,0"), "decimal commas"),
+    "too few fields": ("quantity,at,value\nacceleration_over_g,0.06225\n", "cut short"),
+    "an underscore": (INCLINE.replace("0.06", "0.0_6"), "holds no number"),
+    "digits of another alphabet": (INCLINE.replace("2", "\u0662"), "holds no number"),
+    "Fortran": (INCLINE.replace("0.06225", "6.225D-02"), "holds no number"),
+    "a number that nothing is": (INCLINE.replace("0.06", "1e308"), "not finite|which nothing is"),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+@pytest.mark.filterwarnings("error")
+def test_the_form_of_an_answer(formulas: Path, tmp_path: Path, name: str) -> None:
+    text, words = FORMS[name]
+    folder = tmp_path / "given" / "2-incline-5"
+    folder.mkdir(parents=True)
+    (folder / "answer.csv").write_bytes(text.encode())
+    choice = Choice(patterns=("2-incline-5",))
+    failures = runner.compare(formulas, [folder.parent], tmp_path / "page", choice).failures
+    assert bool(failures) == bool(words)
+    assert re.search(words, "".join(failures))
+
+
+@pytest.mark.parametrize("name", [os.fsdecode(b"\xff"), "\x1b[2J", "\u6c99", "$\\frac{"], ids=ascii)
+@pytest.mark.filterwarnings("error")
+def test_names_of_solvers_and_packs_are_drawn_as_they_are(
+    formulas: Path, tmp_path: Path, name: str
+) -> None:
+    shutil.copytree(formulas, tmp_path / name / "pack" / name)
+    folder = tmp_path / name / "2-incline-5"
+    folder.mkdir()
+    (folder / "answer.csv").write_text(INCLINE)
+    choice = Choice(patterns=("2-incline-5",))
+    root = tmp_path / name / "pack" / name
+    found = runner.compare(root, [folder.parent], tmp_path / "page", choice)
+    assert not found.failures
+    assert "\x1b" not in found.summary + found.page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("count", [0.5, -1.0])
+def test_counts_are_whole(tmp_path: Path, count: float) -> None:
+    asked = pd.DataFrame({"quantity": ["moved", "not_moved"], "at": ["1", "1"]})
+    path = tmp_path / "answer.csv"
+    path.write_text(f"quantity,at,value\nmoved,1,{count}\nnot_moved,1,{2 - count}\n")
+    with pytest.raises(AnswerError, match=f"moved at 1 is {count:g}: it counts grains"):
+        answer.read(path, asked, 2.0)

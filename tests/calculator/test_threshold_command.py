@@ -278,6 +278,7 @@ def test_usual_numbers_raise_no_question(run: Run, arguments: list[str]) -> None
         (["--diameter", "1e-3", "--depth", "1"], ["--depth", "gas", "--fluid-density"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
         ([*QUARTZ_IN_WATER, "--depth", "nan"], ["--depth", "nan m"]),
+        ([*QUARTZ_IN_WATER, "--depth", "1e300"], ["--depth", "deeper than any liquid"]),
         (["--diameter", "1e-3", "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
         (["--diameter", "1e308"], ["--diameter", "less than or equal to 10"]),

@@ -52,6 +52,12 @@ def test_a_full_disk(pile: Bench, ledger: Ledger, small_disk: Path, size: str) -
         pile.check_finished()
 
 
+def test_a_disk_that_no_file_may_be_run_on(pile: Bench, ledger: Ledger, small_disk: Path) -> None:
+    with ledger.fault("a disk that no file may be run on", "the whole study"):
+        _remount(small_disk, "noexec,nosuid,nodev,size=100M")
+        pile.check_finished()
+
+
 def test_a_disk_that_can_only_be_read(pile: Bench, ledger: Ledger, small_disk: Path) -> None:
     with ledger.fault("a read-only disk", "begin"):
         _remount(small_disk, "ro,size=100M")

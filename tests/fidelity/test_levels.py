@@ -1,7 +1,10 @@
 """Fidelity levels: what they change, and by what they are recognised."""
 
+import re
+
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.fidelity import levels
 from orchestrator.fidelity.levels import AS_ASKED, LEVELS, Part, changed
 from tests.fidelity.conftest import MakePile
@@ -25,6 +28,25 @@ def test_a_level_changes_how_a_scene_is_answered_not_what_it_asks(pile: MakePile
         assert answered.bed.slope_deg == scene.bed.slope_deg
         assert answered.forces.stress == scene.forces.stress
         assert answered.protocol.fractions == scene.protocol.fractions
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("flow.expansion_ration", 1.1),
+        ("protocol.time_steps", 0.1),
+        ("grain.stiffness", -1.0),
+        ("flow.model", "magic"),
+        ("protocol.load_increment", float("nan")),
+        ("nothing", 1),
+        ("flow", 1),
+    ],
+)
+def test_a_scene_is_changed_in_fields_that_there_are(
+    field: str, value: object, pile: MakePile
+) -> None:
+    with pytest.raises(InputError, match=rf"changed: {re.escape(field)}"):
+        changed(pile(), {field: value})
 
 
 def test_beds_of_nearly_one_roughness_share_a_flow(pile: MakePile) -> None:

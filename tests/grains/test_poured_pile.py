@@ -55,6 +55,23 @@ def test_each_method_answers(finished: tuple[Plan, Path]) -> None:
     assert rows["error_estimate"].isna().all()
 
 
+def test_each_size_class_has_its_threshold(finished: tuple[Plan, Path]) -> None:
+    planned, cases = finished
+    made = tables.make(ASKED, planned, cases, list(planned.cases))
+    rows = made["size_class"]
+    counted = rows.groupby(["scene_id", "fraction"])["count"].sum()
+    (pile, *_) = planned.piles.values()
+    assert (counted == pile.packing.count).all()
+    middle = rows[np.abs(np.log(rows["size_over_d"])) < np.log(2) / 4]
+    assert (middle["hiding"].dropna() == 1).all()
+    grains = made["pile_grain"]
+    assert grains["pivot_deg"].between(-90, 180).all()
+    np.testing.assert_allclose(
+        np.sort(grains["size_over_d"].unique()),
+        np.unique(pile.packing.sizes[pile.packing.windward]),
+    )
+
+
 def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, Path]) -> None:
     planned, cases = finished
     pile = next(one for one in planned.piles.values() if one.scene.protocol.method == "dem")

@@ -153,6 +153,13 @@ BAD_FILES = {
 }
 
 
+def test_a_study_file_that_is_too_large_is_not_read(shell: Shell) -> None:
+    (shell.folder / "bad.toml").touch()
+    os.truncate(shell.folder / "bad.toml", 2**40)
+    code, said = shell.run("study", "bad.toml", "--out", "out")
+    assert (code, "bad.toml: it is larger than 16 MiB" in said) == (2, True), said
+
+
 @pytest.mark.parametrize("name", BAD_FILES)
 def test_study_files_that_are_wrong_otherwise(shell: Shell, name: str) -> None:
     (shell.folder / "bad.toml").write_text(BAD_FILES[name])

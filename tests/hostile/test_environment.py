@@ -1,6 +1,7 @@
 """A user's settings and variables that are none of ours: they change no result and no figure."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -137,3 +138,42 @@ def test_a_program_that_draws_by_itself_keeps_its_settings(
         assert matplotlib.rcParams["font.size"] == 33
     assert Path.cwd() == tmp_path
     assert os.environ["MPLBACKEND"] == "pdf"
+
+
+@pytest.mark.parametrize("value", ["abc", "", "-1", "1e9", "9" * 40])
+def test_the_library_is_imported_whatever_the_date_of_a_build(value: str) -> None:
+    command = [sys.executable, "-c", "import orchestrator.pipeline, orchestrator.report.page"]
+    subprocess.run(command, cwd=ROOT, env={**os.environ, "SOURCE_DATE_EPOCH": value}, check=True)
+
+
+BROKEN = {
+    "scipy": "raise RuntimeError('compiled against another numpy')",
+    "pandas": "def",
+    "pydantic": "import _nothing",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_library_is_told_in_a_line(tmp_path: Path, name: str) -> None:
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / f"{name}.py").write_text(BROKEN[name])
+    (tmp_path / "small.toml").write_text(HEAD + CELLS)
+    paths = f"{tmp_path / 'broken'}{os.pathsep}{ROOT}"
+    ended = _run(tmp_path, "study", "small.toml", PYTHONPATH=paths)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("orchestrator: a library does not load: ")
+    assert ended.stderr.count("\n") == 1
+    examined = _run(tmp_path, "doctor", PYTHONPATH=paths)
+    assert examined.returncode == 1
+    (line,) = (line for line in examined.stdout.splitlines() if line.startswith("NOT"))
+    assert f"pip install --force-reinstall {name}" in line
+
+
+def test_a_package_without_its_templates_says_so(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "orchestrator", tmp_path / "package" / "orchestrator")
+    (tmp_path / "small.toml").write_text(HEAD + CELLS)
+    ended = _run(tmp_path, "study", "small.toml", PYTHONPATH=str(tmp_path / "package"))
+    assert ended.returncode == 1
+    assert "package/templates/liggghts/" in ended.stderr
+    assert "lacks this directory of templates (install the package again)" in ended.stderr
+    assert ended.stderr.count("\n") == 1

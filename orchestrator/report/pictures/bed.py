@@ -146,6 +146,9 @@ def _triple(number: int, place: FloatArray) -> tuple[int, float | None, float | 
 def window(pile: Pile) -> Window:
     """What is shown: the whole pile, or of a long one the upper end of its face."""
     (x, z), toe = pile.line.crest, float(pile.line.toe[0])
+    if z <= 0:  # a level bed has no crest
+        left = pile.line.x[1] - 2
+        return left, min(pile.line.x[-2] + 2, left + LONG), -4.0, 6.0
     beside = 0.06 * toe
     if x <= LONG:
         return -beside, toe + beside, -2.0, float(z) + max(0.5 * z, 6.0)
