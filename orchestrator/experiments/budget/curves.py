@@ -39,7 +39,7 @@ def _curves(ax: Axes, one: Wear) -> None:
     count = one.bed.packing.count
     worn = one.left[one.bed.packing.windward]
     for flows, colour, style_of in ((one.frozen, "0.5", "--"), (worn, "#0072b2", "-")):
-        known = np.sort(flows[np.isfinite(flows)])
+        known = np.sort(flows[np.isfinite(flows)])[: int(LAST * count) + 1]
         moved = np.arange(1, len(known) + 1) / count
         ax.step(known, moved, where="post", color=colour, ls=style_of)
     ax.set(ylim=(0, LAST), ylabel="n/N")
