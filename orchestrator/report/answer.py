@@ -22,7 +22,7 @@ def sentences(results: Results) -> list[str]:
     piles = results.joined("pile_threshold")
     if len(piles):
         found = [_of_pile(row, results) for row in _ends(piles)]
-        return [*found, *_warnings(piles)]
+        return [*found, *_warnings(piles), *_worth(piles, results.study.tolerance)]
     grains = results.joined("single_grain")
     return [*map(_of_grain, _grain_ends(grains)), *_warnings(grains)] if len(grains) else []
 
@@ -87,6 +87,21 @@ def _warnings(table: pd.DataFrame) -> Iterator[str]:
     usable = int(valid(table).sum())
     if usable < len(table):
         yield f"Usable: {usable} of {len(table)} thresholds."
+
+
+def _worth(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
+    """A tolerance below the model's own interval is answered, and this is said of it."""
+    known = piles.dropna(subset=["shields", "shields_model_low"])
+    if tolerance is None or known.empty:
+        return
+    low = 1 - known["shields_model_low"] / known["shields"]
+    high = known["shields_model_high"] / known["shields"] - 1
+    if tolerance < float(((low + high) / 2).min()):
+        yield (
+            f"The tolerance of {tolerance:.0%} is about numerics. The choices that all models here "
+            f"share move the same thresholds by −{low.max():.0%} … +{high.max():.0%}, most by "
+            f"{known['model_share'].mode().iloc[0]} (see `orchestrator budget`)."
+        )
 
 
 def sheet(results: Results) -> Sheet | None:

@@ -1,0 +1,33 @@
+"""What is said in words of a study's thresholds."""
+
+import math
+
+import pandas as pd
+import pytest
+
+from orchestrator.report import answer
+
+
+def _piles(low: float, high: float) -> pd.DataFrame:
+    return pd.DataFrame(
+        {
+            "shields": [0.05, math.nan],
+            "shields_model_low": [0.05 * (1 - low), math.nan],
+            "shields_model_high": [0.05 * (1 + high), math.nan],
+            "model_share": ["packing", "packing"],
+        }
+    )
+
+
+def test_a_tolerance_below_the_models_interval_is_told() -> None:
+    (said,) = answer._worth(_piles(0.3, 1.1), 0.05)
+    assert "tolerance of 5% is about numerics" in said
+    assert "−30% … +110%, most by packing" in said
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "tolerance"),
+    [(0.3, 1.1, None), (0.04, 0.02, 0.05), (math.nan, math.nan, 0.05)],
+)
+def test_nothing_is_told_of_others(low: float, high: float, tolerance: float | None) -> None:
+    assert not list(answer._worth(_piles(low, high), tolerance))
