@@ -82,6 +82,8 @@ def _units() -> Iterator[tuple[float, str]]:
 
 def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]]:
     bodies = ((DISC, "the inertia of a disc"), (SHELL, "the inertia of a hollow sphere"))
+    if quantity == "reynolds":
+        yield 0.5, "it is that of the radius"
     if kind == "incline":
         a, friction = math.radians(told["incline_deg"]), math.tan(math.radians(told["phi_deg"]))
         rolls = math.tan(a) < (1 + 1 / SPHERE) * friction
@@ -140,6 +142,13 @@ def _changes(told: Told) -> Iterator[tuple[str, Told]]:
         "the weight is that of the dry grain, not of the submerged one",
         {"g_m_s2": told["g_m_s2"] / submerged},
     )
+    yield "the radius is taken for the diameter", {"d_m": told["d_m"] / 2}
+    yield (
+        "the entrainment angle is counted from the other side",
+        {"beta_deg": 90 - told["beta_deg"]},
+    )
+    yield "the slope is converted to radians twice", {"alpha_deg": math.radians(told["alpha_deg"])}
+    yield "the lift coefficient is that for the radius", {"alpha_s": 4 * told["alpha_s"]}
     for g in GRAVITIES:
         yield f"g is {g:g}, not {told['g_m_s2']:g} m/s2", {"g_m_s2": g}
 

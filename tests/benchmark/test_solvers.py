@@ -66,6 +66,33 @@ right = solver.passing
 solver.KINDS["passing"] = lambda scene, case: right({{**scene, {}}}, case)
 """
 WRONG = {
+    "the radius": (
+        OTHER_SCENE.format("'d_m': scene['d_m'] / 2, 'weight_n': scene['weight_n'] / 8") + TAIL,
+        FORMULA,
+        "the radius is taken for the diameter",
+    ),
+    "an angle from the other side": (
+        OTHER_SCENE.format("'beta_deg': 90 - scene['beta_deg']") + TAIL,
+        SLOPED,
+        "the entrainment angle is counted from the other side",
+    ),
+    "a slope in radians": (
+        OTHER_SCENE.format("'alpha_deg': math.radians(scene['alpha_deg'])") + TAIL,
+        SLOPED,
+        "the slope is converted to radians twice",
+    ),
+    "a lift for the radius": (
+        OTHER_SCENE.format("'alpha_s': 4 * scene['alpha_s']") + TAIL,
+        FORMULA,
+        "the lift coefficient is that for the radius",
+    ),
+    "a Reynolds number of the radius": (
+        AFTER + "lines = [n.split(',') for n in text.splitlines()]\n"
+        "out.write_text(''.join(f'{q},{at},{float(v) / 2 if q == \"reynolds\" else v}\\n'"
+        " for q, at, v in lines))\nsys.exit(code)\n",
+        FORMULA,
+        "reynolds is .*: it is that of the radius",
+    ),
     "a criterion of 0.5 d": (
         PASSING.format("'displacement_criterion': 0.5") + TAIL,
         "2-passing-2",
