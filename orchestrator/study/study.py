@@ -29,8 +29,11 @@ from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.sizes import Sizes
 
 PARTS = tuple(Scene.model_fields)
-GROUP_KEYS = (*PARTS, "axes", "name")
-TOP_KEYS = (*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group", "profiles")
+GROUP_KEYS = (*PARTS, "axes", "name", "seeds")
+TOP_KEYS = (
+    *(*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group", "profiles"),
+    "seeds",
+)
 TIME_LIMIT_S = 3600.0
 LONGEST_S = 1e8
 """Three years."""
@@ -39,6 +42,7 @@ BED = {"kind": "grain", "roughness": "d/30"}
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
 """Of a study file: what lists every scene that there may be is shorter."""
+MOST_SEEDS = 1000
 
 
 @dataclass(frozen=True)
@@ -222,8 +226,18 @@ def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator
         place = f"{where}: group {number}" if "group" in data else where
         _known(item, GROUP_KEYS, place, "")
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
+        if seeds := _seeds(item.get("seeds", data.get("seeds", 0)), f"{place}: seeds"):
+            merged["axes"] = {**merged["axes"], "bed.seed": seeds}
         scenes = tuple(_scenes(merged, place, profiles))
         yield Group(str(item.get("name", f"group {number}")), scenes, place)
+
+
+def _seeds(count: Any, where: str) -> list[int]:
+    """The seeds of beds that differ in nothing else; none where a file asks for none."""
+    if type(count) is not int or not 0 <= count <= MOST_SEEDS:
+        what = "it is no number of beds"
+        raise InputError(what, where=where, remedy=f"at most {MOST_SEEDS}: seeds = 5 takes 0 to 4")
+    return list(range(count))
 
 
 def _resolved(groups: Sequence[Group]) -> Iterator[Group]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.study import sizes, study
 from orchestrator.study.scene import Scene
@@ -81,3 +82,19 @@ def test_a_lattice_takes_no_mixture() -> None:
     text = "grain = { diameter = 1e-3, sizes = { sigma_g = 1.3 } }"
     with pytest.raises(InputError, match="a mixture needs a poured bed"):
         study.parse(text, name="m", where="m")
+
+
+def test_one_key_asks_for_several_seeds() -> None:
+    grain = "grain = { diameter = 1e-3 }"
+    found = study.parse(f"seeds = 3\n{BED % 'd/30'}\n{grain}", name="m", where="m")
+    assert [scene.bed.seed for scene in found.scenes] == [0, 1, 2]  # type: ignore[union-attr]
+    for wrong in ("-1", "true", "2000", "'3'", "1.5"):
+        with pytest.raises(InputError, match="seeds: it is no number of beds"):
+            study.parse(f"seeds = {wrong}\n{BED % 'd/30'}\n{grain}", name="m", where="m")
+
+
+@pytest.mark.parametrize("name", ["poured", "mixture"])
+def test_presets_of_poured_beds_can_be_planned(name: str) -> None:
+    asked = study.load(name)
+    assert all(scene.is_poured for scene in asked.scenes)
+    assert len(plan.make(asked).cases) >= 4
