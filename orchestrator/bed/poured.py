@@ -21,6 +21,8 @@ LAYER = np.sin(np.pi / 3)
 """Thickness of a layer, d: as of a lattice."""
 NEAR = 0.5
 """Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
+LOCAL = 5.0
+"""Length of bed before and behind a grain that it is held against, d."""
 
 
 def read(
@@ -89,6 +91,24 @@ def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> Bool
     found = np.empty_like(free)
     found[order] = free
     return found
+
+
+def standing(packing: Packing, line: BedLine) -> FloatArray:
+    """How much higher each grain's lowest point lies than that of a mean exposed grain, d, (n,).
+
+    The local bed is the mean height of the exposed centres within `LOCAL` along the bed, less half
+    of d: a grain of d at that height stands as all grains of a lattice do.
+    """
+    segment, along = line.nearest(packing.centres)
+    away = packing.centres - line.corners[segment]
+    height = np.einsum("nk,nk->n", away, line.normals[segment])
+    shown = packing.windward | packing.lee
+    order = np.argsort(along[shown], kind="stable")
+    place, sums = along[shown][order], np.append(0, np.cumsum(height[shown][order]))
+    first, last = (np.searchsorted(place, along + side * LOCAL) for side in (-1, 1))
+    near = np.maximum(last - first, 1)
+    level = (sums[last] - sums[first]) / near
+    return np.asarray(np.where(shown, height - packing.sizes / 2 - (level - 0.5), 0.0))
 
 
 def contacts(centres: FloatArray, sizes: FloatArray, touch: float = 1e-3) -> IntArray:

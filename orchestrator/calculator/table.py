@@ -164,7 +164,8 @@ def _is_gas(given: Values) -> NDArray[np.bool_]:
 
 
 def _exposure(given: Values) -> Exposure:
-    return Exposure(*(given[name] for name in Exposure.__dataclass_fields__))
+    told = {name: given[name] for name in Exposure.__dataclass_fields__ if name in given}
+    return Exposure(**told)
 
 
 def _threshold(here: ForceLaw, given: Values) -> Threshold:

@@ -19,7 +19,7 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling
-from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces, on_slopes
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -29,6 +29,8 @@ FloatArray = NDArray[np.float64]
 TOE = 0.05
 """Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
 
+MANY = 20
+"""Kinds of grains in a bed beyond which their tables of forces have fewer places."""
 DIGITS = 9
 """Of lengths in d that a poured bed depends on: beds that differ in their scale alone share it."""
 
@@ -196,18 +198,39 @@ class LoadedBed:
         Exposed grains that may move carry a force.
         """
         pushed = self.packing.mobile & (self.packing.windward | self.packing.lee)
-        drag, lift = forces(self.scene, self.packing.sizes)
+        drag, lift = forces(self.scene, self.packing.sizes, self.gaps)
         return Loading(drag, lift, np.where(pushed, ratio, 0.0), self.tangents, self.normals)
 
     @cached_property
+    def gaps(self) -> FloatArray:
+        """Height of each grain's lowest point over the level where the flow begins, m, shape (n,).
+
+        By `forces.exposure` it is z0, or follows from the grain's own height over the local bed.
+        """
+        z0 = np.full(len(self.packing.sizes), self.bed.roughness)
+        if self.scene.forces.exposure == "alike":
+            return z0
+        return z0 + poured.standing(self.packing, self.line) * self.scene.grain.diameter
+
+    @cached_property
     def force_tables(self) -> list[ForceTable]:
-        """For each of the n grains, its forces over its own weight."""
+        """For each of the n grains, its forces over its own weight; of some use where it is pushed.
+
+        All grains that are not share the table of a grain of d.
+        """
         unit, weight = float(closed_form(self.scene).friction_velocity), self.scene.weight
+        packed = self.packing
+        pushed = packed.mobile & (packed.windward | packed.lee)
+        sizes = np.where(pushed, packed.sizes, 1.0).tolist()
+        kinds = list(zip(sizes, np.where(pushed, self.gaps, self.gaps[0]).tolist(), strict=True))
+        places = PLACES if len(set(kinds)) <= MANY else FEWER
         tables = {
-            size: ForceTable(*forces(self.scene, size), weight * size**3, unit)
-            for size in np.unique(self.packing.sizes).tolist()
+            (size, gap): ForceTable(
+                *forces(self.scene, size, gap), weight * size**3, unit, places=places
+            )
+            for size, gap in set(kinds)
         }
-        return [tables[size] for size in self.packing.sizes.tolist()]
+        return [tables[kind] for kind in kinds]
 
     def face(self, cases: Path) -> Face:
         """The windward grains and the stress on them, from the finished flow case."""

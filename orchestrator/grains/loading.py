@@ -14,8 +14,10 @@ FloatArray = NDArray[np.float64]
 Force = Callable[[FloatArray], FloatArray]
 """Size of a force (N) at local friction velocities (m/s) of at least 0."""
 
-TABULATED = np.geomspace(1e-4, 1e4, 4001)
+RANGE = 1e-4, 1e4
 """Local friction velocities of a table of forces, over that at which a grain goes by itself."""
+PLACES, FEWER = 4001, 501
+"""Of a table. With fewer it is within 1e-8 of the force law, and made in a tenth of the time."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class ForceTable:
     """Drag and lift over the weight, tabulated so that thousands of grains ask in turn.
 
     Between its places each is a power of the friction velocity times a small correction, a cubic
-    spline of the logarithms: it reproduces the force laws within 1e-12.
+    spline of the logarithms: with all places it reproduces the force laws within 1e-12.
 
     Parameters
     ----------
@@ -67,10 +69,14 @@ class ForceTable:
         Submerged weight of a grain, N.
     unit : float
         Friction velocity in the middle of the table, m/s.
+    places : int
+        How many there are.
     """
 
-    def __init__(self, drag: Force, lift: Force, weight: float, unit: float) -> None:
-        ustar = unit * TABULATED
+    def __init__(
+        self, drag: Force, lift: Force, weight: float, unit: float, places: int = PLACES
+    ) -> None:
+        ustar = unit * np.geomspace(*RANGE, places)
         self._log_ustar = np.log(ustar)
         self._forces = np.array([drag(ustar), lift(ustar)]) / weight
         # a law without lift has none anywhere

@@ -26,6 +26,9 @@ class Exposure:
         Kinematic viscosity nu, m2/s.
     lift_coefficient : array_like
         alpha_s of Eqs. 2 and 4; laws with a lift of their own ignore it.
+    gap : array_like, optional
+        Height of the grain's lowest point over the level at which the flow begins, m; by default
+        z0. Laws that do not `protrude` ignore it.
     """
 
     diameter: FloatArray
@@ -33,6 +36,7 @@ class Exposure:
     fluid_density: FloatArray
     viscosity: FloatArray
     lift_coefficient: FloatArray
+    gap: FloatArray
 
     def __init__(
         self,
@@ -41,14 +45,16 @@ class Exposure:
         fluid_density: ArrayLike,
         viscosity: ArrayLike,
         lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
+        gap: ArrayLike | None = None,
     ) -> None:
-        given = (diameter, roughness, fluid_density, viscosity, lift_coefficient)
+        height = roughness if gap is None else gap
+        given = (diameter, roughness, fluid_density, viscosity, lift_coefficient, height)
         for name, value in zip(self.__dataclass_fields__, given, strict=True):
             object.__setattr__(self, name, np.asarray(value, float))
 
     @property
     def fields(self) -> tuple[FloatArray, ...]:
-        """The five fields in their order, for calls that pass them on as arguments."""
+        """The six fields in their order, for calls that pass them on as arguments."""
         return tuple(getattr(self, name) for name in self.__dataclass_fields__)
 
     @property

@@ -53,6 +53,8 @@ class ForceLaw(ABC):
         Whose drag it is and the particle Reynolds number at which that ends.
     turns : bool
         Whether the flow also turns the grain about its centre.
+    protrudes : bool
+        Whether a grain's own height over the bed matters to its forces.
     """
 
     name: ClassVar[str]
@@ -62,6 +64,7 @@ class ForceLaw(ABC):
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
     turns: ClassVar[bool] = False
+    protrudes: ClassVar[bool] = False
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:

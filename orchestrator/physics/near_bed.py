@@ -9,21 +9,51 @@ import numpy as np
 from orchestrator.physics.constants import INVERSE_KARMAN
 from orchestrator.physics.exposure import Exposure, FloatArray
 
+HIDDEN = 1e-9
+"""Part of a grain that the flow meets at least: one below its level feels next to nothing."""
+
+
+def _met(exposure: Exposure, level: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The height of the lowest point that the flow meets, and the part of the diameter above it.
+
+    The flow begins at some level, m.
+    """
+    bottom = np.maximum(exposure.gap, level)
+    part = 1 - (bottom - exposure.gap) / exposure.diameter
+    return bottom, np.maximum(part, HIDDEN)
+
 
 def viscous_length(exposure: Exposure) -> FloatArray:
-    """Height of the grain's centre d/2 + z0, m: the mean viscous speed is ustar^2/nu times it."""
-    return np.asarray(exposure.diameter / 2 + exposure.roughness)
+    """Mean height at which the flow meets the grain, m, for the linear profile of Eq. 2.
+
+    The height of its centre d/2 + z0 where it lies z0 above the bed. The mean viscous speed is
+    ustar^2/nu times it.
+    """
+    bottom, part = _met(exposure, np.zeros(()))
+    return np.asarray(part * (part * exposure.diameter / 2 + bottom))
 
 
 def rough_speed(exposure: Exposure) -> FloatArray:
-    """V_f/ustar of Eq. 4: the logarithmic profile averaged from z0 to z0 + d."""
+    """V_f/ustar of Eq. 4: the logarithmic profile averaged from z0 to z0 + d.
+
+    Of a grain that stands higher or lower it is averaged over its own height.
+    """
     r = exposure.ratio
-    return np.asarray(INVERSE_KARMAN * ((1 + r) * np.log1p(1 / r) - 1))
+    alike = INVERSE_KARMAN * ((1 + r) * np.log1p(1 / r) - 1)
+    bottom, part = _met(exposure, exposure.roughness)
+    low = bottom / exposure.roughness
+    high = low + part / r
+    own = INVERSE_KARMAN * (r * (high * np.log(high) - low * np.log(low)) - part)
+    return np.asarray(np.where(exposure.gap == exposure.roughness, alike, np.maximum(own, HIDDEN)))
 
 
 def rough_gradient(exposure: Exposure) -> FloatArray:
     """(du/dz)/ustar of Eq. 4, averaged alike, 1/m."""
-    return np.asarray(INVERSE_KARMAN * np.log1p(1 / exposure.ratio) / exposure.diameter)
+    bottom, part = _met(exposure, exposure.roughness)
+    met = np.log1p(part * exposure.diameter / bottom)
+    alike = np.log1p(1 / exposure.ratio)
+    own = np.where(exposure.gap == exposure.roughness, alike, met)
+    return np.asarray(INVERSE_KARMAN * own / exposure.diameter)
 
 
 def bridge(ustar: FloatArray, viscous: FloatArray, rough: FloatArray) -> FloatArray:

@@ -61,7 +61,7 @@ def friction_velocity_at(
     *args, ratio = (np.ravel(array).astype(float) for array in arrays)
 
     def excess(ustar: FloatArray, *grain: FloatArray) -> FloatArray:
-        here, (a, b, c, goal) = Exposure(*grain[:5]), grain[5:]
+        here, (a, b, c, goal) = Exposure(*grain[:6]), grain[6:]
         sum_ = law.drag(ustar, here) * a + law.lift(ustar, here) * b + law.torque(ustar, here) * c
         return np.asarray(sum_ - goal)
 

@@ -32,10 +32,11 @@ def law(scene: Scene) -> ForceLaw:
     return LAWS[scene.forces.law]
 
 
-def exposure(scene: Scene, sizes: ArrayLike = 1.0) -> Exposure:
+def exposure(scene: Scene, sizes: ArrayLike = 1.0, gaps: ArrayLike | None = None) -> Exposure:
     """What the force on a grain of a scene depends on besides the friction velocity.
 
-    Grains of other sizes are given by their diameters, in that of the scene.
+    Grains of other sizes are given by their diameters, in that of the scene; their lowest points
+    lie some gaps (m) above the level of the flow, by default z0.
     """
     return Exposure(
         scene.grain.diameter * np.asarray(sizes, float),
@@ -43,12 +44,15 @@ def exposure(scene: Scene, sizes: ArrayLike = 1.0) -> Exposure:
         scene.fluid.density,
         scene.fluid.viscosity,
         scene.forces.lift_coefficient,
+        gaps,
     )
 
 
-def forces(scene: Scene, sizes: ArrayLike = 1.0) -> tuple[Force, Force]:
+def forces(
+    scene: Scene, sizes: ArrayLike = 1.0, gaps: ArrayLike | None = None
+) -> tuple[Force, Force]:
     """Drag and lift on an exposed grain of a resolved scene, or on grains of some sizes."""
-    here, there = law(scene), exposure(scene, sizes)
+    here, there = law(scene), exposure(scene, sizes, gaps)
     return partial(here.drag, exposure=there), partial(here.lift, exposure=there)
 
 

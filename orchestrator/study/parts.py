@@ -52,6 +52,7 @@ Model = Literal["solve", "hill", "flat"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
+Standing = Literal["alike", "protrusion"]
 Shape = Literal[
     "triangle", "dune", "cosine", "gaussian", "trapezoid", "step up", "step down", "flat"
 ]
@@ -499,6 +500,20 @@ class Forces(Part):
         ),
     ] = "exposed"
     """grains of a pile that feel the flow's force"""
+
+    exposure: Annotated[
+        Standing,
+        _unless("alike"),
+        Info(
+            "exposure",
+            scope="poured beds",
+            choices={
+                "alike": "every exposed grain stands z₀ above the bed, as in the paper",
+                "protrusion": "each stands at its own height over the local bed",
+            },
+        ),
+    ] = "alike"
+    """height at which the flow meets a grain"""
 
     @field_validator("law")
     @classmethod

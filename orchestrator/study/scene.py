@@ -62,6 +62,8 @@ class Scene(Part):
         if self.grain.sizes is not None and not self.is_poured:
             what = "a lattice has equal grains: a mixture needs a poured bed"
             raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
+        if self.forces.exposure == "protrusion":
+            check_protrusion(self.forces.law, is_poured=self.is_poured)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
             if self.flow.model == "solve":
@@ -162,6 +164,17 @@ def check_method(law: str, method: str) -> None:
             f"{law} turns the grain about its centre, which the method {method} leaves out",
             'choose the method "pivot", or a force law without torque',
         )
+
+
+def check_protrusion(law: str, *, is_poured: bool) -> None:
+    """Grains stand at heights of their own on a poured bed alone, under some laws."""
+    if not is_poured:
+        what = "the grains of a lattice stand alike"
+        raise UnfitError("forces.exposure", what, 'bed.packing = "poured", or leave it out')
+    if law in LAWS and not LAWS[law].protrudes:
+        known = ", ".join(name for name, one in LAWS.items() if one.protrudes)
+        what = f"{law} knows no height of a grain over the bed"
+        raise UnfitError("forces.exposure", what, f"laws that do: {known}")
 
 
 def check_pile(bed: PileBed, diameter: float) -> None:

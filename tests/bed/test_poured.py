@@ -142,3 +142,21 @@ def test_a_mould_that_holds_nothing_says_so(tmp_path: Path) -> None:
     (directory / "settling.csv").write_text("stage,step,grains,ke\n1,5,3,0.0\n2,9,3,1.0\n")
     with pytest.raises(SolverError, match="does not come to rest"):
         _bed()._check_rest(directory)
+
+
+def test_a_grain_stands_as_high_as_its_lowest_point_over_the_local_bed() -> None:
+    line = BedLine((-9.0, 0.0, 60.0, 69.0), (0.0, 0.0, 0.0, 0.0), 1.0)
+    x = np.arange(0.5, 60)
+    height = np.where(x == 30.5, 0.4, 0.0) + 0.5
+    row = packing.Packing(
+        centres=np.column_stack([x, height]),
+        sizes=np.where(x == 40.5, 0.8, 1.0),
+        mobile=np.ones(60, bool),
+        windward=np.ones(60, bool),
+        lee=np.zeros(60, bool),
+        arc_length=x,
+    )
+    found = poured.standing(row, line)
+    assert found[5] == pytest.approx(0.0, abs=1e-12)
+    assert found[30] == pytest.approx(0.4 - 0.4 / 10, rel=0.1)
+    assert found[40] == pytest.approx(0.1, abs=1e-12)

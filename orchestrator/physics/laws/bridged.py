@@ -24,6 +24,7 @@ class Bridged(DragAndSaffman):
     name: ClassVar[str] = "bridged"
     label: ClassVar[str] = "bridged"
     reference: ClassVar[str] = MODEL
+    protrudes: ClassVar[bool] = True
     sphere = SCHILLER_NAUMANN
 
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:

@@ -21,6 +21,7 @@ class High(DragAndSaffman):
         "after C.-H. Ling, J. Hydraul. Eng. 121, 1995"
     )
     reynolds: ClassVar[tuple[float, float]] = (30.0, np.inf)
+    protrudes: ClassVar[bool] = True
     sphere = SCHILLER_NAUMANN
 
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:

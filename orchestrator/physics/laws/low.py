@@ -18,6 +18,7 @@ class Low(DragAndSaffman):
     label: ClassVar[str] = "Eq. 2 (low Re*)"
     reference: ClassVar[str] = "the paper, Eq. 2, after C.-H. Ling, J. Hydraul. Eng. 121, 1995"
     reynolds: ClassVar[tuple[float, float]] = (0.0, 3.0)
+    protrudes: ClassVar[bool] = True
     sphere = STOKES
 
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
