@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
@@ -15,6 +15,9 @@ from orchestrator.calculator import cli as calculator
 from orchestrator.errors import OrchestratorError, is_of_import, of_shortage, of_system
 from orchestrator.runs import signals, streams
 from orchestrator.runs.cluster import SYSTEMS, Queue
+
+if TYPE_CHECKING:
+    from orchestrator.study.study import Study
 
 INTERRUPTED = 130
 
@@ -62,7 +65,7 @@ VALUED = (
     "--scene",
     *calculator.VALUED,
 )
-FLAGS = ("-h", "--help", "--version", "--json", *calculator.FLAGS, "--")
+FLAGS = ("-h", "--help", "--version", "--json", "--plan", *calculator.FLAGS, "--")
 
 
 def _plain(arguments: Sequence[str]) -> list[str]:
@@ -123,6 +126,9 @@ def _add_study(commands: Any) -> None:
         metavar="QUEUE",
         help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
     )
+    command.add_argument(
+        "--plan", action="store_true", help="say what would run, how long and how large, and end"
+    )
     command.set_defaults(run=_study)
 
 
@@ -182,6 +188,8 @@ def _study(options: argparse.Namespace) -> int:
         study.check_tolerance(options.tolerance, "--tolerance")
         asked = replace(asked, tolerance=options.tolerance)
     out = options.out or Path("results") / asked.name
+    if options.plan:
+        return _plan(asked, out, options.workers)
     queue = Queue(options.cluster, asked.cluster) if options.cluster else None
     guests = (paper.report_card,)
     finished = pipeline.run(asked, out, workers=options.workers, queue=queue, guests=guests)
@@ -193,7 +201,18 @@ def _study(options: argparse.Namespace) -> int:
             f"`orchestrator status {out}` names them",
             file=sys.stderr,
         )
-    return _end(finished.page, finished.failures)
+    return _end(finished.page, finished.failures, finished.answer)
+
+
+def _plan(asked: "Study", out: Path, workers: int) -> int:
+    from orchestrator import pipeline, plan, preview
+    from orchestrator.runs.workspace import Workspace
+
+    space = Workspace(out.absolute())
+    planned = plan.settled(asked, space.cases)
+    todo = pipeline.missing(planned, space)
+    print(preview.text(asked, planned, list(todo.values()), workers))
+    return 0
 
 
 def _ladder(options: argparse.Namespace) -> int:
@@ -229,10 +248,13 @@ def _report(options: argparse.Namespace) -> int:
     from orchestrator import paper, pipeline
 
     finished = pipeline.redraw(options.directory, (paper.report_card,))
-    return _end(finished.page, finished.failures)
+    return _end(finished.page, finished.failures, finished.answer)
 
 
-def _end(page: Path, failures: dict[str, OrchestratorError]) -> int:
+def _end(page: Path, failures: dict[str, OrchestratorError], answer: str = "") -> int:
+    """Print the answer, what failed, and last the page."""
+    if answer:
+        print(answer)
     for name, error in failures.items():
         print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
     print(page)

@@ -1,5 +1,6 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
+import sys
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,12 +35,15 @@ class Finished:
         The cases that failed, with why.
     left : tuple of str
         If the study has changed since the last time, the cases that it does not ask for now.
+    answer : str
+        What was found, for a terminal.
     """
 
     page: Path
     started: int
     failures: dict[str, OrchestratorError]
     left: tuple[str, ...] = ()
+    answer: str = ""
 
 
 def run(
@@ -92,9 +96,10 @@ def run(
             states |= planned.done(space.cases, _without(planned.cases, states))
         failures = {name: error for name, error in failures.items() if name in planned.cases}
         if started or not _is_drawn(study, planned, space):
+            print("drawing tables, figures and page", file=sys.stderr)
             draw(study, planned, space, states, failures, guests)
         left = space.left(planned.cases) if changed else ()
-        return Finished(space.page, started, failures, left)
+        return Finished(space.page, started, failures, left, _answer(study, planned, space))
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -143,7 +148,11 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, planned.done(space.cases), failures, guests)
-    return Finished(space.page, 0, failures)
+        return Finished(space.page, 0, failures, (), _answer(study, planned, space))
+
+
+def _answer(study: Study, planned: Plan, space: Workspace) -> str:
+    return report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
 
 
 def prune(directory: Path) -> pruning.Pruned:
@@ -214,7 +223,9 @@ def draw(
 def _origin(study: Study, planned: Plan) -> str:
     """Digest of all that the tables and figures are made of."""
     cases = [one.id for one in planned.cases.values()]
-    return digest_text(canonical_json([__version__, study.text, study.tolerance, cases]))
+    return digest_text(
+        canonical_json([__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases])
+    )
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:

@@ -80,7 +80,23 @@ def test_a_study_of_single_grains_and_the_same_again(orchestrator: Command, tmp_
     (tmp_path / "grains.toml").write_text(GRAINS)
     first = orchestrator("study", "grains.toml", "--out", "out")
     assert first.returncode == 0, first.stderr
-    page = Path(first.stdout.strip())
+    *said, last = first.stdout.splitlines()
+    assert said[0].split() == [
+        "slope",
+        "d",
+        "forces",
+        "by",
+        "τ_c",
+        "interval",
+        "u*₀,",
+        "m/s",
+        "usable",
+    ]
+    assert "DEM" in said[1]
+    assert any(line.startswith("One grain of 0.7 mm") for line in said)
+    assert "100% of the work" in first.stderr
+    assert "drawing" in first.stderr
+    page = Path(last)
     assert page == tmp_path / "out" / "report.html"
     assert page.is_file()
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")}
@@ -90,6 +106,19 @@ def test_a_study_of_single_grains_and_the_same_again(orchestrator: Command, tmp_
     after = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")}
     touched = {path.name for path in after if after[path] != before.get(path)}
     assert touched <= {"study.json", ".lock"}
+
+
+def test_a_plan_says_what_would_run_and_runs_nothing(orchestrator: Command, tmp_path: Path) -> None:
+    (tmp_path / "grains.toml").write_text(GRAINS)
+    ended = orchestrator("study", "grains.toml", "--out", "out", "--plan", path="/nowhere")
+    assert ended.returncode == 0, ended.stderr
+    assert "2 scenes" in ended.stdout
+    assert "1 cases, 1 to run" in ended.stdout
+    assert "cells: 1, 1 to run" in ended.stdout
+    assert "expected: about" in ended.stdout
+    assert not (tmp_path / "out").exists()
+    (tmp_path / "steep.toml").write_text("grain.diameter = 1e-3\nbed.slope_deg = 50.0")
+    _refused(orchestrator("study", "steep.toml", "--plan"), "steep.toml", "slope_deg")
 
 
 def test_the_same_study_elsewhere_gives_the_same_tables(

@@ -71,3 +71,12 @@ def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "
         return []
     shown = [one for pile in bed.chosen(results) for one in pile.runs]
     return [*shown, *(pile.flow for pile in flow.chosen(results))]
+
+
+def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
+    """What a study found, for a terminal: its thresholds with their intervals, and sentences."""
+    with settings.own():
+        from orchestrator.report import answer as found
+        from orchestrator.report.results import Results
+
+    return found.text(Results(study, plan, tables, cases))

@@ -201,3 +201,17 @@ def _span(values: pd.Series, form: str) -> str:
         return "—"
     ends = dict.fromkeys(format(float(value), form) for value in (known.min(), known.max()))
     return " … ".join(ends)
+
+
+def text(results: Results) -> str:
+    """The short table, then the sentences, for a terminal."""
+    said = "\n".join(sentences(results)) or "No case has given a result yet."
+    found = sheet(results)
+    if found is None:
+        return said
+    widths = [max(map(len, column)) for column in zip(found.head, *found.rows, strict=True)]
+    lines = (
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in (found.head, *found.rows)
+    )
+    return "\n".join([*lines, "", said])

@@ -1,4 +1,4 @@
-"""What a running study shows: cases done, the last one that ended, time left."""
+"""What a running study shows: the share of the work done, the last case that ended, time left."""
 
 import sys
 from collections import defaultdict
@@ -31,7 +31,7 @@ class Display:
     def __enter__(self) -> Self:
         self._bar.start()
         self._task = self._bar.add_task(
-            "", total=self._count, ended=0, count=self._count, left=self._time_left()
+            "", total=1.0, ended=0, count=self._count, left=self._time_left()
         )
         return self
 
@@ -50,17 +50,21 @@ class Display:
         word = "failed" if outcome.error else "done"
         left = self._time_left()
         self._console.print(
-            f"[{self._ended}/{self._count}] {word}  {outcome.case.name}  {left}", markup=False
+            f"[{self._ended}/{self._count}] {word}  {outcome.case.name}  "
+            f"{self._forecast.done:.0%} of the work, {left}",
+            markup=False,
         )
         if outcome.error:
             self._console.print(f"  {outcome.error}", markup=False)
         if self._task is not None:
-            self._bar.update(self._task, completed=self._ended, ended=self._ended, left=left)
+            self._bar.update(
+                self._task, completed=self._forecast.done, ended=self._ended, left=left
+            )
 
     def _time_left(self) -> str:
         if self._ended == self._count:
             return "all runs ended"
-        return f"about {_human(self._forecast.left_s())} left"
+        return f"about {human(self._forecast.left_s())} left"
 
 
 class Forecast:
@@ -81,6 +85,7 @@ class Forecast:
         self._took: defaultdict[str, float] = defaultdict(float)
         for case in todo:
             self._left[case.kind] += case.cost_s
+        self._whole = sum(self._left.values())
 
     def ended(self, outcome: Outcome) -> None:
         """Take note of a case that has ended: it is not to come, and shows the pace of its kind."""
@@ -89,6 +94,12 @@ class Forecast:
         if not outcome.error:
             self._ended[kind] += cost
             self._took[kind] += outcome.seconds
+
+    @property
+    def done(self) -> float:
+        """Share of the work that has ended, 0 to 1."""
+        left = max(0.0, sum(self._left.values()))
+        return 1 - left / self._whole if left else 1.0
 
     def left_s(self) -> float:
         """Time until all have ended, s."""
@@ -104,7 +115,8 @@ class Forecast:
         return sum(self._took.values()) / sum(self._ended.values())
 
 
-def _human(seconds: float) -> str:
+def human(seconds: float) -> str:
+    """A time for people."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,229 @@
+"""The public Python face: `threshold`, `run` and `open`."""
+
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from orchestrator import paper, pipeline, report, tables
+from orchestrator.calculator import table as calculator
+from orchestrator.errors import InputError, OrchestratorError, SolverError
+from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+from orchestrator.report.results import Results
+from orchestrator.runs.workspace import Workspace
+from orchestrator.study import study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Numbers = ArrayLike
+"""A number or an array of them."""
+
+
+def threshold(
+    diameter: Numbers,
+    *,
+    density: Numbers = 2500.0,
+    fluid_density: Numbers = 1.0,
+    viscosity: Numbers = 1e-5,
+    slope_deg: Numbers = 0.0,
+    entrainment_angle_deg: Numbers = 60.0,
+    roughness: Numbers | str = "d/30",
+    lift_coefficient: Numbers = LIFT_COEFFICIENT,
+    gravity: Numbers = GRAVITY,
+    depth: Numbers | None = None,
+    law: str | None = "bridged",
+) -> pd.DataFrame:
+    """Thresholds of motion of single grains by the closed form.
+
+    Parameters
+    ----------
+    diameter : array_like
+        d, m.
+    density, fluid_density : array_like
+        Of grain and fluid, kg/m3.
+    viscosity : array_like
+        Kinematic, m2/s.
+    slope_deg, entrainment_angle_deg : array_like
+        Slope that the flow goes up, and the angle of the contact that a grain rolls over, degrees.
+    roughness : array_like or str
+        Roughness length z0, m, or a part of the diameter such as ``d/10``.
+    lift_coefficient : array_like
+        Of Saffman's lift.
+    gravity : array_like
+        m/s2.
+    depth : array_like, optional
+        Of a liquid, m: for its mean velocity.
+    law : str or None
+        A force law, or ``paper`` for the paper's rule; None: every law.
+
+    Returns
+    -------
+    DataFrame
+        The arrays broadcast together and are raveled: one row for each point, or for each point
+        and law, with units in the columns' names; ``valid`` and ``why_not`` say where a law ends.
+
+    Raises
+    ------
+    InputError
+        For a point that is no scene, a law that is none, or if no law holds at any point.
+    """
+    given: dict[str, Numbers] = {
+        "diameter": diameter,
+        "density": density,
+        "fluid_density": fluid_density,
+        "viscosity": viscosity,
+        "slope_deg": slope_deg,
+        "entrainment_angle_deg": entrainment_angle_deg,
+        "roughness": roughness,
+        "lift_coefficient": lift_coefficient,
+        "gravity": gravity,
+        **({} if depth is None else {"depth": depth}),
+    }
+    arrays = np.broadcast_arrays(*(np.asarray(values) for values in given.values()))
+    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True)))
+    answer = "bridged" if law is None else calculator.known_law(law)
+    found = calculator.thresholds(points, answer)
+    chosen = found if law is None else found[found["answer"]]
+    return chosen.drop(columns="answer").reset_index(drop=True)
+
+
+def run(
+    source: str | Path,
+    *,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    tolerance: float | None = None,
+) -> "Opened":
+    """Run what is missing of a study, draw it, and open it.
+
+    Parameters
+    ----------
+    source : str or Path
+        A study file, or the name of a preset.
+    out : str or Path, optional
+        Its directory; by default ``results/NAME``.
+    workers : int, optional
+        Cases at a time; by default one for each processor.
+    tolerance : float, optional
+        Relative error that thresholds may have.
+
+    Raises
+    ------
+    InputError
+        If the study cannot be answered.
+    SolverError
+        If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
+    """
+    asked = study.load(str(source), [paper.PRESETS])
+    if tolerance is not None:
+        study.check_tolerance(tolerance, "tolerance")
+        asked = replace(asked, tolerance=tolerance)
+    place = Path(out) if out else Path("results") / asked.name
+    count, guests = workers or os.cpu_count() or 1, (paper.report_card,)
+    finished = pipeline.run(asked, place, workers=count, guests=guests)
+    if finished.failures:
+        name, error = next(iter(finished.failures.items()))
+        what = f"{len(finished.failures)} cases failed; {name}: {error}"
+        raise SolverError(what, where=str(place))
+    return open(place)
+
+
+def open(directory: str | Path) -> "Opened":
+    """Open the directory of a study that was run.
+
+    Raises
+    ------
+    InputError
+        If it holds no study.
+    OrchestratorError
+        If it has no tables, or they have changed since they were written.
+    """
+    space = Workspace(Path(directory).absolute())
+    asked, planned = pipeline.reopen(space)
+    found = tables.read(space.folder, "tables")
+    return Opened(Results(asked, planned, found, space.cases))
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A study that was run, as `run` and `open` give it."""
+
+    _results: Results
+
+    @property
+    def directory(self) -> Path:
+        """Its directory."""
+        return self._results.cases.parent
+
+    @property
+    def page(self) -> Path:
+        """Its page."""
+        return self.directory / report.PAGE
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Every table by its name, SI units in the columns' names."""
+        return dict(self._results.tables)
+
+    @property
+    def thresholds(self) -> pd.DataFrame:
+        """The thresholds of the piles, or of the single grains of a study without piles.
+
+        Each row has its scene's parameters beside it, and says whether it is ``usable``.
+        """
+        piles = self._results.joined("pile_threshold")
+        return piles if len(piles) else self._results.joined("single_grain")
+
+    @property
+    def answer(self) -> str:
+        """What was found, in words and a short table."""
+        found = self._results
+        return report.said(found.study, found.plan, found.tables, found.cases)
+
+    @cached_property
+    def plot(self) -> "Plots":
+        """Its figures."""
+        return Plots(self._results)
+
+    def case(self, name: str) -> Path:
+        """The directory of a case, by its name or the beginning of it.
+
+        Raises
+        ------
+        InputError
+            If no case begins so, or several do.
+        """
+        found = [one for one in self._results.plan.cases if one.startswith(name)]
+        if len(found) != 1:
+            what = f"{len(found)} cases begin with {name!r}"
+            raise InputError(what, where=str(self.directory), remedy="see the column case")
+        return self._results.cases / found[0]
+
+
+@dataclass(frozen=True)
+class Plots:
+    """Figures of a study."""
+
+    _results: Results
+
+    def shields(self) -> "Figure":
+        """The extended Shields diagram of the page.
+
+        Raises
+        ------
+        OrchestratorError
+            If the study has nothing for it yet.
+        """
+        from orchestrator.report import overview, settings
+
+        with settings.own():
+            for figure in overview.draw(self._results):
+                if figure.canvas:
+                    return figure.canvas
+        raise OrchestratorError("there is nothing to draw", where=str(self._results.cases.parent))
