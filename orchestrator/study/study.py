@@ -133,7 +133,7 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
     try:
         # some editors begin a text with a mark of its encoding
         with opened(path) as stream:
-            content = stream.read(MOST_BYTES + 1)
+            content = stream.read(MOST_BYTES + 1) or b""  # nothing of what would wait
         text = content.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"not a readable text file: {error}", where=source) from None

@@ -160,6 +160,12 @@ def test_a_study_file_that_is_too_large_is_not_read(shell: Shell) -> None:
     assert (code, "bad.toml: it is larger than 16 MiB" in said) == (2, True), said
 
 
+def test_a_study_file_that_never_ends_is_not_waited_for(shell: Shell) -> None:
+    code, said = shell.run("study", "/proc/kmsg", "--out", "out")
+    assert code == 2, said
+    assert "/proc/kmsg" in said
+
+
 @pytest.mark.parametrize("name", BAD_FILES)
 def test_study_files_that_are_wrong_otherwise(shell: Shell, name: str) -> None:
     (shell.folder / "bad.toml").write_text(BAD_FILES[name])
