@@ -51,11 +51,14 @@ class Face:
         Position along the bed line from the windward toe, m.
     speed : ndarray, shape (N,)
         Local friction velocity over the undisturbed one, signed.
+    x : ndarray, shape (N,)
+        Place downstream of the foot of the first form, m.
     """
 
     ids: NDArray[np.int64]
     arc_length: FloatArray
     speed: FloatArray
+    x: FloatArray
 
 
 @dataclass(frozen=True)
@@ -138,9 +141,11 @@ class LoadedBed:
             "disorder": bed.disorder if bed.packing == "disordered" else 0.0,
             "seed": bed.seed,
         }
-        if bed.is_wedge:
-            return _packed(self.line, **how)
         ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
+        if bed.is_wedge:
+            found = _packed(ground, **how)
+            # an obstacle before it makes the way along the bed longer
+            return replace(found, arc_length=self.line.nearest(found.centres)[1])
         return _covered(self.line, ground, counts, **how)
 
     @cached_property
@@ -239,6 +244,7 @@ class LoadedBed:
             ids=np.flatnonzero(chosen) + 1,
             arc_length=self.packing.arc_length[chosen] * self.scene.grain.diameter,
             speed=self.ustar_over_ustar0(cases)[chosen],
+            x=self.packing.centres[chosen, 0] * self.scene.grain.diameter,
         )
 
     def alone(self, speed: FloatArray) -> FloatArray:

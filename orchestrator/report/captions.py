@@ -184,6 +184,18 @@ def stress(results: Results, piles: list[Pile]) -> str:
     )
 
 
+def where() -> str:
+    """Of the map of thresholds."""
+    return (
+        "Each bed, from the top: signed friction velocity along the bed over the undisturbed one "
+        "(shaded: flow that runs back); the bed with the speed of the flow over it, where its "
+        "files are kept, heights exaggerated; and for each counted grain the undisturbed friction "
+        "velocity at which it goes, against its place. Colour: the fraction of the counted "
+        "grains that has gone by then. Grey: grains that never went. Where the flow runs back "
+        "it pushes grains upstream. No interval is drawn; the tables have them."
+    )
+
+
 def averaged(piles: Iterable[Pile]) -> str:
     """The length of bed that the stress on a grain is averaged over."""
     return f"max(d, {_values('averaging_length', piles)})"
@@ -195,10 +207,8 @@ def eq10_over_wall(results: Results, flow_cases: Iterable[str]) -> tuple[float, 
     means, crests = [], []
     for name in flow_cases:
         rows = table[table["flow_case"] == name]
-        bed = results.flows[name].bed
-        face = rows[
-            (rows["s_m"] > 0) & (rows["s_m"] < bed.height / np.sin(np.radians(bed.slope_deg)))
-        ]
+        line = results.flows[name].model.line
+        face = rows[(rows["s_m"] > 0) & (rows["s_m"] < line.crest_s)]
         wall, eq10 = face["ustar_over_ustar0_wall"], face["ustar_over_ustar0_eq10"]
         means.append(eq10.mean() / wall.mean() - 1)
         crests.append(eq10.max() / wall.max() - 1)

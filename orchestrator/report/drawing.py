@@ -9,7 +9,17 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.report import FIGURES, compared, mixture, overview, piles, single, stress, style
+from orchestrator.report import (
+    FIGURES,
+    compared,
+    mixture,
+    overview,
+    piles,
+    single,
+    stress,
+    style,
+    where,
+)
 from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import bed, flow, mesh
 from orchestrator.report.results import Results
@@ -23,6 +33,7 @@ SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (7, (mixture.draw,)),
     (4, (compared.draw, single.draw)),
     (0, (bed.draw,)),
+    (8, (where.draw,)),
     (5, (stress.draw,)),
     (6, (flow.draw, mesh.draw)),
     (1, (overview.draw,)),

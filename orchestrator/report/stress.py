@@ -101,7 +101,7 @@ def _panel(panel: SubFigure, results: Results, pile: Pile) -> None:
     _draw_grains(top, results, pile)
     _profile(below, x, rows["z_m"].to_numpy(float) / h)
     _mark_corners((top, below), pile)
-    toe = 2 / np.tan(np.radians(pile.bed.slope_deg))
+    toe = pile.model.line.x[-2] / h
     top.set(xlim=(-BEFORE, toe + BEHIND), ylabel=r"$u^\star/u^\star_0$")
     top.set_title(title(results, pile), loc="left")
 
@@ -126,7 +126,7 @@ def _draw_grains(ax: Axes, results: Results, pile: Pile) -> None:
         return
     own = grains[grains["flow_case"] == pile.flow.name].sort_values(["stress", "scene_id", "s_m"])
     one = own[own["scene_id"].isin(own["scene_id"].tail(1))]
-    x = one["s_m"] * np.cos(np.radians(pile.bed.slope_deg)) / pile.bed.height
+    x = one["x_m"] / pile.bed.height
     ax.plot(x, one["ustar_over_ustar0"], gid="grains", zorder=1.5, **GRAINS)
 
 
@@ -139,8 +139,8 @@ def _profile(ax: Axes, x: FloatArray, z: FloatArray) -> None:
 
 
 def _mark_corners(axes: tuple[Axes, Axes], pile: Pile) -> None:
-    half = 1 / np.tan(np.radians(pile.bed.slope_deg))
-    for x, name in ((0.0, "toe"), (half, "crest"), (2 * half, "lee toe")):
+    line, h = pile.model.line, pile.bed.height
+    for x, name in ((0.0, "toe"), (line.crest[0] / h, "crest"), (line.x[-2] / h, "lee toe")):
         for ax in axes:
             ax.axvline(x, color="0.6", lw=0.6, ls=(0, (4, 2)), zorder=0, gid=name)
         style.upright_note(axes[0], x - 0.1, name, at="top")

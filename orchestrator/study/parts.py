@@ -5,6 +5,7 @@ text under it are what tables, figures and the reference of study files say of i
 degrees and say so in their names; all else is in SI units or in the unit that is declared.
 """
 
+from math import radians, tan
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -348,13 +349,26 @@ class PileBed(Bed):
         return self.counted or ("all" if everywhere else "windward")
 
     @property
+    def is_triangle(self) -> bool:
+        """Whether it is the paper's bed: one triangle of two equal faces, the windward counted."""
+        equal = self.shape == "triangle" and self.lee_slope == self.slope_deg
+        return self.is_wedge and equal and not self.obstacles
+
+    @property
     def is_wedge(self) -> bool:
         """Whether it is one form of two straight faces, of which the windward one is counted."""
         faces = self.shape == "triangle" or (
             self.shape == "dune" and self.windward == "straight" and not self.brink_radius
         )
-        one = faces and self.forms == 1 and not self.profile and not self.obstacles
-        return one and self.counts == "windward"
+        one = faces and self.forms == 1 and not self.profile and self.counts == "windward"
+        return one and not any(
+            o.x + o.reach > 0 and o.x - o.reach < self._base for o in self.obstacles
+        )
+
+    @property
+    def _base(self) -> float:
+        """Length of a form of straight faces, m."""
+        return sum(self.height / tan(radians(slope)) for slope in (self.slope_deg, self.lee_slope))
 
     @property
     def is_replica(self) -> bool:

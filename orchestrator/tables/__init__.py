@@ -17,7 +17,7 @@ from orchestrator.fidelity import checks
 from orchestrator.plan import Plan
 from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
-from orchestrator.tables import piles, scenes, single, text
+from orchestrator.tables import forms, piles, scenes, single, text
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter
 from orchestrator.tables.usable import with_usable
@@ -48,6 +48,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
         "size_class": pd.DataFrame(row for one in ready for row in piles.size_class_rows(one)),
+        "form": pd.DataFrame(row for one in ready for row in forms.rows(one)),
         "check": pd.DataFrame(_checks(study, plan, cases, done)),
     }
     return {name: table for name, table in made.items() if not table.empty}

@@ -11,6 +11,7 @@ import pandas as pd
 from orchestrator.fidelity import checks
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.spread import spread
+from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
@@ -71,6 +72,7 @@ def grains(answer: Answer) -> pd.DataFrame:
             "scene_id": answer.scene_id,
             "grain_id": face.ids,
             "s_m": face.arc_length,
+            "x_m": face.x,
             "ustar_over_ustar0": face.speed,
             "moved_in_load_step": motion.level,
             "fallen_in_load_step": motion.fallen,
@@ -170,6 +172,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
+            "u_1m_m_s": found.ustar0 / undisturbed_ustar(1.0, 1.0, scene.bed.roughness),
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],

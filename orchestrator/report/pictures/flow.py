@@ -45,7 +45,7 @@ def chosen(results: Results) -> list[Pile]:
 
 def _window(piles: list[Pile]) -> Window:
     """Left, right, bottom, top, h; the same for all panels."""
-    toe = max(2 / float(np.tan(np.radians(pile.bed.slope_deg))) for pile in piles)
+    toe = max(pile.model.line.x[-2] / pile.bed.height for pile in piles)
     return -BEFORE, toe + BEHIND, 0.0, ABOVE
 
 
@@ -76,12 +76,16 @@ def _panel(ax: Axes, pile: Pile, window: Window, velocity: FloatArray) -> AxesIm
     speed = np.linalg.norm(velocity, axis=-1)
     image = ax.imshow(speed, origin="lower", extent=window, cmap="viridis", vmin=0, vmax=1.1)
     _streamlines(ax, window, velocity)
-    half = 1 / np.tan(np.radians(pile.bed.slope_deg))
-    ax.fill([0, half, 2 * half], [0, 1, 0], color=style.BED, lw=0)
-    x = [window[0], 0, half, 2 * half, window[1]]
-    ax.plot(x, [0, 0, 1, 0, 0], color="0.2", lw=0.8, gid="bed")
+    draw_bed(ax, pile)
     ax.set(ylabel="$z/h$", aspect="equal", xlim=window[:2], ylim=window[2:], yticks=[0, 1, 2, 3])
     return image
+
+
+def draw_bed(ax: Axes, pile: Pile) -> None:
+    """The bed under the flow, in h."""
+    x, z = pile.model.line.corners.T / pile.bed.height
+    ax.fill_between(x, z, z.min() - 1, color=style.BED, lw=0)
+    ax.plot(x, z, color="0.2", lw=0.8, gid="bed")
 
 
 def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:

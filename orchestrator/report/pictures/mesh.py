@@ -48,18 +48,18 @@ def read_edges(case: Path) -> FloatArray:
 
 
 def _frame(pile: Pile, edges: FloatArray, title: str) -> Canvas:
-    half = 1 / float(np.tan(np.radians(pile.bed.slope_deg)))
+    (x, z), end = pile.model.line.crest / pile.bed.height, pile.model.line.x[-2] / pile.bed.height
     left, right, bottom, top = CREST
     windows = [
-        (-BESIDE, 2 * half + BESIDE, 0.0, ABOVE),
-        (half + left, half + right, 1 + bottom, 1 + top),
+        (-BESIDE, end + BESIDE, 0.0, ABOVE),
+        (x + left, x + right, z + bottom, z + top),
     ]
     shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
     figure = style.canvas(6.4 * sum(shapes) + 0.8)
     axes = list(figure.subplots(2, 1, height_ratios=shapes))
     for ax, window in zip(axes, windows, strict=True):
         _panel(ax, edges, window)
-        ax.fill([0, half, 2 * half], [0, 1, 0], color=style.BED, lw=0)
+        flow.draw_bed(ax, pile)
     left, right, bottom, top = windows[1]
     box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
     axes[0].add_patch(box)

@@ -1,0 +1,72 @@
+"""Beds of other shapes from their study file to the map of their grains' thresholds."""
+
+import numpy as np
+import pytest
+
+from orchestrator import plan, tables
+from orchestrator.report import where
+from orchestrator.report.results import Results
+from orchestrator.runs import engine
+from orchestrator.study import study
+
+TRAIN = """
+title = "Two ripples"
+grain = { diameter = 1e-3 }
+protocol = { method = "peeling" }
+flow = { cells_per_face = 10 }
+[bed]
+kind = "pile"
+shape = "dune"
+slope_deg = 15.0
+height = 0.01
+forms = 2
+mobile_layers = 1
+obstacles = [{ kind = "fence", x = -0.03, height = 0.004 }]
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    cases = tmp_path_factory.mktemp("where") / "cases"
+    cases.mkdir()
+    asked = study.parse(TRAIN, name="train", where="test")
+    planned = plan.make(asked)
+    with engine.local(cases, workers=1, limit_s=120.0) as pool:
+        assert not engine.run(planned.cases, pool, lambda outcome: None)
+    made = tables.make(asked, planned, cases, planned.done(cases))
+    return Results(asked, planned, made, cases)
+
+
+def test_each_form_of_a_train_has_its_thresholds(results: Results) -> None:
+    table = results.tables["form"]
+    assert list(table["form"].unique()) == [1, 2]
+    assert table["count"].sum() / 4 == results.tables["pile_threshold"]["count"].iloc[0]
+    first, second = (table[table["form"] == form].set_index("fraction") for form in (1, 2))
+    assert (first["over_first_form"] == 1).all()
+    np.testing.assert_allclose(
+        second["over_first_form"], second["ustar0_m_s"] / first["ustar0_m_s"]
+    )
+    assert (np.diff(first["ustar0_m_s"]) >= 0).all()
+
+
+def test_the_map_shows_every_grain_at_its_place(results: Results) -> None:
+    (figure,) = where.draw(results)
+    grains = results.tables["pile_grain"]
+    (dots,) = (
+        artist
+        for part in figure.canvas.subfigs  # type: ignore[union-attr]
+        for axes in part.axes
+        for artist in axes.collections
+        if artist.get_gid() == "thresholds"
+    )
+    shown = np.asarray(dots.get_offsets())
+    goes = grains[grains["ustar0_m_s"].notna()]
+    np.testing.assert_allclose(shown[:, 0], goes["x_m"] / 0.01)
+    np.testing.assert_allclose(shown[:, 1], goes["ustar0_m_s"])
+
+
+def test_a_current_a_metre_above_the_bed_follows_from_the_log_law(results: Results) -> None:
+    rows = results.tables["pile_threshold"]
+    z0 = rows["z0_over_d"] * rows["d_m"]
+    expected = rows["ustar0_m_s"] / 0.41 * np.log((1 + z0) / z0)
+    np.testing.assert_allclose(rows["u_1m_m_s"], expected, rtol=1e-6)
