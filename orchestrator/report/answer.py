@@ -6,6 +6,7 @@ import pandas as pd
 
 from orchestrator.physics.log_law import log_law_speed
 from orchestrator.report import labels
+from orchestrator.report.apart import varying
 from orchestrator.report.facts import Sheet
 from orchestrator.report.overview import nearest_fraction
 from orchestrator.report.results import Results, split, valid
@@ -119,19 +120,22 @@ HEAD = ("τ_c", "interval", "u*₀, m/s", "usable")
 
 
 def _each(rows: pd.DataFrame) -> Sheet:
+    telling = varying(rows, "alpha_deg", "d_m", "force_law")
     cells = [
         (
             f"{row['alpha_deg']:g}°",
             labels.millimetres(row["d_m"]),
             labels.value("force_law", row["force_law"]),
+            *(labels.value(one, row[one]) if pd.notna(row[one]) else "—" for one in telling),
             *_threshold(row),
         )
         for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows()
     ]
     fraction = rows["fraction"].iloc[0]
     tau, interval, *others = HEAD
-    value = f"{tau} at n/N = {fraction:.0%}"
-    return Sheet(("slope", "d", "forces", value, interval, MODEL, *others), tuple(cells))
+    told = (labels.words(one).label for one in telling)
+    head = ("slope", "d", "forces", *told, f"{tau} at n/N = {fraction:.0%}", interval, MODEL)
+    return Sheet((*head, *others), tuple(cells))
 
 
 def _threshold(row: pd.Series) -> tuple[str, str, str, str, str]:
