@@ -22,8 +22,8 @@ FloatArray = NDArray[np.float64]
 
 DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
 """The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
-CONTACT = {"stiffness": 1e4, "damping": 0.1, "time_step": 0.2}
-"""At a damping of 0.3 equal spheres, which settle into a lattice, jitter at this time step."""
+CONTACT = {"stiffness": 1e4, "damping": 0.1, "time_step": 0.3}
+"""With more damping equal spheres, which settle into crystals, jitter at this time step."""
 REST = 1e-3
 """Kinetic energy of a grain at rest, over W^2/K; decks take ten times as much for rest."""
 MOST_LOOKS = 400
@@ -65,7 +65,7 @@ class PouredBed(Case):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 1
+    recipe: ClassVar[int] = 2
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)

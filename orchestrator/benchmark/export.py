@@ -54,6 +54,12 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
             where=str(source),
             remedy="run the study without a tolerance into another directory",
         )
+    if any(scene.is_poured for scene in asked.scenes):
+        raise InputError(
+            "it has poured beds, and the grains of a pack have one size",
+            where=str(source),
+            remedy="export a study without them",
+        )
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))
     return pack.write(

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from orchestrator import plan, tables
+from orchestrator.benchmark import export
+from orchestrator.errors import InputError
+from orchestrator.fidelity.decision import decide
 from orchestrator.plan import Plan
 from orchestrator.runs import engine
+from orchestrator.runs.claim import STUDY as STUDY_KIND
+from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
 STUDY = """
@@ -85,3 +90,18 @@ def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, P
     own = packed.sizes[packed.windward]
     larger = np.argsort(own)
     assert (np.diff(force[larger]) > 0).all()
+
+
+def test_no_error_is_promised_on_poured_beds() -> None:
+    for scene in ASKED.scenes:
+        decision = decide(scene, 0.05)
+        assert decision.is_as_asked
+        assert decision.error_estimate is None
+
+
+def test_a_pack_takes_no_poured_beds(tmp_path: Path) -> None:
+    space = Workspace(tmp_path)
+    with space.held(STUDY_KIND, "poured"):
+        space.describe(STUDY_KIND, "poured", [], study=STUDY, tolerance=None)
+    with pytest.raises(InputError, match="poured beds"):
+        export.export(tmp_path / "pack", tmp_path, ())
