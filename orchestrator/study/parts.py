@@ -124,7 +124,8 @@ class Grain(Part):
         Info("sizes", scope="poured beds"),
     ] = None
     """mixture of a poured bed; by default all grains have the diameter. A sieve table: rows of
-    diameter (m, rising) and mass fraction, which gives the diameter as its d50. Or a log-normal
+    diameter (m, rising) and mass fraction, or the name of a file with columns diameter_m and
+    fraction; its d50 is the diameter. Or a log-normal
     distribution by mass about the diameter, { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, with
     cut-offs in d, two geometric standard deviations by default"""
 

@@ -1,4 +1,4 @@
-"""The profiles that a study file names, from files beside it or from the study's own text."""
+"""Profiles and sieve tables that a study file names, from files or from the study's own text."""
 
 import json
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.study import profile
+from orchestrator.study import profile, sizes
 
 OWN = ("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius")
 """Fields of a bed that a profile has of its own."""
@@ -50,6 +50,26 @@ class Profiles:
             smoothing = 0.0  # the model will refuse it
         found = profile.read(self._text(name), Path(name).name, self._place(name), smoothing)
         return {"profile": found, "height": found.height, "slope_deg": found.steepest_deg}
+
+    def sieve(self, name: str, where: str) -> list[list[float]]:
+        """The rows of a sieve table that a study file names; `where` names the study file.
+
+        Raises
+        ------
+        InputError
+            Naming the field, the file's line and the remedy.
+        """
+        place, remedy = (
+            f"{where}: grain.sizes",
+            "columns diameter_m,fraction: a line for each sieve",
+        )
+        try:
+            return sizes.of_csv(self._text(name))
+        except (ValueError, InputError) as error:
+            what = error.what.replace("profile", "file") if isinstance(error, InputError) else error
+            raise InputError(
+                f"{name[:80]}: {str(what)[:200]}", where=place, remedy=remedy
+            ) from None
 
     def _place(self, name: str) -> str:
         return str(self.folder / name)

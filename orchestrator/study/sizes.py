@@ -15,6 +15,8 @@ Sieve = tuple[tuple[float, float], ...]
 LARGEST_RATIO = 10.0
 """Of the largest to the smallest grain: neighbour lists reach as far as two of the largest, so that
 their length, and the time of a run, rise with its square."""
+HEAD = ("diameter_m", "fraction")
+"""Columns of a file with a sieve table."""
 SUM = 1e-6
 """How far from 1 the fractions of a sieve table may add up."""
 
@@ -131,6 +133,27 @@ def read(value: Any) -> Sizes | None:
     if not rows:
         raise ValueError("neither rows [diameter, mass fraction] nor { sigma_g = ... }")
     return tuple(rows)
+
+
+def of_csv(text: str) -> list[list[float]]:
+    """The rows of a sieve table in a file: diameter and mass fraction, under a line that says so.
+
+    Raises
+    ------
+    ValueError
+        Naming the line.
+    """
+    head, *lines = text.lstrip("\ufeff").splitlines() or [""]
+    if [name.strip() for name in head.split(",")] != list(HEAD):
+        raise ValueError(f"line 1 is not {','.join(HEAD)}")
+    rows = []
+    for number, line in enumerate(lines, 2):
+        if line.strip():
+            try:
+                rows.append([float(cell) for cell in line.split(",")])
+            except ValueError:
+                raise ValueError(f"line {number} is no row of two numbers") from None
+    return rows
 
 
 def _row(row: Any) -> tuple[float, float]:

@@ -326,8 +326,11 @@ def make_scene(
     bed = {**BED, **parts["bed"]}
     if profiles and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
         bed |= profiles.bed(bed, where)
+    grain = parts["grain"]
+    if profiles and isinstance(grain.get("sizes"), str):
+        grain = {**grain, "sizes": profiles.sieve(grain["sizes"], where)}
     try:
-        mixture, grain = _mixture(parts["grain"])
+        mixture, grain = _mixture(grain)
         if diameter := _of_the_bed(grain.get("diameter"), bed.get("relative_size", 1.0)):
             bed["roughness"] = roughness_length(bed["roughness"], diameter, mixture)
         return Scene.model_validate({**parts, "grain": grain, "bed": bed})

@@ -1,5 +1,7 @@
 """Mixtures of grains: what a study file may write, and what is drawn from it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -63,7 +65,6 @@ def test_the_seed_shuffles_the_grains_and_nothing_else() -> None:
         ("sizes = [[1e-3, -1.0]]", "no number above 0"),
         ("sizes = [1e-3]", "a row is not"),
         ("sizes = []", "neither rows"),
-        ("sizes = 'sieve'", "neither rows"),
         ("diameter = 2e-3\nsizes = [[1e-3, 0.5], [2e-3, 0.5]]", "the d50 of grain.sizes is 0.0014"),
         ("diameter = 1e-3\nsizes = { sigma_g = 0.5 }", "sigma_g"),
         ("diameter = 1e-3\nsizes = { sigma_g = 2.0 }", "16 times the smallest"),
@@ -98,3 +99,35 @@ def test_presets_of_poured_beds_can_be_planned(name: str) -> None:
     asked = study.load(name)
     assert all(scene.is_poured for scene in asked.scenes)
     assert len(plan.make(asked).cases) >= 4
+
+
+def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
+    (tmp_path / "sieve.csv").write_text("diameter_m,fraction\n5e-4,0.2\n1e-3,0.5\n\n2e-3,0.3\n")
+    source = tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    asked = study.load(str(source))
+    assert asked.scenes[0].grain.sizes == SIEVE
+    # the study's own text is whole without the file
+    again = study.parse(asked.text, name="m", where=str(tmp_path / "elsewhere" / "m.toml"))
+    assert again.scenes[0].id == asked.scenes[0].id
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1 is not"),
+        ("size,fraction\n1e-3,1\n", "line 1 is not"),
+        ("diameter_m,fraction\n1e-3;1\n", "line 2 is no row"),
+        ("diameter_m,fraction\n1e-3,0.5\nsand,0.5\n", "line 3 is no row"),
+        ("diameter_m,fraction\n", "neither rows"),
+        ("diameter_m,fraction\n1,0.5\n2,0.4\n", "add up to 0.9"),
+        ("diameter_m,fraction\n1e-3,1,1\n", "a row is not"),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "sieve.csv").write_text(text)
+    source = tmp_path / "mixed.toml"
+    source.write_text(f"{BED % 'd/30'}\ngrain = {{ sizes = 'sieve.csv' }}\n")
+    with pytest.raises(InputError, match=said) as caught:
+        study.load(str(source))
+    assert "\n" not in str(caught.value)
