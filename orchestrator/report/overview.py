@@ -1,6 +1,6 @@
 """The extended Shields diagram: piles, single grains, force laws and measurements in one frame."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,11 @@ def draw(results: Results) -> Iterator[Figure]:
         *shields.draw_air(ax, scenes),
     ]
     told = Told(ax)
-    entries = [*_points(told, grains, "grain", GRAIN), *_points(told, piles, "pile", PILE)]
+    shades = style.palette("alpha_deg", results.values("alpha_deg"))
+    entries = [
+        *_points(told, grains, "grain", GRAIN, shades),
+        *_points(told, piles, "pile", PILE, shades),
+    ]
     reach = [*theory.span(scenes), *_known(piles, "reynolds"), *_known(grains, "reynolds")]
     low, high = min(reach) / 1.6, max(reach) * 1.6
     reynolds = np.geomspace(low / 2, high * 2, theory.POINTS)
@@ -118,12 +122,17 @@ class Told:
         self.groups[gid] = said
 
 
-def _points(told: Told, rows: pd.DataFrame, bed: str, columns: Sequence[str]) -> list[Artist]:
+def _points(
+    told: Told,
+    rows: pd.DataFrame,
+    bed: str,
+    columns: Sequence[str],
+    shades: Mapping[float, str],
+) -> list[Artist]:
     """Colours are slopes, shapes kinds of bed, hollow is not usable; entries for a legend."""
     if rows.empty:
         return []
     shape, size = ("o", 2.4) if bed == "grain" else (SHAPES[1], 3.6)
-    shades = style.palette("alpha_deg", sorted(set(rows["alpha_deg"])))
     shown = [column for column in SAID if column in rows]
     extra = varying(rows, *shown)
     for (alpha, usable), own in split(rows.assign(valid=valid(rows)), "alpha_deg", "valid"):
@@ -137,6 +146,7 @@ def _points(told: Told, rows: pd.DataFrame, bed: str, columns: Sequence[str]) ->
     entries: list[Artist] = [
         Line2D([], [], ls="", marker=shape, color=colour, ms=4, label=f"{name}, {_slope(alpha)}")
         for alpha, colour in shades.items()
+        if (rows["alpha_deg"] == alpha).any()
     ]
     if not valid(rows).all():
         look: style.Look = {"ls": "", "marker": shape, "ms": 4, "mfc": "white", "mec": "0.2"}
