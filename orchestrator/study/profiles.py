@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.study import profile, sizes
 
 OWN = ("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius")
@@ -59,17 +59,19 @@ class Profiles:
         InputError
             Naming the field, the file's line and the remedy.
         """
-        place, remedy = (
-            f"{where}: grain.sizes",
-            "columns diameter_m,fraction: a line for each sieve",
-        )
         try:
             return sizes.of_csv(self._text(name))
-        except (ValueError, InputError) as error:
-            what = error.what.replace("profile", "file") if isinstance(error, InputError) else error
-            raise InputError(
-                f"{name[:80]}: {str(what)[:200]}", where=place, remedy=remedy
-            ) from None
+        except ValueError as error:
+            what = str(error)
+        except OSError as error:  # a name that no file can have
+            what = error.strerror or "no file"
+        except OrchestratorError as error:
+            what = error.what.replace("profile", "file")[:200]
+        raise InputError(
+            f"{name[:80]}: {what}",
+            where=f"{where}: grain.sizes",
+            remedy="columns diameter_m,fraction: a line for each sieve",
+        )
 
     def _place(self, name: str) -> str:
         return str(self.folder / name)
