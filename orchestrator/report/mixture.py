@@ -12,7 +12,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
 
 from orchestrator.grains.pile import Pile
-from orchestrator.physics import hiding
+from orchestrator.physics import measured
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, split
@@ -21,8 +21,8 @@ SHOWN = 45.0
 """Longest part of a bed that is drawn in one row, d: of a longer one its middle."""
 LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
 LINES = (
-    ("Wilcock and Crowe", hiding.wilcock_crowe, "-"),
-    ("Egiazaroff", hiding.egiazaroff, "--"),
+    ("Wilcock and Crowe", lambda size: measured.wilcock_crowe_hiding(size) / size, "-"),
+    ("Egiazaroff", measured.egiazaroff_hiding, "--"),
 )
 
 
@@ -90,7 +90,7 @@ def _pivots(results: Results) -> Figure:
     percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
     ax.plot(angles, percent, color="black", label=f"these beds, {len(angles)} grains")
     ax.plot(
-        hiding.kirchner_pivot_deg(percent), percent, color="0.5", ls="--",
+        measured.kirchner_pivot(percent), percent, color="0.5", ls="--",
         label="Kirchner et al. (1990), $D = D_{50}$",
     )  # fmt: skip
     ax.axvline(30, color=style.WATER, lw=1, label="lattice, β = 60°")

@@ -17,7 +17,7 @@ from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.physics import hiding
+from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
 
@@ -113,8 +113,8 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
                 "class_moved": moved.mean() if whole else np.nan,
                 **found[one.number],
                 "hiding": found[one.number]["shields_own"] / middle,
-                "hiding_wilcock_crowe": float(hiding.wilcock_crowe(one.size)),
-                "hiding_egiazaroff": float(hiding.egiazaroff(one.size)),
+                "hiding_wilcock_crowe": float(wilcock_crowe_hiding(one.size) / one.size),
+                "hiding_egiazaroff": float(egiazaroff_hiding(one.size)),
             }
 
 

@@ -10,6 +10,8 @@ from orchestrator.benchmark import export
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
 from orchestrator.plan import Plan
+from orchestrator.report import mixture
+from orchestrator.report.results import Results
 from orchestrator.runs import engine
 from orchestrator.runs.claim import STUDY as STUDY_KIND
 from orchestrator.runs.workspace import Workspace
@@ -105,3 +107,18 @@ def test_a_pack_takes_no_poured_beds(tmp_path: Path) -> None:
         space.describe(STUDY_KIND, "poured", [], study=STUDY, tolerance=None)
     with pytest.raises(InputError, match="poured beds"):
         export.export(tmp_path / "pack", tmp_path, ())
+
+
+def test_the_page_shows_where_grains_go_their_pockets_and_sizes(
+    finished: tuple[Plan, Path],
+) -> None:
+    planned, cases = finished
+    made = tables.make(ASKED, planned, cases, list(planned.cases))
+    found = {one.name: one for one in mixture.draw(Results(ASKED, planned, made, cases))}
+    assert {"poured-pivot", "poured-peeling", "poured-dem", "pivots", "hiding"} == set(found)
+    bed = found["poured-dem"].canvas
+    assert bed is not None
+    (discs,) = bed.axes[0].collections
+    (pile, *_) = planned.piles.values()
+    assert np.shape(discs.get_offsets()) == pile.packing.centres.shape
+    assert pile.runs[-1].name in str([one.cases for one in found.values()])
