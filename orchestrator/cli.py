@@ -165,6 +165,7 @@ def _add_directory_commands(commands: Any) -> None:
     for name, function, text in (
         ("status", _status, "what of a study is done, running, failed and why"),
         ("report", _report, "draw tables, figures and page of a study again"),
+        ("gallery", _gallery, "one page over the studies that a directory holds"),
         ("prune", _prune, "drop the large files of finished cases; a rerun makes them anew"),
     ):
         command = commands.add_parser(name, help=text)
@@ -267,6 +268,13 @@ def _status(options: argparse.Namespace) -> int:
     found = status.read(options.directory)
     print(status.text(found))
     return 3 if found.failed else 0
+
+
+def _gallery(options: argparse.Namespace) -> int:
+    from orchestrator import gallery
+
+    print(gallery.write(options.directory))
+    return 0
 
 
 def _prune(options: argparse.Namespace) -> int:

@@ -162,6 +162,11 @@ class Opened:
         return self._results.cases.parent
 
     @property
+    def title(self) -> str:
+        """What its file calls it."""
+        return self._results.study.title
+
+    @property
     def page(self) -> Path:
         """Its page."""
         return self.directory / report.PAGE
@@ -185,6 +190,11 @@ class Opened:
         """What was found, in words and a short table."""
         found = self._results
         return report.said(found.study, found.plan, found.tables, found.cases)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What was found, in words alone."""
+        return tuple(self.answer.split("\n\n")[-1].splitlines())
 
     @cached_property
     def plot(self) -> "Plots":

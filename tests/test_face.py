@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import orchestrator
+from orchestrator import cli
 from orchestrator.errors import InputError, OrchestratorError
 
 GRAINS = """
@@ -58,6 +59,25 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
         found.case("flow")
     (ax,) = found.plot.shields().axes
     assert ax.get_xscale() == "log"
+
+
+def test_a_gallery_has_a_card_for_each_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("one", "two & more"):
+        text = GRAINS.replace("7e-4, 1e-3", "1e-3")
+        (tmp_path / "study.toml").write_text(f"title = '{name}'\n{text}")
+        orchestrator.run(tmp_path / "study.toml", out=tmp_path / "all" / name, tolerance=0.1)
+    (tmp_path / "all" / "no study").mkdir()
+    assert cli.main(["gallery", str(tmp_path / "all")]) == 0
+    page = Path(capsys.readouterr().out.splitlines()[-1])
+    html = page.read_text(encoding="utf-8")
+    assert html.count("<article>") == 2
+    assert '<a href="two%20%26%20more/report.html">two &amp; more</a>' in html
+    assert html.count("One grain of 1 mm on 0° starts to move at u* ") == 2
+    assert html.count("data:image/svg+xml;base64,") == 2
+    assert cli.main(["gallery", str(tmp_path / "all" / "no study")]) == 2
+    assert "no study with a page" in capsys.readouterr().err
 
 
 def test_what_is_no_study_is_refused(tmp_path: Path) -> None:

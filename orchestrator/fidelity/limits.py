@@ -242,7 +242,8 @@ LIMITS = (
         "bed.slope_deg",
         _pile_slope,
         "Piles of 10 to 35 deg: others are refused.",
-        f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg",
+        f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg, and no more than"
+        " min(friction angle, 90 deg - entrainment angle)",
     ),
     Limit(
         "first-cell",

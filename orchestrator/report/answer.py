@@ -24,8 +24,8 @@ def sentences(results: Results) -> list[str]:
     if len(piles):
         found = [_of_pile(row, results) for row in _ends(piles)]
         return [*found, *_warnings(piles), *_worth(piles, results.study.tolerance)]
-    grains = results.joined("single_grain")
-    return [*map(_of_grain, _grain_ends(grains)), *_warnings(grains)] if len(grains) else []
+    single = results.joined("single_grain")
+    return [*map(_of_grain, _grain_ends(single)), *_warnings(single)] if len(single) else []
 
 
 def _ends(piles: pd.DataFrame) -> list[pd.Series]:
@@ -111,8 +111,7 @@ def sheet(results: Results) -> Sheet | None:
     if len(piles):
         here = piles[piles["fraction"] == nearest_fraction(piles)]
         return _each(here) if len(here) <= FEW else _ranges(here)
-    grains = results.joined("single_grain")
-    return _grains(grains) if len(grains) else None
+    return grains(results)
 
 
 MODEL = "model's interval"
@@ -175,9 +174,11 @@ def _ranges(rows: pd.DataFrame) -> Sheet:
     return Sheet(("slope", "d", "forces", f"{tau} at n/N = {fraction:.0%}", *others), tuple(cells))
 
 
-def _grains(rows: pd.DataFrame) -> Sheet:
+def grains(results: Results) -> Sheet | None:
     """By slope, force law and method: the range of the thresholds of single grains."""
-    cells = []
+    rows, cells = results.joined("single_grain"), []
+    if rows.empty:
+        return None
     for (alpha, law, method), own in split(rows, "alpha_deg", "force_law", "answered_method"):
         usable = own[valid(own)]
         name = "shields_dem" if method == "dem" else "shields_closed_form"

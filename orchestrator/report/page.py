@@ -51,6 +51,7 @@ def render(
         scene_count=len(results.scenes),
         case_count=len(results.plan.cases),
         piles=facts.piles(results),
+        grains=answer.grains(results),
         single_grains=facts.single_grains(results),
         levels=facts.levels(results),
         checks=facts.checks(results),
