@@ -110,17 +110,17 @@ class LoadedBed:
             return ()
         line, grain = self.line, self.scene.grain
         x, z = (tuple(round(v, DIGITS) for v in values) for values in (line.x, line.z))
-        return (
-            PouredBed(
-                line=replace(line, x=x, z=z),
-                depth=self.bed.poured_depth,
-                surface=round(self.surface, DIGITS),
-                sizes=grain.sizes,
-                diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
-                friction_angle_deg=grain.friction_angle_deg,
-                seed=self.bed.seed,
-            ),
+        bed = PouredBed(
+            line=replace(line, x=x, z=z),
+            depth=self.bed.poured_depth,
+            surface=round(self.surface, DIGITS),
+            sizes=grain.sizes,
+            diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
+            friction_angle_deg=grain.friction_angle_deg,
+            seed=self.bed.seed,
         )
+        bed.check_size()
+        return (bed,)
 
     @cached_property
     def packing(self) -> Packing:
