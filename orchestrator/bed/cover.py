@@ -259,13 +259,14 @@ def _depth(top: BedLine, points: FloatArray) -> tuple[NDArray[np.int64], FloatAr
 
 
 def _without_overlaps(groups: list[FloatArray]) -> FloatArray:
-    """Points of all groups but those too near to one of an earlier group."""
-    kept = groups[0]
-    for points in groups[1:]:
-        if len(points):
-            apart = cKDTree(kept).query(points, distance_upper_bound=1.0)[0]
-            kept = np.vstack([kept, points[apart > 1 - TIE]])
-    return kept
+    """Points of all groups but those too near to one before them."""
+    points = np.vstack(groups)
+    near = cKDTree(points).query_pairs(1 - 2 * TIE, output_type="ndarray")
+    kept = np.ones(len(points), bool)
+    for first, second in near[np.argsort(near.max(axis=1), kind="stable")].tolist():
+        low, high = min(first, second), max(first, second)
+        kept[high] &= not kept[low]
+    return np.asarray(points[kept])
 
 
 def _both_ways(centres: FloatArray, reach: float) -> Iterator[tuple[NDArray[np.int64], ...]]:

@@ -9,6 +9,10 @@ FloatArray = NDArray[np.float64]
 
 OFFSET = 0.125
 """Largest offset of a grain normal to its row, over the size of the disorder."""
+FINE = 0.1
+"""Between two places of a curve at which a row may be opened, diameters."""
+MOST_TURNS = 100
+"""How often a row is opened further; whoever overlaps then is left out by `cover`."""
 TOUCH = 1 + 1e-9
 """Neighbours of a row are at least this far apart, diameters."""
 
@@ -74,8 +78,13 @@ def rows_on(
     rng = np.random.default_rng(seed)
     gaps = rng.uniform(0, size, count) if size else np.zeros(count)
     aside = rng.uniform(-OFFSET * size, OFFSET * size, count + 1)
-    along = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
-    while True:
+    close = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
+    # the opening belongs to places of the curve: grains that it shifts leave it where it is
+    length = 2 * float(close[-1]) + 1
+    places = np.linspace(0, length, int(np.ceil(length / FINE)) + 1)
+    opened = np.zeros(len(places))
+    for _ in range(MOST_TURNS):
+        along = np.interp(close, places - np.cumsum(opened), places)
         found = [_on(curve, along, aside)]
         for _ in range(layers):
             found.insert(0, _pockets(found[0]))
@@ -86,8 +95,12 @@ def rows_on(
                 there = wide[place : place + len(more)]
                 np.maximum(there, more, out=there)
         if not wide.any():
-            return found
-        along = along + np.concatenate([[0.0], np.cumsum(1.1 * wide)])
+            break
+        steps = places[1] - places[0]
+        gap = np.clip(np.searchsorted(along, places) - 1, 0, count - 1)
+        opened += np.minimum(1.1 * wide[gap] / np.diff(along)[gap], 0.5) * steps
+        opened = np.minimum(opened, 0.5 * steps)
+    return found
 
 
 def _on(curve: BedLine, along: FloatArray, aside: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """The flow over one bed line as an OpenFOAM case."""
 
 import re
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from importlib.metadata import version as installed
 from math import isfinite, log
@@ -22,6 +22,7 @@ from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Convection, Turbulence
+from orchestrator.study.profile import Profile
 from orchestrator.study.scene import BUILDABLE_DEG
 
 WALL_STRESS = "wall_stress.csv"
@@ -70,6 +71,8 @@ class FlowCase(Case):
         Of the pressure for cells that are not orthogonal, in each iteration.
     line : BedLine, optional
         The bed line, m; by default a triangle of the slope and the height, or a flat bed.
+    profile : Profile, optional
+        The measured profile that the line is of, for a copy of it in the case.
 
     Raises
     ------
@@ -89,6 +92,7 @@ class FlowCase(Case):
     convection_scheme: Convection = "linearUpwind"
     non_orthogonal_correctors: int = 1
     line: BedLine | None = None
+    profile: Profile | None = field(default=None, compare=False)
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
@@ -113,7 +117,7 @@ class FlowCase(Case):
         self._check_mesh()
 
     def _check_numbers(self) -> None:
-        for name, value in asdict(replace(self, line=None) if self.line else self).items():
+        for name, value in self._plain.items():
             if isinstance(value, str) or value is None:
                 continue
             if value == 0 and name in ("slope_deg", "non_orthogonal_correctors"):
@@ -149,10 +153,16 @@ class FlowCase(Case):
             name: int(getattr(self, name))
             for name in ("cells_per_face", "non_orthogonal_correctors")
         }
-        fields = asdict(replace(self, line=None)).items()
-        numbers = {n: v if isinstance(v, str) else float(v) for n, v in fields if n != "line"}
+        plain = self._plain.items()
+        numbers = {n: v if isinstance(v, str) else float(v) for n, v in plain}
         corners = digest_text(canonical_json(self.bed_line.corners.tolist()))
         return {**numbers, **whole, "bed_line": corners}
+
+    @property
+    def _plain(self) -> dict[str, Any]:
+        """Its numbers and words."""
+        names = (one.name for one in fields(self) if one.name not in ("line", "profile"))
+        return {name: getattr(self, name) for name in names}
 
     @property
     def bed_line(self) -> BedLine:
@@ -217,6 +227,8 @@ class FlowCase(Case):
             growth=self.growth,
         )
         write_line(self.grid, directory / "bed_line.geo")
+        if self.profile:
+            (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
         write_mesh(directory)
 
     def collect(self, directory: Path) -> None:

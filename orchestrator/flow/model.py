@@ -95,6 +95,7 @@ class Solved(FlowModel):
         try:
             return _shared(
                 line=self.line,
+                profile=bed.profile,
                 slope_deg=bed.slope_deg,
                 height_m=bed.height,
                 roughness_m=self.scene.solve_roughness,

@@ -20,6 +20,8 @@ LARGEST = 20_000_000
 """Bytes of a file."""
 LARGEST_NUMBER = 1e5
 """Of a coordinate, m."""
+FEWEST = 3
+"""Points."""
 MOST_CORNERS = 3000
 """Of a bed line, each of which is a grid line of the flow's mesh."""
 GAP = 20.0
@@ -90,7 +92,11 @@ def read(text: str, name: str, where: str, smoothing: float) -> Profile:
     """
     if not text.strip():
         raise InputError("the profile is empty", where=where, remedy="write x_m,z_m and points")
-    lines, x, z = (np.array(column) for column in zip(*_points(text, where), strict=True))
+    points = list(_points(text, where))
+    if len(points) < FEWEST:
+        what = f"{len(points)} points make no bed"
+        raise InputError(what, where=where, remedy=f"write {FEWEST} at least")
+    lines, x, z = (np.array(column) for column in zip(*points, strict=True))
     _check(lines, x, where)
     if smoothing:
         x, z = _smoothed(x, z, smoothing, where)
@@ -115,16 +121,15 @@ def text_of(path: Path) -> str:
     InputError
         If it is none.
     """
-    where = str(path)
-    if path.is_dir():
-        raise InputError("a directory, not a profile", where=where, remedy="name the file")
-    if not os.path.lexists(path):
+    where, remedy = str(path), "save it as CSV in UTF-8"
+    if not os.path.exists(path):
         remedy = "a path is relative to the study file"
         raise InputError("there is no such profile", where=where, remedy=remedy)
-    if not path.is_file():
-        raise InputError("not a regular file", where=where, remedy="copy it to one")
-    remedy = "save it as CSV in UTF-8"
     try:
+        if path.is_dir():
+            raise InputError("a directory, not a profile", where=where, remedy="name the file")
+        if not path.is_file():
+            raise InputError("not a regular file", where=where, remedy="copy it to one")
         if path.stat().st_size > LARGEST:
             remedy = "leave out points: a bed line needs some in a grain's diameter at most"
             raise InputError(f"larger than {LARGEST // 10**6} MB", where=where, remedy=remedy)
@@ -189,8 +194,6 @@ def _number(cell: str, where: str, line: int) -> float:
 
 def _check(lines: NDArray[np.int64], x: FloatArray, where: str) -> None:
     """See that x rises without gaps from each point to the next."""
-    if len(x) < 3:
-        raise InputError(f"{len(x)} points make no bed", where=where, remedy="write three at least")
     steps = np.diff(x)
     if (steps < 0).all():
         remedy = "turn the lines round"

@@ -27,6 +27,8 @@ from orchestrator.study.sizes import Sizes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+MOST_GRAINS = 1e5
+"""Length of a profile, diameters."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "trapezoid")
 FIELDS_OF_SHAPES = {
     "windward": ("dune",),
@@ -185,6 +187,9 @@ def check_pile(bed: PileBed, diameter: float) -> None:
         )
     if not bed.profile:
         check_shape(bed)
+    elif (length := bed.profile.x[-1]) > MOST_GRAINS * diameter:
+        what = f"{length:g} m are {length / diameter:.0f} grains of {diameter:g} m"
+        raise UnfitError("bed.profile", what, "are its columns in mm? or cut a part out of it")
     for one, other in pairwise(sorted(bed.obstacles, key=lambda one: one.x)):
         if other.x - one.x < one.reach + other.reach:
             what = f"{one} and {other} overlap"

@@ -1,0 +1,170 @@
+"""Profiles that users measure: read, smoothed, refused in one line, and whole in a study's text."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.bed.shapes import of_bed
+from orchestrator.errors import InputError
+from orchestrator.study import profile, study
+from orchestrator.study.parts import PileBed
+
+GOOD = "x_m,z_m\n0,0\n0.05,0.01\n0.1,0.02\n0.14,0\n"
+STUDY = """
+grain = { diameter = 1e-3 }
+bed = { kind = "pile", profile = "scan.csv" }
+flow = { model = "flat" }
+"""
+
+
+def bed_of(folder: Path, text: str = STUDY) -> PileBed:
+    found = study.parse(text, name="scan", where=str(folder / "study.toml")).scenes[0].bed
+    assert isinstance(found, PileBed)
+    return found
+
+
+def points(*rows: str) -> str:
+    return "\n".join(["x_m,z_m", *rows, ""])
+
+
+def long(*changed: tuple[int, str]) -> str:
+    rows = [f"{0.005 * i:.4g},{0.01 * abs(np.sin(i / 9)):.5f}" for i in range(60)]
+    for place, row in changed:
+        rows[place] = row
+    return points(*rows)
+
+
+BAD: dict[str, tuple[str | bytes, str]] = {
+    "empty": ("", r"scan.csv: the profile is empty \(write x_m"),
+    "blank": (" \n\n", r"the profile is empty"),
+    "header alone": ("x_m,z_m\n", r"0 points make no bed \(write 3"),
+    "one point": (points("0,0"), r"1 points make no bed"),
+    "no header": ("0,0\n1,0.1\n2,0\n", r"line 1: no column x_m in '0,0'"),
+    "another language": ("Ort;Höhe\n0;0\n1;0,1\n", r"line 1: no column x_m in 'Ort;Höhe'"),
+    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", r"line 1: no column z_m"),
+    "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", r"line 1: two columns x_m"),
+    "millimetres": ("x_mm,z_mm\n0,0\n", r"line 1: no column x_m .*divide x_mm by 1000"),
+    "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), r"line 4: x goes back to 1 m: unsorted"),
+    "overhang": (long((30, "0.14,0.02")), r"line 32: x goes back to 0.14 m: unsorted, or an over"),
+    "upstream": (points("3,0", "2,0.1", "1,0"), r"line 3: x falls: the profile runs upstream"),
+    "duplicate": (points("0,0", "1,0.1", "1,0.2", "2,0"), r"line 4: x = 1 m again"),
+    "NaN": (points("0,0", "1,nan", "2,0"), r"line 3: nan is not a place"),
+    "infinite": (points("0,0", "inf,1", "2,0"), r"line 3: inf is not a place"),
+    "vast": (points("0,0", "1,1e300", "2,0"), r"line 3: 1e\+300 m is no place on a bed"),
+    "a word": (points("0,0", "1,high", "2,0"), r"line 3: 'high' is not a number"),
+    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), r"line 3: 4 values, more than the header"),
+    "semicolons": ("x_m;z_m\n0;0\n1;1\n", r"line 1: no column x_m in 'x_m;z_m'"),
+    "too few values": (points("0,0", "1", "2,0"), r"line 3: 1 values, less than the header"),
+    "an empty value": (points("0,0", "1,", "2,0"), r"line 3: an empty value \(close the gap"),
+    "a blank line": (points("0,0", "", "1,0.1", "2,0"), r"line 3: a blank line"),
+    "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), r"a gap"),
+    "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), r"line 4: 89 deg at x = 1 m, above"),
+    "level": (points("0,0.3", "1,0.3", "2,0.3"), r"level: it has no height"),
+    "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), r"4000 points, more than"),
+    "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), r"not a readable text file"),
+    "binary": (b"\x7fELF\0\0\x01\0", r"binary, not text"),
+    "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, r"larger than 20 MB"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    text, says = BAD[name]
+    (tmp_path / "scan.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError, match=says) as caught:
+        bed_of(tmp_path)
+    said = str(caught.value)
+    assert str(tmp_path / "scan.csv") in said
+    assert "\n" not in said
+    assert caught.value.remedy
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no such profile \(a path is relative to the"):
+        bed_of(tmp_path)
+    (tmp_path / "scan.csv").mkdir()
+    with pytest.raises(InputError, match="a directory, not a profile"):
+        bed_of(tmp_path)
+    (tmp_path / "scan.csv").rmdir()
+    os.mkfifo(tmp_path / "scan.csv")
+    with pytest.raises(InputError, match="not a regular file"):
+        bed_of(tmp_path)
+    with pytest.raises(InputError, match="no such profile"):
+        bed_of(tmp_path, STUDY.replace("scan.csv", "x" * 5000))
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ("height = 0.1", r"bed.profile: it has its own height \(leave out bed.height"),
+        ("slope_deg = 10.0", "it has its own slope_deg"),
+        ('shape = "dune"', "it has its own shape"),
+        ("smoothing = -1.0", "bed.smoothing: -1.0 is not accepted"),
+        ("smoothing = 0.1", r"smoothing over 0.1 m leaves nothing of 0.14 m"),
+    ],
+)
+def test_what_does_not_go_with_a_profile_is_refused(fields: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD)
+    with pytest.raises(InputError, match=says):
+        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", {fields}'))
+
+
+def test_a_profile_that_may_be_in_millimetres_is_asked_about(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(points("0,0", "70,20", "140,0"))
+    with pytest.raises(InputError, match=r"bed.profile: 140 m are 140000 grains .*in mm"):
+        bed_of(tmp_path)
+
+
+def test_a_profile_begins_at_the_origin_between_flat_beds(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD.replace("0,0\n", "0,0.0\n"))
+    bed = bed_of(tmp_path)
+    line = of_bed(bed)
+    assert bed.height == pytest.approx(0.02)
+    assert bed.slope_deg == pytest.approx(np.degrees(np.arctan(0.2)))
+    np.testing.assert_allclose(line.x[1:-1], [0, 0.05, 0.1, 0.14])
+    assert line.x[0] == pytest.approx(-0.2)
+
+
+def test_a_scene_is_what_a_profile_says_not_its_name(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD)
+    (tmp_path / "other.csv").write_text(GOOD.replace("x_m,z_m", "z_m , x_m").replace("0", "0"))
+    shifted = "\n".join(["note,x_m,z_m", "a,1,5", "b,1.05,5.01", "c,1.1,5.02", "d,1.14,5"])
+    (tmp_path / "other.csv").write_text(shifted)
+    one = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
+    text = STUDY.replace("scan", "other")
+    other = study.parse(text, name="a", where=str(tmp_path / "a.toml"))
+    np.testing.assert_allclose(
+        of_bed(one.scenes[0].bed).x,
+        of_bed(other.scenes[0].bed).x,
+    )
+    (tmp_path / "scan.csv").write_text(GOOD.replace("0.02", "0.021"))
+    changed = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
+    assert changed.scenes[0].id != one.scenes[0].id
+    (tmp_path / "same.csv").write_text(GOOD.replace("\n", "\r\n"))
+    again = study.parse(STUDY.replace("scan", "same"), name="a", where=str(tmp_path / "a.toml"))
+    assert again.scenes[0].id == one.scenes[0].id
+
+
+def test_a_study_is_whole_without_the_file(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD)
+    asked = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
+    (tmp_path / "scan.csv").unlink()
+    again = study.parse(asked.text, name="a", where="elsewhere")
+    assert again.scenes[0].id == asked.scenes[0].id
+    assert again.text == asked.text
+
+
+def test_noise_is_smoothed_and_the_ends_stay(tmp_path: Path) -> None:
+    x = np.linspace(0, 1, 10_000)
+    hill = 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))
+    noisy = hill + 1e-4 * np.random.default_rng(1).standard_normal(len(x))
+    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True))
+    found = profile.read(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.02)
+    assert len(found.x) < 300
+    there = np.interp(np.array(found.x), x, hill)
+    assert np.abs(np.array(found.z) - there + noisy[0]).max() < 4e-4
+    assert found.x[-1] == pytest.approx(1.0)
+    with pytest.raises(InputError, match=r"10000 points, more than .* \(give bed.smoothing"):
+        profile.read(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.0)
