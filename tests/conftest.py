@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,6 +16,16 @@ from orchestrator.solvers import liggghts
 from tests import small_study
 
 Deck = Callable[..., str]
+
+
+def pytest_configure() -> None:
+    """Let programs that tests start hear every signal, as those of a terminal do.
+
+    A shell that runs the tests in the background has them ignore two, and children inherit that.
+    """
+    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP, signal.SIGTERM):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.fixture

@@ -42,8 +42,8 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def chosen(results: Results) -> dict[str, Pile]:
     """Piles by their scenes, one for each bed line."""
-    grains = results.tables.get("pile_grain")
-    done = set() if grains is None else set(grains["scene_id"])
+    grains = results.joined("pile_grain")
+    done = set() if grains.empty else set(grains["scene_id"])
     found: dict[object, tuple[str, Pile]] = {}
     for scene_id, pile in results.plan.piles.items():
         if scene_id in done and not pile.bed.is_triangle:

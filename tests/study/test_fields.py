@@ -117,7 +117,7 @@ def test_what_has_no_effect_is_empty(scene: Scene) -> None:
 
 
 def test_a_row_says_what_was_asked_and_what_answered_it() -> None:
-    asked = study.parse("tolerance = 0.05\n" + PILE, name="test", where="test")
+    asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
     (row,) = scenes.rows(asked, planned)
     (one,) = asked.scenes
