@@ -274,12 +274,17 @@ def mesh(pile: Pile) -> str:
 
 def bed(results: Results, pile: Pile) -> str:
     """Of the picture of the bed."""
+    moved = (
+        f"moved, that is {_values('displacement_criterion', [pile])} downstream along the bed; "
+        "hollow: left the box, where it lay"
+        if pile.method.cases
+        else f"moves by then, by {pile.scene.protocol.method}, a method without dynamics"
+    )
     return (
-        "After Fig. 13 of the paper. Grains at the end of a load step; orange: moved, that is "
-        f"{_values('displacement_criterion', [pile])} downstream along the bed; hollow: left the "
-        "box, where it lay; pale yellow: exposed, has not moved; beige: mobile under it; grey: "
-        "fixed. The shade of blue is the speed of the flow by OpenFOAM, over that at the lid; it "
-        f"does not see the grains. d is one diameter. {_pile(results, pile)}"
+        f"After Fig. 13 of the paper. Grains at the end of a load step; orange: {moved}; pale "
+        "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. The shade of blue is "
+        "the speed of the flow by OpenFOAM, over that at the lid; it does not see the grains. d is "
+        f"one diameter. {_pile(results, pile)}"
     )
 
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,6 +13,8 @@ from orchestrator.study.info import Info
 
 RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
+WIDTH = 60
+"""Letters of a line over a panel."""
 FRACTION = Info("fraction", "n/N", "%")
 """Of the fraction of grains at which a threshold is read; it is no field of its own."""
 
@@ -97,5 +100,9 @@ def methods(rows: pd.DataFrame) -> str:
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
-    """What all that a panel or a marker shows agrees in; what has no effect on it is left out."""
-    return ", ".join(written(column, row[column]) for column in columns if pd.notna(row[column]))
+    """What all that a panel or a marker shows agrees in; what has no effect on it is left out.
+
+    It is broken into lines that fit beside another panel.
+    """
+    said = ", ".join(written(column, row[column]) for column in columns if pd.notna(row[column]))
+    return textwrap.fill(said, WIDTH, break_long_words=False)

@@ -65,8 +65,8 @@ class Results:
         return self.scenes[self.scenes["scene_id"] == found].iloc[0]
 
     def has_files(self, pile: Pile) -> bool:
-        """Whether a pile was run, and it and its flow still have the files of pictures."""
-        return pile.method.cases != () and all(is_whole(one, self.cases) for one in pile.runs)
+        """Whether a pile's runs and its flow's still have the files of pictures."""
+        return all(is_whole(one, self.cases) for one in pile.runs)
 
     @cached_property
     def flows(self) -> dict[str, Pile]:

@@ -114,6 +114,18 @@ def test_the_drawing_shows_the_load_step_of_its_title(steps: Steps, figure: Figu
     assert "data:image/png" in text
 
 
+def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
+    peeled = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+    steps = bed.read(peeled, results.cases)
+    assert (steps.places == peeled.packing.centres).all()
+    assert steps.moved(len(steps.places) - 1) > 0.7 * peeled.packing.count
+    found = bed.data(steps, steps.first(0.3))
+    assert not any(found["frames"])
+    assert found["moved"][found["shown"]] >= 0.3 * found["count"]
+
+
 def test_a_bed_without_results_has_no_picture(results: Results) -> None:
     assert list(bed.draw(only(results, "grain"))) == []
     none = replace(results, tables={**results.tables, "pile_threshold": pd.DataFrame()})

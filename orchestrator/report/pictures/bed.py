@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from orchestrator.grains import dump, motion
-from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, labels, page
 from orchestrator.report.figure import Figure
@@ -67,7 +66,17 @@ class Steps:
 
 
 def read(pile: Pile, cases: Path) -> Steps:
-    """Read the dumps of a finished pile."""
+    """Read where the grains of a finished pile are: without DEM, where they were packed."""
+    packing = pile.packing
+    found, level = pile.motion(cases), np.zeros(len(packing.centres), np.int64)
+    level[packing.windward] = found.level
+    places = _by_dem(pile, cases) if pile.method.cases else packing.centres[None]
+    steps = (len(places) if pile.method.cases else len(found.flow), *packing.centres.shape)
+    return Steps(pile, np.broadcast_to(places, steps), level, found.flow[: steps[0]])
+
+
+def _by_dem(pile: Pile, cases: Path) -> FloatArray:
+    """The places of the grains as packed and at the end of each load step, from the dumps, d."""
     directory, packing = cases / pile.case.name, pile.packing
     samples = pd.read_csv(directory / motion.SAMPLES)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
@@ -77,9 +86,7 @@ def read(pile: Pile, cases: Path) -> Steps:
     places[0] = packing.centres
     d = pile.scene.grain.diameter
     places[np.searchsorted(ends, rows["step"]) + 1, rows["id"] - 1] = rows[["x", "z"]] / d
-    found, level = Motion.from_csv(directory), np.zeros(len(packing.centres), np.int64)
-    level[packing.windward] = found.level
-    return Steps(pile, places, level, found.flow[: len(places)])
+    return places
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -104,13 +111,14 @@ def draw(results: Results) -> Iterator[Figure]:
 def chosen(results: Results) -> Iterator[Pile]:
     """The pile that stands for all of its slope: of the largest grains, usable if any is.
 
-    A pile whose files were pruned stands for nothing.
+    One by DEM comes before others; one whose files were pruned stands for nothing.
     """
     for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
         order = rows.assign(valid=valid(rows)).sort_values(
             ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
-        piles = (results.shown(str(scene_id)) for scene_id in order["scene_id"])
+        piles = [results.shown(str(scene_id)) for scene_id in order["scene_id"]]
+        piles.sort(key=lambda pile: not pile.method.cases)
         yield from itertools.islice(filter(results.has_files, piles), 1)
 
 
@@ -185,7 +193,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         ),
         bar=_bar(right - left),
         d=labels.millimetres(pile.scene.grain.diameter),
-        case=pile.case.name,
+        case=pile.runs[-1].name if pile.runs else "",
         title=labels.plain("alpha_deg", pile.bed.slope_deg),
     )
 
