@@ -5,6 +5,7 @@ import math
 import pytest
 
 from orchestrator.fidelity import spread
+from orchestrator.fidelity.decision import decide
 from orchestrator.fidelity.spread import Share
 from tests.fidelity.conftest import MakePile
 
@@ -18,6 +19,11 @@ def test_independent_shares_add_as_squares() -> None:
 
 def test_a_threshold_does_not_fall_below_zero() -> None:
     assert spread._of((Share("a", 0.9, 0.0), Share("b", 0.9, 0.0))).low == 1.0
+
+
+def test_of_another_bed_nothing_is_known(pile: MakePile) -> None:
+    assert math.isnan(spread.spread(pile(shape="dune"), 0.3).low)
+    assert decide(pile(shape="dune"), 0.2).why == "no error is known: as the study asks"
 
 
 def test_what_was_measured_is_known_at_every_fraction(pile: MakePile) -> None:

@@ -64,10 +64,11 @@ def scene_class(part: Part, scene: Scene) -> str:
     """The class of scenes that share the known error of a level.
 
     The flow's depends on how the stress is read, the grains' on their packing; both on whether the
-    slope is the limiting one, on which a row waits for a touch.
+    slope is the limiting one, on which a row waits for a touch, and on the shape.
     """
     assert isinstance(scene.bed, PileBed)
     ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
+    ending += _shape(scene.bed)
     if part == "flow":
         return scene.forces.stress + ending
     packing: str = scene.bed.packing
@@ -82,7 +83,13 @@ def model_class(scene: Scene) -> str:
     assert isinstance(scene.bed, PileBed)
     reynolds = float(closed_form(scene).reynolds)
     names = {VISCOUS: "viscous", ROUGH: "transitional", math.inf: "rough"}
-    return f"{scene.bed.packing}, {next(name for end, name in names.items() if reynolds < end)}"
+    name = next(name for end, name in names.items() if reynolds < end)
+    return f"{scene.bed.packing}, {name}{_shape(scene.bed)}"
+
+
+def _shape(bed: PileBed) -> str:
+    """What was measured on triangles holds for no other bed."""
+    return "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
 
 
 def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:
