@@ -280,8 +280,9 @@ def bed(results: Results, pile: Pile) -> str:
         if pile.method.cases
         else f"moves by then, by {pile.scene.protocol.method}, a method without dynamics"
     )
+    when = "at the end of a load step" if pile.method.cases else "as packed, at a flow"
     return (
-        f"After Fig. 13 of the paper. Grains at the end of a load step; orange: {moved}; pale "
+        f"After Fig. 13 of the paper. Grains {when}; orange: {moved}; pale "
         "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. The shade of blue is "
         "the speed of the flow by OpenFOAM, over that at the lid; it does not see the grains. d is "
         f"one diameter. {_pile(results, pile)}"

@@ -40,7 +40,7 @@ for (const box of document.querySelectorAll("[data-steps]")) {
       circle.setAttribute("class", moved ? (gone ? "v g" : "v") : under[i]);
     });
     const [n, N] = [data.moved[step], data.count];
-    box.querySelector("output").textContent = `load step ${step} of ${data.frames.length}: `
+    box.querySelector("output").textContent = `${data.step} ${step} of ${data.frames.length}: `
       + `u*₀ = ${data.flow[step]} m/s, n/N = ${n}/${N} = ${Math.round(100 * n / N)} %`;
   };
   slider.addEventListener("input", () => show(+slider.value));

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.errors import SolverError
+from orchestrator.report import captions
 from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import bed, flow, flow_field, mesh
 from orchestrator.report.pictures.bed import Steps
@@ -123,6 +124,9 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert steps.moved(len(steps.places) - 1) > 0.7 * peeled.packing.count
     found = bed.data(steps, steps.first(0.3))
     assert not any(found["frames"])
+    # no load step ran
+    assert found["step"] == "flow"
+    assert "load step" not in captions.bed(results, peeled)
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 

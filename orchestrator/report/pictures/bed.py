@@ -135,6 +135,7 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         frames.append([_triple(i, places[i]) for i in np.flatnonzero(new).tolist()])
         last[new] = places[new]
     return {
+        "step": "load step" if steps.pile.method.cases else "flow",
         "shown": shown,
         "count": steps.pile.packing.count,
         "flow": [float(f"{flow:.4g}") for flow in steps.flow],
