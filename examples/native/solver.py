@@ -44,9 +44,10 @@ def flow_around(scene, ustar):
     return tuple(2 * ustar**2 / (a + math.hypot(a, 2 * ustar / c)) for a, c in pairs)
 
 
-def threshold(scene):
+def threshold(scene, slope_deg=None):
     """The u* (m/s) at which the forces turn a grain over its neighbour (Eq. 1), by bisection."""
-    alpha, beta = math.radians(scene["alpha_deg"]), math.radians(scene["beta_deg"])
+    slope_deg = scene["alpha_deg"] if slope_deg is None else slope_deg
+    alpha, beta = math.radians(slope_deg), math.radians(scene["beta_deg"])
     goal = scene["weight_n"] * math.cos(alpha - beta)
     low, high = 1e-6, 1e3
     for _ in range(200):
@@ -230,12 +231,20 @@ def passing(scene, case):
 
 def pile(scene, case):
     """Each grain alone: it moves when its own stress reaches the threshold of one grain."""
-    alone = threshold(scene)
     counted = [g for g in table(case / "grains.csv") if g["kind"] == "counted"]
-    ratio = [float(g["ustar_over_ustar0"]) for g in counted]
+    found = {}  # grains on one slope have one threshold
+    order = []
+    for grain in counted:
+        ratio, slope = float(grain["ustar_over_ustar0"]), float(grain["slope_deg"])
+        # flow that runs back pushes the grain the other way, on a slope of the other sign
+        slope = math.copysign(1.0, ratio) * round(slope, 9)
+        if slope not in found:
+            found[slope] = threshold(scene, slope)
+        if ratio:
+            order.append((found[slope] / abs(ratio), ratio * abs(ratio)))
+    order.sort()
     flow = [float(h["ustar0_m_s"]) for h in table(case / "load_steps.csv")]
-    order = sorted((r for r in ratio if r > 0), reverse=True)
-    moved = [sum(alone <= r * u for r in order) for u in flow]
+    moved = [sum(alone <= u for alone, _ in order) for u in flow]
     excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
 
     def first(fraction):
@@ -245,7 +254,7 @@ def pile(scene, case):
 
     def shields(fraction):
         level, ustar0 = first(fraction)
-        mean = sum(r * r for r in order[: moved[level]]) / max(moved[level], 1)
+        mean = sum(stress for _, stress in order[: moved[level]]) / max(moved[level], 1)
         return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
 
     answers = {

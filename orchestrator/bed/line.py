@@ -130,7 +130,7 @@ class BedLine:
     def roof(self, clearance: float) -> tuple[float, FloatArray]:
         """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""
         apart = np.delete(self.corners[1:-1], self.top - 1, axis=0) - self.crest
-        steep = np.arctan2(-apart[:, 1], np.abs(apart[:, 0])).min()
+        steep = np.abs(np.arctan2(-apart[:, 1], np.abs(apart[:, 0]))).min()
         return float(np.degrees(steep)), self.crest + np.array([0, clearance / np.cos(steep)])
 
     def depth(self, points: FloatArray, segment: int) -> FloatArray:

@@ -20,6 +20,7 @@ from orchestrator.benchmark.problem import (
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile_case import MARGIN
 from orchestrator.tables import Tables
 
 STRESS, MEAN_STRESS = 0.10, 0.05
@@ -39,8 +40,8 @@ to 20 % of N and six load steps apart (docs/benchmark.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
 round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
-UPSTREAM, DOWNSTREAM, LID = 10.0, 20.0, 10.0
-"""Ends of the flow's domain, h."""
+LID = 10.0
+"""Height of the flow's domain, h."""
 
 
 @dataclass(frozen=True)
@@ -119,17 +120,14 @@ def flow_parameters(one: Answered) -> dict[str, Any]:
 
 
 def _bed(case: FlowCase) -> pd.DataFrame:
-    h = case.height_m
-    face = h / np.tan(np.radians(case.slope_deg))
-    x = [-UPSTREAM * h, 0.0, face, 2 * face, 2 * face + DOWNSTREAM * h]
-    return pd.DataFrame({"x_m": x, "z_m": [0.0, 0.0, h, 0.0, 0.0]})
+    return pd.DataFrame(case.bed_line.corners, columns=["x_m", "z_m"])
 
 
 def _stress_rows(one: Answered) -> Iterator[Row]:
     along = one.stress
     mean = windward_mean(one)
     yield exact("windward_mean", mean, MEAN_STRESS, ours=mean)
-    crest = 1 / np.sin(np.radians(one.pile.bed.slope_deg))
+    crest = one.pile.model.line.crest_s / one.pile.bed.height
     for s, u in zip(along["s_over_h"], along["ustar_over_ustar0_wall"], strict=True):
         judged = FACE[0] * crest <= s <= FACE[1] * crest
         yield exact("ustar_over_ustar0", u, STRESS if judged else np.nan, place(s), u)
@@ -138,7 +136,7 @@ def _stress_rows(one: Answered) -> Iterator[Row]:
 def windward_mean(one: Answered) -> float:
     """Mean of u*/u*_0 over the windward face by arc length."""
     stress = WallStress.from_csv(one.cases / one.pile.flow.name / "wall_stress.csv")
-    crest = one.pile.bed.height / np.sin(np.radians(one.pile.bed.slope_deg))
+    crest = one.pile.model.line.crest_s
     face = (stress.s_m > 0) & (stress.s_m < crest)
     return float(np.average(stress.ustar_over_ustar0_wall[face], weights=stress.length_m[face]))
 
@@ -147,8 +145,16 @@ def pile(one: Answered) -> Problem:
     """Level 4: the grains of a pile under a given stress."""
     scene = one.pile.scene
     told = parameters(scene, "pile") | {"count": one.pile.packing.count} | _lift_off(one)
+    told |= _roof(one) if not one.pile.bed.is_triangle else {}
     tables = {"grains": _grains(one), "load_steps": load_steps(one)}
     return Problem(4, scene.id, "pile", told, tables, expectations(_pile_rows(one, GRAINS)))
+
+
+def _roof(one: Answered) -> dict[str, float]:
+    """The roof above which a grain in flight is gone, of a bed that is no triangle."""
+    slope, ridge = one.pile.line.roof(MARGIN + 0.5)
+    x, z = (ridge * one.pile.scene.grain.diameter).tolist()
+    return {"roof_slope_deg": slope, "roof_x_m": x, "roof_z_m": z}
 
 
 def line(one: Answered) -> Problem:
@@ -179,7 +185,7 @@ def _grains(one: Answered) -> pd.DataFrame:
     pushed = packing.mobile & packing.lee
     kinds = [~packing.mobile, packing.windward, pushed]
     forced = packing.windward | pushed
-    slope = np.where(packing.lee, -scene.bed.slope_deg, scene.bed.slope_deg)
+    slope = np.degrees(np.arctan2(one.pile.tangents[:, 1], one.pile.tangents[:, 0]))
     x, z = packing.centres.T * scene.grain.diameter
     return pd.DataFrame(
         {

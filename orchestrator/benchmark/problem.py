@@ -132,13 +132,22 @@ MEANINGLESS: Mapping[str, frozenset[str]] = {
 """What of a scene does not matter to who solves it as a kind: all else is told."""
 
 
+SHAPES = frozenset(
+    {
+        *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
+        *("profile", "smoothing", "obstacles", "counted"),
+    }
+)
+"""What a bed line follows from: packs have the line and the grains themselves."""
+
+
 def parameters(scene: Scene, kind: str) -> dict[str, Any]:
     """What a pack says of a scene, whose force law is decided, where it is a problem of a kind."""
     grain = scene.grain
     told = fields.used(scene) | mechanics(
         grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness
     )
-    hidden = MEANINGLESS[kind]
+    hidden = MEANINGLESS[kind] | SHAPES
     return {name: value for name, value in told.items() if value is not None and name not in hidden}
 
 

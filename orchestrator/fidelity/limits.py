@@ -128,6 +128,13 @@ def _bed_line(scene: Scene) -> str | None:
     return f"{where} is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
 
 
+def _theory(scene: Scene) -> str | None:
+    bed = _pile(scene)
+    if not bed or scene.flow.model != "hill" or (bed.is_wedge and not bed.obstacles):
+        return None
+    return "the linear theory is of one form with a straight windward side"
+
+
 def _first_cell(scene: Scene) -> str | None:
     if not _solved(scene) or 4 * scene.solve_roughness <= scene.first_cell_height:
         return None
@@ -244,6 +251,13 @@ LIMITS = (
         "Piles of 10 to 35 deg: others are refused.",
         f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg, and no more than"
         " min(friction angle, 90 deg - entrainment angle)",
+    ),
+    Limit(
+        "slope",
+        "flow.model",
+        _theory,
+        "The linear theory is of one form with a straight windward side: others are refused.",
+        'choose "solve"',
     ),
     Limit(
         "first-cell",

@@ -89,3 +89,14 @@ def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str, x: float, z: float
     assert start < x < end
     assert np.abs(line.slopes_deg).max() < 75.1
     np.testing.assert_allclose(line.height(np.array([start, end])), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "slope"), [("triangle", 15.0), ("dune", 15.0), ("step up", 0.0), ("train", 0.0)]
+)
+def test_the_roof_is_clear_of_the_forms(name: str, slope: float) -> None:
+    line = of_bed(bed(**SHAPES[name]))
+    found, ridge = line.roof(0.001)
+    assert found == pytest.approx(slope, abs=1e-9)
+    inner = line.corners[1:-1] - ridge
+    assert (inner[:, 1] + np.abs(inner[:, 0]) * np.tan(np.radians(found)) < -0.00099).all()

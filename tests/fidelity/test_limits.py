@@ -6,6 +6,7 @@ import pytest
 
 from orchestrator import cli, plan
 from orchestrator.errors import InputError
+from orchestrator.fidelity import limits
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.study import study
 from orchestrator.study.study import Study
@@ -87,3 +88,27 @@ def test_what_cannot_be_built_is_refused_always(text: str, field: str) -> None:
 def test_a_theory_has_no_mesh_to_refuse() -> None:
     (pile,) = plan.make(_parse(PILE.replace("solve", "hill") + "first_cell_height = 6e-5\n")).piles
     assert pile
+
+
+@pytest.mark.parametrize(
+    ("bed", "says"),
+    [
+        ('shape = "cosine", slope_deg = 31.0', r"bed: 3\d\.?\d* deg at x = .* is beyond min"),
+        ('shape = "dune", slope_deg = 15.0, counted = "all", lee_slope_deg = 33.0', "33 deg at x"),
+        ("slope_deg = 15.0, forms = 2, spacing = 0.1", r"bed.spacing: forms 0.149\d* m long over"),
+        ('shape = "flat", counted = "windward"', "no grain is counted"),
+    ],
+)
+def test_beds_that_no_grains_lie_on_are_refused(bed: str, says: str) -> None:
+    text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ kind = "pile", {bed} }}'
+    with pytest.raises(InputError, match=says):
+        limits.check_study(study.parse(text, name="t", where="t"))
+
+
+def test_the_theory_is_of_one_form() -> None:
+    text = 'grain = { diameter = 1e-3 }\nflow = { model = "hill" }\nbed = { kind = "pile", '
+    with pytest.raises(InputError, match="the linear theory is of one form"):
+        limits.check_study(
+            study.parse(text + 'shape = "cosine", slope_deg = 15.0 }', name="t", where="t")
+        )
+    limits.check_study(study.parse(text + "slope_deg = 15.0 }", name="t", where="t"))
