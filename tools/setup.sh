@@ -122,7 +122,20 @@ install_venv() {
     mv "$stamp.new" "$stamp"
 }
 
-ready() { venv_holds "$@" && [ -z "$(missing_packages)" ]; }
+# With a file that names the checkout, its package is found from any directory.
+linked() {
+    for packages in "$environment"/lib/python3*/site-packages; do
+        [ "$(cat "$packages/orchestrator.pth" 2>/dev/null)" = "$PWD" ] || return 1
+    done
+}
+
+link_checkout() {
+    for packages in "$environment"/lib/python3*/site-packages; do
+        printf '%s\n' "$PWD" >"$packages/orchestrator.pth"
+    done
+}
+
+ready() { venv_holds "$@" && linked && [ -z "$(missing_packages)" ]; }
 
 set_up() {
     ! ready "$@" || return 0
@@ -133,6 +146,7 @@ set_up() {
     install_packages
     check_python
     venv_holds "$@" || install_venv "$@"
+    linked || link_checkout
     exec 9<&-
 }
 
