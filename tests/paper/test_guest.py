@@ -25,14 +25,14 @@ def imported(path: Path) -> set[str]:
     return found
 
 
-def test_only_the_command_line_imports_it() -> None:
+def test_only_the_command_line_and_the_python_face_import_it() -> None:
     theirs = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
         if "paper" not in path.relative_to(PACKAGE).parts
         and any(name.startswith("orchestrator.paper") for name in imported(path))
     }
-    assert theirs == {"cli.py"}
+    assert theirs == {"cli.py", "face.py"}
 
 
 def test_the_engine_knows_no_preset_of_the_paper() -> None:
