@@ -1,4 +1,7 @@
-"""The paper: its studies, and the report card of what it claims. Only the command line and the Python face ask it."""
+"""The paper: its studies, and the report card of what it claims.
+
+Only the command line and the Python face ask it.
+"""
 
 from collections.abc import Sequence
 from functools import cache
