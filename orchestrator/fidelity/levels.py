@@ -135,7 +135,8 @@ def _own_speed(scene: Scene) -> Fields:
     assert isinstance(scene.bed, PileBed)
     ustar = float(closed_form(scene).friction_velocity)
     speed = ustar / 0.41 * math.log1p(10 * scene.bed.height / scene.bed.roughness)
-    return {**STANDARD, "flow.speed": float(f"{speed:.6g}")}
+    own = {"flow.speed": float(f"{speed:.6g}"), "flow.first_cell_height": scene.first_cell_height}
+    return {**STANDARD, **own}
 
 
 def _paper_stiffness(scene: Scene) -> Fields:

@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
-from orchestrator.flow.case import LID_OVER_HEIGHT
+from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.physics.constants import KARMAN
@@ -136,10 +136,10 @@ def _theory(scene: Scene) -> str | None:
 
 
 def _first_cell(scene: Scene) -> str | None:
-    if not _solved(scene) or 4 * scene.solve_roughness <= scene.first_cell_height:
+    if not _solved(scene) or scene.solve_roughness <= scene.first_cell_height:
         return None
     return (
-        f"z0 = {scene.solve_roughness:g} m is above half of z_e ="
+        f"z0 = {scene.solve_roughness:g} m is above twice z_e ="
         f" {scene.first_cell_height / 2:g} m, the height of the first cell's centre"
     )
 
@@ -148,9 +148,7 @@ def _laminar(scene: Scene) -> str | None:
     bed = _solved(scene)
     if not bed:
         return None
-    ustar0 = undisturbed_ustar(
-        scene.flow.speed, LID_OVER_HEIGHT * bed.height, scene.solve_roughness
-    )
+    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.height, scene.solve_roughness)
     ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.flow.viscosity
     if ratio >= 1:
         return None
@@ -263,8 +261,8 @@ LIMITS = (
         "first-cell",
         "bed.roughness",
         _first_cell,
-        "z_e, half the first cell, is at least 2 z0: refused below; 10 z0 is sound.",
-        "lower it, or raise flow.first_cell_height or bed.height; z_e of 10 z0 is sound",
+        "z_e, half the first cell, is at least z0/2: refused below; from z0 on it is sound.",
+        "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound",
     ),
     Limit(
         "similarity",

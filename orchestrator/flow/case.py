@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from importlib.metadata import version as installed
-from math import isfinite, log
+from math import cos, isfinite, log, radians
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,9 +15,14 @@ from orchestrator.bed.shapes import triangle
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow import diagnostics
 from orchestrator.flow.diagnostics import Diagnostic
-from orchestrator.flow.grid import Grid, along
+from orchestrator.flow.grid import NEAR, Grid, along, extended, growth_far
 from orchestrator.flow.mesh import write_line, write_mesh
-from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
+from orchestrator.flow.stress import (
+    WallStress,
+    approach_ustar,
+    read_openfoam,
+    undisturbed_ustar,
+)
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
@@ -27,9 +32,10 @@ from orchestrator.study.scene import BUILDABLE_DEG
 
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"
-LID_OVER_HEIGHT = 10.0
+SPEED_HEIGHT = 10.0
+"""Height above the flat bed at which U_e is given, h."""
 MESH = (
-    *("boundary", "faces", "neighbour", "owner", "points", "sets/air"),
+    *("boundary", "faces", "neighbour", "owner", "points", "sets/air", "sets/approach"),
     *("cellZones", "faceZones", "pointZones"),
 )
 """Files of a mesh that gmshToFoam makes."""
@@ -48,11 +54,11 @@ class FlowCase(Case):
     slope_deg : float
         Slope of the windward faces, where they are steepest; 0 if there are none.
     height_m : float
-        Height h of the forms, m; the lid is at 10 h.
+        Height h of the forms, m.
     roughness_m : float
         Roughness length z0 of the bed, m.
     speed_m_s : float
-        U_e, the speed of the approaching flow at the lid, m/s.
+        U_e, the speed of the approaching flow at 10 h above the flat bed, m/s.
     viscosity_m2_s : float
         Kinematic viscosity, m2/s.
     first_cell_m : float
@@ -69,6 +75,8 @@ class FlowCase(Case):
         Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
     non_orthogonal_correctors : int
         Of the pressure for cells that are not orthogonal, in each iteration.
+    lid, upstream, downstream : float
+        Height of the lid above the flat bed, flat bed before and behind the forms, in h.
     line : BedLine, optional
         The bed line, m; by default a triangle of the slope and the height, or a flat bed.
     profile : Profile, optional
@@ -91,12 +99,15 @@ class FlowCase(Case):
     turbulence_model: Turbulence = "kEpsilon"
     convection_scheme: Convection = "linearUpwind"
     non_orthogonal_correctors: int = 1
+    lid: float = 100.0
+    upstream: float = 80.0
+    downstream: float = 100.0
     line: BedLine | None = None
     profile: Profile | None = field(default=None, compare=False)
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 4
+    recipe: ClassVar[int] = 6
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
@@ -108,6 +119,7 @@ class FlowCase(Case):
     )
     made: ClassVar[tuple[str, ...]] = (
         "log.gmshToFoam",
+        "log.setExprFields",
         "log.simpleFoam",
         "constant/polyMesh/sed??????",  # a killed sed's
     )
@@ -166,8 +178,9 @@ class FlowCase(Case):
 
     @property
     def bed_line(self) -> BedLine:
-        """The bed line, m."""
-        return self.line or triangle(self.slope_deg, self.height_m)
+        """The bed line, m, from the inlet to the outlet."""
+        line = self.line or triangle(self.slope_deg, self.height_m)
+        return extended(line, self.upstream * self.height_m, self.downstream * self.height_m)
 
     @cached_property
     def grid(self) -> Grid:
@@ -185,9 +198,14 @@ class FlowCase(Case):
         return float(self.expansion_ratio ** (40 / self.cells_per_face))
 
     @property
+    def growth_far(self) -> float:
+        """The same far from the forms."""
+        return growth_far(self.growth, self.cells_per_face)
+
+    @property
     def ustar0_m_s(self) -> float:
         """Friction velocity u*_0 of the approaching flow, m/s."""
-        return undisturbed_ustar(self.speed_m_s, LID_OVER_HEIGHT * self.height_m, self.roughness_m)
+        return undisturbed_ustar(self.speed_m_s, SPEED_HEIGHT * self.height_m, self.roughness_m)
 
     @property
     def cost_s(self) -> float:
@@ -200,8 +218,11 @@ class FlowCase(Case):
 
     def _cells(self) -> float:
         """How many cells `pile.geo` makes, about."""
-        up = log(1 + LID_OVER_HEIGHT * self.height_m / self.first_cell_m * (self.growth - 1))
-        return sum(self.grid.cells) * up / log(self.growth)
+        near, far = min(NEAR, self.lid / 2) * self.height_m, self.growth_far
+        up = log(1 + near / self.first_cell_m * (self.growth - 1)) / log(self.growth)
+        last = self.first_cell_m * self.growth**up
+        up += log(1 + (self.lid * self.height_m - near) / last * (far - 1)) / log(far)
+        return sum(self.grid.cells) * up
 
     def versions(self) -> dict[str, str]:
         """The programs that mesh and solve."""
@@ -212,7 +233,10 @@ class FlowCase(Case):
         _set_values(
             directory / "parameters",
             freeStream=self.speed_m_s,
-            lidHeight=LID_OVER_HEIGHT * self.height_m,
+            speedHeight=SPEED_HEIGHT * self.height_m,
+            lidHeight=self.lid * self.height_m,
+            columnOffset=-self.height_m,
+            firstCentre=self.first_cell_m / 2 / cos(radians(self.slope_deg)),
             roughnessLength=self.roughness_m,
             viscosity=self.viscosity_m2_s,
             turbulence=self.turbulence_model,
@@ -223,8 +247,10 @@ class FlowCase(Case):
             directory / "parameters.geo",
             slope_deg=self.slope_deg,
             height=self.height_m,
+            lid=self.lid * self.height_m,
             first_cell=self.first_cell_m,
             growth=self.growth,
+            growth_far=self.growth_far,
         )
         write_line(self.grid, directory / "bed_line.geo")
         if self.profile:
@@ -246,13 +272,14 @@ class FlowCase(Case):
         stress.to_csv(directory / WALL_STRESS)
         found = diagnostics.of(
             stress,
+            approach=approach_ustar(directory),
             slope_deg=self.slope_deg,
             height=self.height_m,
             roughness=self.roughness_m,
             reynolds=self.ustar0_m_s / self.viscosity_m2_s,
         )
         diagnostics.to_csv(found, directory / DIAGNOSTICS)
-        self._check_upstream(found["upstream_ustar_over_ustar0"], directory)
+        self._check_approach(found["approach_ustar_over_log_law"], directory)
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
@@ -272,10 +299,10 @@ class FlowCase(Case):
         segment = np.searchsorted(line.x, x) - 1
         return np.asarray(line.slopes_deg[np.clip(segment, 0, len(line.slopes_deg) - 1)])
 
-    def _check_upstream(self, upstream: Diagnostic, directory: Path) -> None:
-        if not upstream.sound:
+    def _check_approach(self, approach: Diagnostic, directory: Path) -> None:
+        if not approach.sound:
             raise SolverError(
-                f"on the undisturbed bed u* is {upstream.value:.3f} u*_0: the wall's log law fails",
+                f"on flat bed u* is {approach.value:.3f} of the log law's: the wall function fails",
                 where=str(directory),
                 remedy=f"{DIAGNOSTICS} says more; raise the first cell's height or the speed",
             )

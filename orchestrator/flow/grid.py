@@ -4,7 +4,7 @@ The grid lines are vertical. Each corner of the bed line is one of them; between
 cells are a geometric series. They are shortest at sharp tops, where the stress has its peaks.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, inf, log, radians, tan
 
 import numpy as np
@@ -15,6 +15,13 @@ SHARP_DEG = 8.0
 """Bend of the bed from which on a corner is a corner, not a part of a curve."""
 CELLS_ON_OBSTACLE = 8
 """Cells in the height of an obstacle, along the bed beside it."""
+TOP = 0.35
+"""Length of the cells at sharp tops over the mean of a face: a grain's stress is averaged over h/40
+there."""
+NEAR = 4.0
+"""Beyond this, h before and behind the forms and above the bed, cells grow by `FAR`."""
+FAR = 1.3
+"""Ratio of neighbouring cells there, with 40 cells on a face."""
 LEVEL_CELLS = 8
 """A level piece of this many cells at least is divided in the middle: cells grow towards it."""
 
@@ -38,6 +45,17 @@ class Grid:
     ratio: tuple[float, ...]
 
 
+def growth_far(growth: float, cells_per_face: int) -> float:
+    """Ratio of neighbouring cells far from the forms."""
+    return max(growth, float(FAR ** (40 / cells_per_face)))
+
+
+def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
+    """A line with flat bed of some lengths, m, before and behind it in place of its own."""
+    x = (line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream)
+    return replace(line, x=x)
+
+
 def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
     """The grid along a bed line that begins and ends with flat bed.
 
@@ -54,17 +72,20 @@ def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float
     """
     face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
     cell = face / cells_per_face
-    # a face has half a cell at its sharp top, and this at its foot
-    face_ratio = ratio_of(cells_per_face, cell / 2, face)
-    foot = cell / 2 * face_ratio ** (cells_per_face - 1)
+    # a face has a short cell at its sharp top, and this at its foot
+    face_ratio = ratio_of(cells_per_face, TOP * cell, face)
+    foot = TOP * cell * face_ratio ** (cells_per_face - 1)
     if not slope_deg:
         foot = cell
-    line = _divided(line, cell)
+    near = NEAR * line.h
+    ends = (line.x[1] - near, line.x[-2] + near)
+    line = _divided(line.with_corners([x for x in ends if line.x[0] < x < line.x[-1]]), cell)
     sizes = _sizes(line, cell, foot, max(growth, face_ratio))
     lengths = np.diff(line.x)
     inner = [_piece(*one) for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)]
     up, down = _first(inner[0], lengths[1]), _last(inner[-1], lengths[-2])
-    before, behind = _away(lengths[0], up, growth), _away(lengths[-1], down, growth)
+    far = growth_far(growth, cells_per_face)
+    before, behind = _away(lengths[0], up, far), _away(lengths[-1], down, far)
     pieces = [(before[0], 1 / before[1]), *inner, behind]
     return Grid(line, tuple(n for n, _ in pieces), tuple(r for _, r in pieces))
 
@@ -93,7 +114,7 @@ def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray
     """Length of the cells at each corner, m; the ends of the line have none of their own."""
     bends = line.bends_deg
     sizes = np.full(len(line.x), cell)
-    sizes[bends > SHARP_DEG] = cell / 2
+    sizes[bends > SHARP_DEG] = TOP * cell
     sizes[bends < -SHARP_DEG] = foot
     # in the middle of level bed, and at the ends, as long as the growth allows
     middle = np.abs(bends) < 1e-9

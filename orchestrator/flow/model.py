@@ -10,7 +10,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
-from orchestrator.flow.case import LID_OVER_HEIGHT, WALL_STRESS, FlowCase
+from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, undisturbed_ustar
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -23,6 +23,9 @@ FIELD_OF = {
     "first_cell_m": "flow.first_cell_height",
     "cells_per_face": "flow.cells_per_face",
     "expansion_ratio": "flow.expansion_ratio",
+    "lid": "flow.lid",
+    "upstream": "flow.upstream",
+    "downstream": "flow.downstream",
     "non_orthogonal_correctors": "flow.non_orthogonal_correctors",
 }
 """What a study file calls the parameters of a flow case."""
@@ -48,9 +51,9 @@ class FlowModel(ABC):
 
     @property
     def lid_speed_ratio(self) -> float:
-        """U_e over u*_0: the approaching flow's speed at the lid over its friction velocity."""
-        lid = LID_OVER_HEIGHT * self.line.h
-        return 1 / undisturbed_ustar(1.0, lid, self.scene.solve_roughness)
+        """U_e over u*_0: the approaching flow's speed at 10 h over its friction velocity."""
+        height = SPEED_HEIGHT * self.line.h
+        return 1 / undisturbed_ustar(1.0, height, self.scene.solve_roughness)
 
     @property
     def cases(self) -> tuple[FlowCase, ...]:
@@ -96,6 +99,9 @@ class Solved(FlowModel):
             return _shared(
                 line=self.line,
                 profile=bed.profile,
+                lid=flow.lid,
+                upstream=flow.upstream,
+                downstream=flow.downstream,
                 slope_deg=bed.slope_deg,
                 height_m=bed.height,
                 roughness_m=self.scene.solve_roughness,

@@ -28,9 +28,9 @@ Array = NDArray[np.float64]
 Measure = Literal["wall", "eq10"]
 
 
-def undisturbed_ustar(speed_m_s: float, lid_height_m: float, roughness_m: float) -> float:
-    """Friction velocity of the approaching flow, m/s: u*_0 = 0.41 U_e / ln((z_lid + z0)/z0)."""
-    return float(log_law_ustar(speed_m_s, lid_height_m, roughness_m))
+def undisturbed_ustar(speed_m_s: float, height_m: float, roughness_m: float) -> float:
+    """Friction velocity of the log law with a speed U at a height z: 0.41 U / ln((z + z0)/z0)."""
+    return float(log_law_ustar(speed_m_s, height_m, roughness_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,36 +184,53 @@ class WallStress:
 def read_openfoam(directory: Path) -> WallStress:
     """Stress along the bed of a finished OpenFOAM case.
 
-    The numbers have seven digits, which is what VTK hands on.
+    u*_0 is that of the column before the inlet, in which the approaching flow develops on the rows
+    of the mesh: it is `approach_ustar` times the one of the log law. The numbers have seven digits,
+    which is what VTK hands on.
 
     Parameters
     ----------
     directory : Path
-        A case that `Allrun` has run in; its `parameters` give U_e, the lid and z0.
+        A case that `Allrun` has run in; its `parameters` give U_e and z0.
 
     Raises
     ------
     SolverError
-        If the case holds no results.
+        If the case holds no results, or nothing flows in the column.
     """
-    numbers = read_numbers(directory / "parameters")
-    z0 = numbers["roughnessLength"]
-    ustar0 = undisturbed_ustar(numbers["freeStream"], numbers["lidHeight"], z0)
+    z0 = read_numbers(directory / "parameters")["roughnessLength"]
     bed, air = read_last_time(directory, "bed", ["U", "wallShearStress"])
     faces = _Faces.of(bed)
     z_e, u_t = _first_cells(air, faces)
     stress = np.asarray(bed.cell_data["wallShearStress"], dtype=np.float64)[faces.order]
+    # OpenFOAM's is the stress of the bed on the flow
+    tau = -_along(stress, faces.tangents)
+    if not tau[0] > 0:
+        raise SolverError("no flow in the column before the inlet", where=str(directory))
+    ustar0, own = float(np.sqrt(tau[0])), slice(1, None)
     return WallStress(
-        s_m=faces.s_m,
-        x_m=faces.centres[:, 0],
-        z_m=faces.centres[:, 2],
-        length_m=faces.lengths,
-        z_e_m=z_e,
-        # OpenFOAM's is the stress of the bed on the flow
-        tau_wall=-_along(stress, faces.tangents) / ustar0**2,
-        ustar_over_ustar0_eq10=log_law_ustar(u_t, z_e, z0) / ustar0,
-        ustar_over_ustar0_eq10_printed=log_law_ustar(u_t, z_e, z0, printed=True) / ustar0,
+        s_m=faces.s_m[own],
+        x_m=faces.centres[own, 0],
+        z_m=faces.centres[own, 2],
+        length_m=faces.lengths[own],
+        z_e_m=z_e[own],
+        tau_wall=tau[own] / ustar0**2,
+        ustar_over_ustar0_eq10=log_law_ustar(u_t, z_e, z0)[own] / ustar0,
+        ustar_over_ustar0_eq10_printed=log_law_ustar(u_t, z_e, z0, printed=True)[own] / ustar0,
     )
+
+
+def approach_ustar(directory: Path) -> float:
+    """Friction velocity in the column before the inlet over that of the log law.
+
+    It is 1 but for what the rows of the mesh do to the log law.
+    """
+    numbers = read_numbers(directory / "parameters")
+    heights = numbers["speedHeight"], numbers["roughnessLength"]
+    bed, _ = read_last_time(directory, "bed", ["wallShearStress"])
+    first = int(np.argmin(bed.cell_centers().points[:, 0]))
+    tau = -float(bed.cell_data["wallShearStress"][first, 0])
+    return float(np.sqrt(max(tau, 0.0))) / undisturbed_ustar(numbers["freeStream"], *heights)
 
 
 @dataclass(frozen=True)

@@ -256,7 +256,7 @@ def flow(piles: list[Pile]) -> str:
         f"the last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other "
         "speeds are taken to be similar. White: streamlines, the closed ones "
         "around the flow that runs back, at arbitrary spacing. Only the part near "
-        "the pile is shown: the lid is at 10 h. To scale."
+        "the pile is shown: the lid is far above. To scale."
     )
 
 
@@ -267,7 +267,7 @@ def mesh(pile: Pile) -> str:
         "After Fig. 11 of the paper, which has triangles. Hexahedra, one cell deep, by gmsh: "
         f"{flow.cells_per_face} along each face of the pile; the first cells are "
         f"{flow.first_cell_m / z0:.3g} z₀ high, as the log law of the rough wall needs, and grow "
-        "away from the bed and from the pile. Above: near the pile (the lid is at 10 h); below: "
+        "away from the bed and from the pile. Above: near the pile, the lid is far above; below: "
         "the crest, as boxed. To scale. No grains: the flow sees the smooth faces."
     )
 

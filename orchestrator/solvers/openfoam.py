@@ -14,7 +14,7 @@ from orchestrator.runs.program import Said, ask, find
 if TYPE_CHECKING:
     import pyvista
 
-PROGRAMS = ("gmshToFoam", "simpleFoam")
+PROGRAMS = ("gmshToFoam", "setExprFields", "simpleFoam")
 """The programs of a case's `Allrun`, in their order."""
 TRIED = ("1912",)
 """Versions that the tests ran with."""

@@ -399,7 +399,8 @@ class Flow(Part):
         Speed,
         Info("speed of the solve", "U_e", "m/s", "solve_u_e_m_s", "solved flows", "answer"),
     ] = 10.0
-    """speed at the lid at which the flow over a pile is solved; the stress is scaled from it"""
+    """speed 10 h above the flat bed at which the flow over a pile is solved; the stress is scaled
+    from it"""
     viscosity: Annotated[
         Viscosity,
         Info("viscosity of the solve", "ν", "m²/s", "solve_nu_m2_s", "solved flows", "answer"),
@@ -417,8 +418,8 @@ class Flow(Part):
             read="first_cell_height",
         ),
     ] = None
-    """height of the mesh's cells on the bed; by default h/40 or more, so that their centres are
-    15 z₀ from the bed, 10 z₀ on a low pile"""
+    """height of the mesh's cells on the bed; by default h/40, more on a very rough bed, 2.5 z₀, and
+    where the flow in them would not be turbulent"""
     cells_per_face: Annotated[
         int, Field(ge=10, le=400), Info("cells per face", scope="solved flows", about="answer")
     ] = 40
@@ -461,6 +462,22 @@ class Flow(Part):
         Convection, Info("convection scheme", scope="solved flows", about="answer")
     ] = "linearUpwind"
     """OpenFOAM's scheme for the convection of U"""
+    lid: Annotated[
+        float, Field(ge=3, le=1000), Info("lid", unit="h", scope="solved flows", about="answer")
+    ] = 100.0
+    """height of the lid above the flat bed; the flow there is that of the undisturbed log layer"""
+    upstream: Annotated[
+        float,
+        Field(ge=3, le=1000),
+        Info("flat bed upstream", unit="h", scope="solved flows", about="answer"),
+    ] = 80.0
+    """flat bed from the inlet to the forms"""
+    downstream: Annotated[
+        float,
+        Field(ge=3, le=1000),
+        Info("flat bed downstream", unit="h", scope="solved flows", about="answer"),
+    ] = 100.0
+    """flat bed from the forms to the outlet"""
     non_orthogonal_correctors: Annotated[
         int,
         Field(ge=0, le=5),

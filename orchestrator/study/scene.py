@@ -8,7 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
+from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.laws import LAWS
+from orchestrator.physics.log_law import log_law_ustar
 from orchestrator.physics.threshold import weight
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.parts import (
@@ -124,7 +126,9 @@ class Scene(Part):
         assert isinstance(self.bed, PileBed)
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
-        return default_first_cell_height(self.bed.height, self.solve_roughness)
+        ustar0 = log_law_ustar(self.flow.speed, 10 * self.bed.height, self.solve_roughness)
+        viscous = self.flow.viscosity / (KARMAN * float(ustar0))
+        return default_first_cell_height(self.bed.height, self.solve_roughness, viscous)
 
 
 def pocket_cosine(bed: Bed) -> float:
@@ -236,15 +240,14 @@ def check_mesh(height: float, first_cell_height: float) -> None:
         )
 
 
-def default_first_cell_height(height: float, roughness: float) -> float:
+def default_first_cell_height(height: float, roughness: float, viscous: float = 0.0) -> float:
     """Height of the first cell on the bed of a pile, m.
 
-    Its centre z_e must be 10 z0 from the bed, or the log law fails; at 15 z0 the friction velocity
-    of a flat bed comes out within 1.5 %, at 10 z0 within 1.9 %. It must resolve the pile as well:
-    from h/20 on the former has to do, and h/4 is the end.
+    The finer the better, but its centre z_e must not lie in the roughness, and where the eddy
+    viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow is not turbulent.
+    h/4 is the end.
     """
-    rough = min(30 * roughness, max(height / 20, 20 * roughness))
-    return min(max(height / 40, rough), height / 4)
+    return min(max(height / 40, 2.5 * roughness, 2.5 * viscous), height / 4)
 
 
 def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:

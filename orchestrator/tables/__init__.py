@@ -17,6 +17,7 @@ from orchestrator.fidelity import checks
 from orchestrator.plan import Plan
 from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
+from orchestrator.tables import flows as flows_table
 from orchestrator.tables import forms, piles, scenes, single, text
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter
@@ -44,6 +45,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "scenes": asked,
         "single_grain": with_usable(grains, asked, study),
         "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
+        "flow": pd.DataFrame(flows_table.row(pile, cases) for pile in flows.values()),
         "pile_grain": _concat(map(piles.grains, ready)),
         "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),

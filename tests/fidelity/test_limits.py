@@ -33,7 +33,7 @@ BEYOND = [
     (GRAIN.format(slope=36.0, angle=50.0), "bed.slope_deg", "= 35 deg"),
     (PILE.replace("15.0", "31.0"), "bed.slope_deg", "90 deg - entrainment angle"),
     (PILE.replace("15.0", "5.0"), "bed.slope_deg", "choose 10"),
-    (PILE + "first_cell_height = 6e-5\n", "bed.roughness", "z_e"),
+    (PILE + "first_cell_height = 3e-5\n", "bed.roughness", "z_e"),
     (PILE + "viscosity = 1e-2\n", "flow.viscosity", "not turbulent"),
 ]
 
@@ -86,7 +86,7 @@ def test_what_cannot_be_built_is_refused_always(text: str, field: str) -> None:
 
 
 def test_a_theory_has_no_mesh_to_refuse() -> None:
-    (pile,) = plan.make(_parse(PILE.replace("solve", "hill") + "first_cell_height = 6e-5\n")).piles
+    (pile,) = plan.make(_parse(PILE.replace("solve", "hill") + "first_cell_height = 3e-5\n")).piles
     assert pile
 
 

@@ -16,7 +16,7 @@ PILE = FlowCase(
     roughness_m=1e-4 / 3.0,
     speed_m_s=10.0,
     viscosity_m2_s=1e-5,
-    first_cell_m=1e-3,
+    first_cell_m=5e-4,
     cells_per_face=16,
 )
 SLOW = replace(PILE, slope_deg=30.0, cells_per_face=80)

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import Exploded, InputError, SolverError, Stalled
+from orchestrator.flow import diagnostics
 from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
-from orchestrator.flow.stress import WallStress, read_openfoam
+from orchestrator.flow.stress import WallStress, approach_ustar, read_openfoam
 from orchestrator.runs import case, process
 from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Turbulence
@@ -41,7 +42,7 @@ def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     assert case.is_done(PILE, directory.parent)
     kept, read = WallStress.from_csv(directory / WALL_STRESS), read_openfoam(directory)
     np.testing.assert_array_equal(kept.tau_wall, read.tau_wall)
-    assert (directory / "parameters").read_text().count("//") == 8
+    assert (directory / "parameters").read_text().count("//") == 11
     sums = (directory / "results.sha256").read_text()
     for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress"):
         assert f"/{field}\n" in sums
@@ -72,27 +73,51 @@ def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -
     assert crest > 2.0
     assert lee < 0.0
     start, end = stress.edges_m[[0, -1]]
-    assert stress.mean_over(start + 0.02, 0.02) == pytest.approx(1.0, abs=0.1)
-    assert 0.0 < stress.mean_over(end - 0.02, 0.02) < 1.0
+    assert stress.mean_over(start + 0.02, 0.02) == pytest.approx(1.0, abs=0.01)
+    assert 0.8 < stress.mean_over(end - 0.02, 0.02) < 1.0
+
+
+def solved_flat(flow: FlowCase, tmp_path: Path) -> Path:
+    """A flat bed after 300 iterations: what is left is noise, and its residuals do not fall."""
+    directory = case.prepare(flow, tmp_path)
+    for old, new in (
+        ("endTime             1000;", "endTime 300;"),
+        ("Interval       1000", "Interval 300"),
+    ):
+        edit(directory / "system" / "controlDict", old, new)
+    allrun(directory)
+    return directory
 
 
 @pytest.mark.parametrize(
-    ("roughness", "first_cell"), [(3.3e-6, 5e-4), (3.3e-5, 1e-3), (1e-4, 2e-3)]
+    ("roughness", "first_cell"), [(3.3e-6, 2.5e-4), (3.3e-5, 2.5e-4), (1e-4, 5e-4), (1e-4, 2e-3)]
 )
 def test_a_flat_bed_keeps_the_friction_velocity(
-    solve: Solve, roughness: float, first_cell: float
+    tmp_path: Path, roughness: float, first_cell: float
 ) -> None:
-    """Of the approaching flow, and of the log law at the first cell, which the wall uses too."""
-    flow = replace(PILE, slope_deg=0.0, roughness_m=roughness, first_cell_m=first_cell)
-    stress = WallStress.from_csv(solve(flow) / WALL_STRESS)
-    middle = np.abs(stress.x_m) < 0.1
-    np.testing.assert_allclose(stress.ustar_over_ustar0_wall[middle], 1.0, atol=0.015)
-    np.testing.assert_allclose(
-        stress.ustar_over_ustar0_wall[middle], stress.ustar_over_ustar0_eq10[middle], rtol=0.01
+    """Along 60 h the flow does not change, and the log law of the wall holds from U_e to z_e."""
+    flow = replace(
+        PILE, slope_deg=0.0, roughness_m=roughness, first_cell_m=first_cell, cells_per_face=40
     )
+    directory = solved_flat(flow, tmp_path)
+    stress = read_openfoam(directory)
+    assert np.ptp(stress.x_m[np.abs(stress.x_m) < 0.8]) > 60 * flow.height_m
+    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.002)
+    assert approach_ustar(directory) == pytest.approx(1, abs=0.015)
+    np.testing.assert_allclose(stress.ustar_over_ustar0_eq10, 1.0, atol=0.02)
     printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
     z_over_z0 = first_cell / 2.0 / roughness
     np.testing.assert_allclose(printed, np.log(z_over_z0 + 1.0) / np.log(z_over_z0), rtol=1e-4)
+
+
+@pytest.mark.parametrize("slope", [15.0, 30.0])
+def test_a_domain_twice_as_large_gives_the_same_stress(solve: Solve, slope: float) -> None:
+    flow = replace(PILE, slope_deg=slope)
+    larger = replace(flow, lid=2 * flow.lid, upstream=2 * flow.upstream, downstream=200.0)
+    ratio = windward_mean(solve(larger), larger) / windward_mean(solve(flow), flow)
+    assert ratio**2 == pytest.approx(1, abs=0.01)
+    small = replace(flow, lid=10.0, upstream=10.0, downstream=20.0)
+    assert windward_mean(solve(small), small) > 1.02 * windward_mean(solve(flow), flow)
 
 
 @pytest.mark.parametrize("slope", [15.0, 30.0])
@@ -100,7 +125,7 @@ def test_a_finer_mesh_gives_the_same_mean(solve: Solve, slope: float) -> None:
     coarse = replace(PILE, slope_deg=slope)
     fine = replace(coarse, cells_per_face=32)
     means = [windward_mean(solve(flow), flow) for flow in (coarse, fine)]
-    assert means[0] == pytest.approx(means[1], rel=0.01)
+    assert means[0] == pytest.approx(means[1], rel=0.02)
 
 
 @pytest.mark.parametrize(("speed", "tolerance"), [(5.0, 0.01), (20.0, 0.005)])
@@ -234,7 +259,7 @@ def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) 
 
 def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
     with pytest.raises(SolverError, match=r"z_e is 0.5 to 0.5 of what the first"):
-        replace(PILE, first_cell_m=2e-3).collect(solve(PILE))
+        replace(PILE, first_cell_m=1e-3).collect(solve(PILE))
 
 
 @pytest.mark.parametrize(
@@ -262,14 +287,14 @@ def test_an_unusable_field_is_named(field: str, value: Any) -> None:
 
 @pytest.mark.parametrize("model", ["RNGkEpsilon", "realizableKE", "kOmegaSST"])
 def test_other_models_of_turbulence_keep_a_flat_beds_friction_velocity(
-    solve: Solve, model: Turbulence
+    tmp_path: Path, model: Turbulence
 ) -> None:
-    """Less well than k-epsilon, whose constants are those of the approaching flow."""
+    """Their log law is another than k-epsilon's, whose constants are those of the lid."""
     flat = replace(PILE, slope_deg=0.0, turbulence_model=model)
-    stress = WallStress.from_csv(solve(flat) / WALL_STRESS)
-    middle = np.abs(stress.x_m) < 0.1
-    np.testing.assert_allclose(stress.ustar_over_ustar0_wall[middle], 1.0, atol=0.06)
-    assert not np.allclose(stress.ustar_over_ustar0_wall[middle], 1.0, atol=0.02)
+    directory = solved_flat(flat, tmp_path)
+    stress = read_openfoam(directory)
+    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.01)
+    assert 0.01 < abs(approach_ustar(directory) - 1) < diagnostics.APPROACH_ERROR
 
 
 def test_upwind_convection_gives_a_windward_stress_that_is_too_high(solve: Solve) -> None:
@@ -297,14 +322,11 @@ def test_upwind_convection_reattaches_too_early(solve: Solve) -> None:
     assert (solve(upwind) / DIAGNOSTICS).read_text().splitlines()[-1].endswith(",no")
 
 
-@pytest.mark.parametrize("change", [{"viscosity_m2_s": 1e-3}, {"first_cell_m": 5e-5}])
-def test_a_wall_function_out_of_its_range_is_seen_upstream(
-    tmp_path: Path, change: dict[str, Any]
-) -> None:
-    beyond = replace(PILE, **change)
+def test_a_flow_that_is_not_turbulent_at_the_bed_has_no_answer(tmp_path: Path) -> None:
+    beyond = replace(PILE, viscosity_m2_s=1e-3)
     directory = case.prepare(beyond, tmp_path)
-    assert allrun(directory).returncode == 0
-    with pytest.raises(SolverError, match=r"on the undisturbed bed u\* is (1\.|0\.9)"):
+    assert allrun(directory).returncode == 1
+    with pytest.raises(Stalled, match="did not converge"):
         beyond.collect(directory)
 
 
@@ -322,4 +344,6 @@ def test_finer_and_steeper_cases_cost_more() -> None:
 
 def test_the_default_first_cell() -> None:
     assert default_first_cell_height(0.02, 1e-6) == pytest.approx(5e-4)
-    assert default_first_cell_height(0.02, 1e-4) == pytest.approx(2e-3)
+    assert default_first_cell_height(0.02, 4e-4) == pytest.approx(1e-3)
+    assert default_first_cell_height(0.02, 1e-6, viscous=4e-4) == pytest.approx(1e-3)
+    assert default_first_cell_height(0.02, 5e-3) == pytest.approx(5e-3)

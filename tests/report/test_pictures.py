@@ -38,10 +38,10 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     edges = mesh.read_edges(results.cases / pile.flow.name)
     table = results.tables["wall_stress"]
     faces = len(table)
-    # of a grid of quadrilaterals; its height is that of the lid
-    rows = (len(edges) - faces) // (2 * faces + 1)
-    assert len(edges) == (2 * rows + 1) * faces + rows
-    assert edges[..., 1].max() == pytest.approx(10 * pile.bed.height)
+    # of a grid of quadrilaterals and the one column before it; its height is that of the lid
+    rows = (len(edges) - faces - 1) // (2 * faces + 4)
+    assert len(edges) == (2 * rows + 1) * faces + rows + (3 * rows + 1)
+    assert edges[..., 1].max() == pytest.approx(pile.flow.lid * pile.bed.height)
     middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
     line = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
     assert len(middles.intersection(line)) > 0.9 * faces

@@ -1,0 +1,35 @@
+"""The table of flows: what each was solved with, where it separates, how it speeds up."""
+
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.flow import diagnostics
+from orchestrator.grains.pile import Pile
+from orchestrator.tables.scenes import Row
+
+
+def row(pile: Pile, cases: Path) -> Row:
+    """What the solved flow of a pile is over: one row for all piles that share it."""
+    flow, stress, line = pile.flow, pile.stress(cases), pile.model.line
+    bubble = diagnostics.bubble(stress, line.h) or (np.nan, np.nan)
+    ustar = stress.ustar_over_ustar0_wall
+    windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
+    length = stress.length_m[windward]
+    return {
+        "flow_case": flow.name,
+        "bed_shape": pile.bed.shape if not pile.bed.profile else "profile",
+        "alpha_deg": pile.bed.slope_deg,
+        "h_m": flow.height_m,
+        "z0_m": flow.roughness_m,
+        "turbulence_model": flow.turbulence_model,
+        "first_cell_m": flow.first_cell_m,
+        "lid_over_h": flow.lid,
+        "upstream_over_h": flow.upstream,
+        "downstream_over_h": flow.downstream,
+        "separation_over_h": bubble[0],
+        "reattachment_over_h": bubble[1],
+        "ustar_top": float(np.interp(line.crest_s, stress.s_m, ustar)),
+        "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
+        "ustar_largest": float(ustar.max()),
+    }
