@@ -30,6 +30,8 @@ BARE = 1.0
 """Grains this near to an obstacle are fixed under its foot, diameters."""
 TOUCH = 1e-3
 """Two grains closer than this touch, diameters."""
+LOWER = 0.1
+"""A neighbour bears a grain that stands so much over it, diameters."""
 UNDER = 2
 """Rows of fixed grains where none is counted: none falls through them."""
 
@@ -84,6 +86,7 @@ def cover(
     slack = (SLIT if pattern == "aligned" else TIE) if even else max(SLIT, disorder)
     seen = exposed(centres, top.tangents[under], slack, STRAY if slack > TIE else TIE)
     there = segments[under] & within(centres[:, 0], counts) & ~_near(centres[:, 0], line.bare)
+    seen &= depth < 1
     near = depth < (mobile_layers - 0.5) * np.sin(beta)
     mobile = there & near & _rests(centres)
     counted = mobile & seen
@@ -277,12 +280,13 @@ def _both_ways(centres: FloatArray, reach: float) -> Iterator[tuple[NDArray[np.i
 
 
 def _rests(centres: FloatArray) -> BoolArray:
-    """Which grains touch one upstream and one downstream that lie no higher."""
-    sides = np.zeros((2, len(centres)), bool)
+    """Which grains touch one upstream and one downstream that lie no higher, one of them lower."""
+    sides = np.zeros((3, len(centres)), bool)
     for one, other in _both_ways(centres, 1 + TOUCH):
         apart = centres[other] - centres[one]
         below = apart[:, 1] <= TOUCH
-        for side, beside in enumerate((apart[:, 0] <= 0, apart[:, 0] > 0)):
+        under = apart[:, 1] < -LOWER
+        for side, beside in enumerate((apart[:, 0] <= 0, apart[:, 0] > 0, under)):
             sides[side, one[below & beside]] = True
     return np.asarray(sides.all(axis=0))
 

@@ -129,9 +129,11 @@ class BedLine:
 
     def roof(self, clearance: float) -> tuple[float, FloatArray]:
         """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""
-        apart = np.delete(self.corners[1:-1], self.top - 1, axis=0) - self.crest
+        inner = self.corners[1:-1]
+        ridge = inner[np.argmax(inner[:, 1])]
+        apart = inner[inner[:, 0] != ridge[0]] - ridge
         steep = np.abs(np.arctan2(-apart[:, 1], np.abs(apart[:, 0]))).min()
-        return float(np.degrees(steep)), self.crest + np.array([0, clearance / np.cos(steep)])
+        return float(np.degrees(steep)), ridge + np.array([0, clearance / np.cos(steep)])
 
     def depth(self, points: FloatArray, segment: int) -> FloatArray:
         """Signed distance of points (m, 2) below the straight line of a segment, shape (m,)."""

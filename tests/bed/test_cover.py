@@ -44,6 +44,7 @@ def test_grains_do_not_overlap_and_mobile_ones_rest_on_two(name: str, pattern: P
     holds = (apart < 1 + 1e-3) & (z < 1e-3)
     rests = (holds & (x <= 0)).any(axis=1) & (holds & (x > 0)).any(axis=1)
     assert rests[found.mobile].all()
+    assert (holds & (z < -0.1)).any(axis=1)[found.mobile].all()
     assert found.mobile[found.windward].all()
     assert not (found.windward & found.lee).any()
 
