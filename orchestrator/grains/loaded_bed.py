@@ -13,6 +13,7 @@ from orchestrator.bed.cover import cover
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
 from orchestrator.bed.poured_case import PouredBed
+from orchestrator.bed.pouring import APRON
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
@@ -109,7 +110,10 @@ class LoadedBed:
         if not self.scene.is_poured:
             return ()
         line, grain = self.line, self.scene.grain
-        x, z = (tuple(round(v, DIGITS) for v in values) for values in (line.x, line.z))
+        # the bed does not depend on how far the flow's domain goes on before and behind it
+        ends = (max(line.x[0], line.x[1] - APRON), min(line.x[-1], line.x[-2] + APRON))
+        x = tuple(round(v, DIGITS) for v in (ends[0], *line.x[1:-1], ends[1]))
+        z = tuple(round(v, DIGITS) for v in line.z)
         bed = PouredBed(
             line=replace(line, x=x, z=z),
             depth=self.bed.poured_depth,

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator import plan
 from orchestrator.errors import InputError
+from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.study import sizes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal, Sizes
@@ -138,3 +139,14 @@ def test_more_grains_than_a_machine_bears_are_refused() -> None:
     asked = study.parse(f"{bed}\ngrain = {{ diameter = 1e-3 }}", name="m", where="m")
     with pytest.raises(InputError, match=r"bed.packing: about 4e\+05 grains"):
         plan.make(asked)
+
+
+def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
+    text = """
+    bed = { kind = "pile", shape = "flat", length = %g, packing = "poured" }
+    grain = { diameter = %g, sizes = { sigma_g = 1.3 } }
+    flow = { model = "flat" }
+    protocol = { method = "peeling" }
+    """
+    scenes = [study.parse(text % (80 * d, d), name="m", where="m").scenes[0] for d in (1e-4, 2e-3)]
+    assert len({LoadedBed(scene).pouring[0].id for scene in scenes}) == 1
