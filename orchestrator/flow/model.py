@@ -13,7 +13,7 @@ from orchestrator.flow import theory
 from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress, undisturbed_ustar
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import BUILDABLE_DEG, Scene
 
 FIELD_OF = {
     "height_m": "bed.height",
@@ -102,7 +102,8 @@ class Solved(FlowModel):
                 lid=flow.lid,
                 upstream=flow.upstream,
                 downstream=flow.downstream,
-                slope_deg=bed.slope_deg,
+                # on a gentler profile cells are as fine as on flat bed
+                slope_deg=bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0,
                 height_m=bed.height,
                 roughness_m=self.scene.solve_roughness,
                 speed_m_s=flow.speed,

@@ -49,7 +49,7 @@ class Profiles:
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
             smoothing = 0.0  # the model will refuse it
         found = profile.read(self._text(name), Path(name).name, self._place(name), smoothing)
-        return {"profile": found, "height": found.height, "slope_deg": found.steepest_deg}
+        return {"profile": found, "height": found.height, "slope_deg": round(found.steepest_deg, 2)}
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
         """The rows of a sieve table that a study file names; `where` names the study file.

@@ -13,7 +13,9 @@ from orchestrator.bed.shapes import between_flats, of_bed
 from orchestrator.errors import SolverError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import Mesh, first_cell_heights, smallest_jacobian, write_mesh
+from orchestrator.flow.model import model
 from orchestrator.runs import assets, case
+from orchestrator.study import study
 from orchestrator.study.scene import default_first_cell_height
 from tests.bed.test_shapes import SHAPES, H, bed
 from tests.flow.conftest import PILE
@@ -145,3 +147,13 @@ def test_what_gmsh_says_reaches_the_user(template: Path) -> None:
         write_mesh(template)
     edit(template / "parameters.geo", "height = two;", "height = 0.02;")
     write_mesh(template)
+
+
+def test_a_gentle_profile_has_a_mesh(tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text("x_m,z_m\n0,0\n1,0.01\n2,0\n")
+    text = 'grain = { diameter = 1e-3 }\nbed = { kind = "pile", profile = "scan.csv" }'
+    scene = study.parse(text, name="a", where=str(tmp_path / "a.toml")).scenes[0]
+    (flow,) = model(scene).cases
+    directory = case.prepare(flow, tmp_path)
+    assert (directory / "profile.csv").read_text() == (tmp_path / "scan.csv").read_text()
+    np.testing.assert_allclose(first_cell_heights(written(directory)), flow.first_cell_m, rtol=0.01)
