@@ -17,7 +17,7 @@ from orchestrator.benchmark.problem import (
     parameters,
     place,
 )
-from orchestrator.flow.case import FlowCase
+from orchestrator.flow.case import SPEED_HEIGHT, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import MARGIN
@@ -40,8 +40,6 @@ to 20 % of N and six load steps apart (docs/benchmark.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
 round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
-LID = 10.0
-"""Height of the flow's domain, h."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,8 @@ def flow_parameters(one: Answered) -> dict[str, Any]:
         "z0_m": case.roughness_m,
         "u_e_m_s": case.speed_m_s,
         "ustar0_m_s": case.ustar0_m_s,
-        "lid_m": LID * case.height_m,
+        "lid_m": SPEED_HEIGHT * case.height_m,
+        "domain_height_m": case.lid * case.height_m,
         "solve_nu_m2_s": case.viscosity_m2_s,
         "rho_f_kg_m3": one.pile.scene.fluid.density,
         "first_cell_m": case.first_cell_m,

@@ -115,6 +115,8 @@ _PROTOCOL = ("displacement_criterion", "waiting_time", "load_increment")
 _SOURCE = ("averaging_length", "loaded_grains", "mobile_layers", "turbulence_model")
 _NUMERICS = (
     "expansion_ratio",
+    # the domain is told by its bed line and height
+    *("lid", "upstream", "downstream"),
     "convection_scheme",
     "non_orthogonal_correctors",
     "method",

@@ -463,18 +463,20 @@ class Flow(Part):
     ] = "linearUpwind"
     """OpenFOAM's scheme for the convection of U"""
     lid: Annotated[
-        float, Field(ge=3, le=1000), Info("lid", unit="h", scope="solved flows", about="answer")
+        float,
+        Field(ge=3, le=1000, exclude_if=lambda value: value == 100.0),
+        Info("lid", unit="h", scope="solved flows", about="answer"),
     ] = 100.0
     """height of the lid above the flat bed; the flow there is that of the undisturbed log layer"""
     upstream: Annotated[
         float,
-        Field(ge=3, le=1000),
+        Field(ge=3, le=1000, exclude_if=lambda value: value == 80.0),
         Info("flat bed upstream", unit="h", scope="solved flows", about="answer"),
     ] = 80.0
     """flat bed from the inlet to the forms"""
     downstream: Annotated[
         float,
-        Field(ge=3, le=1000),
+        Field(ge=3, le=1000, exclude_if=lambda value: value == 100.0),
         Info("flat bed downstream", unit="h", scope="solved flows", about="answer"),
     ] = 100.0
     """flat bed from the forms to the outlet"""
