@@ -319,7 +319,7 @@ def _made_by(case: Case, directory: Path) -> Callable[[str], bool]:
     patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
 
     def is_ours(name: str) -> bool:
-        if name in known:
+        if name in known and not _fits(name, case.made):
             return bool(known[name] == _digest(directory / name))
         path = PurePosixPath(name)
         meant = path.with_name(TEMPORARY.sub(r"\1", path.name)).as_posix()
