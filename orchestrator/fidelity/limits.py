@@ -135,6 +135,12 @@ def _theory(scene: Scene) -> str | None:
     return "the linear theory is of one form with a straight windward side"
 
 
+def _flat(scene: Scene) -> str | None:
+    bed = _solved(scene)
+    level = bed and bed.shape == "flat" and not bed.profile and not bed.obstacles
+    return "over a flat bed there is nothing to solve: u* is u*_0 everywhere" if level else None
+
+
 def _first_cell(scene: Scene) -> str | None:
     if not _solved(scene) or scene.solve_roughness <= scene.first_cell_height:
         return None
@@ -256,6 +262,13 @@ LIMITS = (
         _theory,
         "The linear theory is of one form with a straight windward side: others are refused.",
         'choose "solve"',
+    ),
+    Limit(
+        "slope",
+        "flow.model",
+        _flat,
+        "The flow over a flat bed is not solved.",
+        'choose "flat"',
     ),
     Limit(
         "first-cell",

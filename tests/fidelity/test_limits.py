@@ -105,6 +105,15 @@ def test_beds_that_no_grains_lie_on_are_refused(bed: str, says: str) -> None:
         limits.check_study(study.parse(text, name="t", where="t"))
 
 
+def test_a_flat_bed_is_not_solved() -> None:
+    bed = 'kind = "pile", shape = "flat", roughness = "d/30"'
+    text = f"grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\n"
+    with pytest.raises(InputError, match="nothing to solve") as told:
+        limits.check_study(study.parse(text, name="flat", where="flat"))
+    assert told.value.remedy.startswith('choose "flat"')
+    limits.check_study(study.parse(text + 'flow = { model = "flat" }', name="f", where="f"))
+
+
 def test_the_theory_is_of_one_form() -> None:
     text = 'grain = { diameter = 1e-3 }\nflow = { model = "hill" }\nbed = { kind = "pile", '
     with pytest.raises(InputError, match="the linear theory is of one form"):
