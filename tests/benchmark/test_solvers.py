@@ -360,10 +360,12 @@ def test_a_command_that_cannot_work(
 
 
 def test_no_shell_reads_the_command(formulas: Path, tmp_path: Path) -> None:
-    command = _program(tmp_path, TAIL) + "; touch $HOME `touch shell`"
+    command = _program(tmp_path, TAIL)
+    with pytest.raises(InputError, match="no shell reads the command"):
+        runner.run(formulas, command + "; touch shell", tmp_path / "results", Choice(), Limits())
     runner.run(
         formulas,
-        command,
+        command + " $HOME `touch shell` $(touch shell)",
         tmp_path / "results",
         Choice(patterns=("2-incline-5",)),
         Limits(seconds=60.0),

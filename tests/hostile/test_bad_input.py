@@ -376,4 +376,4 @@ def test_names_that_are_no_text(tmp_path: Path) -> None:
     source.write_text(GRAIN + "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n")
     ended = _process(tmp_path, "study", str(source), "--out", out)
     assert ended.returncode == 0, ended.stderr
-    assert Path(os.fsdecode(ended.stdout.rstrip(b"\n"))) == tmp_path / out / "report.html"
+    assert Path(os.fsdecode(ended.stdout.splitlines()[-1])) == tmp_path / out / "report.html"

@@ -100,8 +100,9 @@ def test_a_program_that_may_not_be_run(
 ) -> None:
     path = put("#!/bin/sh\n", mode=stat.S_IRUSR)
     monkeypatch.setenv("PATH", str(tmp_path))
-    # OpenFOAM's mesh reader is looked for first
-    (tmp_path / "gmshToFoam").symlink_to("/bin/true")
+    # OpenFOAM's other programs are looked for first
+    for other in ("gmshToFoam", "setExprFields"):
+        (tmp_path / other).symlink_to("/bin/true")
     with pytest.raises(SolverError, match=f"{path} may not be run .chmod"):
         VERSIONS[name]()
 
