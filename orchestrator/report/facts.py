@@ -268,7 +268,7 @@ def _stray_grains(results: Results) -> list[str]:
             f"{int((far & valid(grains)).sum())} where their law holds."
         )
     if silent.any():
-        found.append(f"Single grains that did not move in any hold: {int(silent.sum())}.")
+        found.append(f"Single grains that did not move in any load step: {int(silent.sum())}.")
     return found
 
 
