@@ -136,7 +136,8 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str)
 
 def test_more_grains_than_a_machine_bears_are_refused() -> None:
     bed = 'bed = { kind = "pile", shape = "flat", length = 50.0, packing = "poured" }'
-    asked = study.parse(f"{bed}\ngrain = {{ diameter = 1e-3 }}", name="m", where="m")
+    text = f'{bed}\ngrain = {{ diameter = 1e-3 }}\nflow = {{ model = "flat" }}'
+    asked = study.parse(text, name="m", where="m")
     with pytest.raises(InputError, match=r"bed.packing: about 4e\+05 grains"):
         plan.make(asked)
 
