@@ -118,7 +118,8 @@ class FlowCase(Case):
         "postProcessing/wallShearStress/*/wallShearStress.dat",
     )
     made: ClassVar[tuple[str, ...]] = (
-        "0/*",  # the run itself writes the approaching flow into them
+        # the run itself writes the approaching flow into them
+        *(f"0/{field}" for field in ("U", "epsilon", "k", "nut", "omega", "p")),
         "log.gmshToFoam",
         "log.setExprFields",
         "log.simpleFoam",
