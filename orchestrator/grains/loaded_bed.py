@@ -186,9 +186,17 @@ class LoadedBed:
         ndarray, shape (n,)
             Of the mean stress around each grain; positive is downstream.
         """
+        return self.ratio(self.stress(cases), self.line)
+
+    def ratio(self, stress: WallStress, line: BedLine) -> FloatArray:
+        """The same under the stress along a line (d) that the bed may have worn down to."""
         how, d = self.scene.forces, self.scene.grain.diameter
         length = max(d, how.averaging_length * self.bed.height)
-        tau = self.stress(cases).mean_over(self.packing.arc_length * d, length, how.stress)
+        s = self.packing.arc_length
+        if line is not self.line:
+            x = np.interp(s, self.line.arc_lengths, self.line.x)
+            s = np.interp(x, line.x, line.arc_lengths)
+        tau = stress.mean_over(s * d, length, how.stress)
         return np.where(self._forgotten, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
 
     @property
@@ -276,13 +284,15 @@ class LoadedBed:
         found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
         return np.asarray(found[packed.windward])
 
-    def leaving(self, ratio: FloatArray) -> FloatArray:
+    def leaving(self, ratio: FloatArray, there: NDArray[np.bool_] | None = None) -> FloatArray:
         """Undisturbed friction velocity at which each windward grain leaves by peeling, m/s.
 
         Parameters
         ----------
         ratio : ndarray, shape (n,)
             Local friction velocity over the undisturbed one, signed.
+        there : ndarray of bool, shape (n,), optional
+            The grains that are there; by default all.
         """
         found = peeling.flows(
             self.packing.centres,
@@ -291,6 +301,7 @@ class LoadedBed:
             self.force_tables,
             along=self.downflow(ratio),
             marker=self.scene.protocol.displacement_criterion,
+            there=there,
         )
         return np.asarray(found[self.packing.windward])
 

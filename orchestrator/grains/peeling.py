@@ -55,6 +55,7 @@ def flows(
     *,
     along: FloatArray,
     marker: float,
+    there: BoolArray | None = None,
 ) -> FloatArray:
     """The flow at which each grain leaves.
 
@@ -72,6 +73,8 @@ def flows(
         Unit vectors along the bed, the way that the flow pushes the grain.
     marker : float
         Displacement along it that counts as motion, of the grain's own diameter.
+    there : ndarray of bool, shape (n,), optional
+        The grains that are there; by default all.
 
     Returns
     -------
@@ -79,10 +82,10 @@ def flows(
         Undisturbed friction velocity, m/s; infinite for grains that never leave.
     """
     grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
-    near = dict(_neighbours(centres, sizes, loading.ratio != 0))
+    present = np.ones(len(centres), bool) if there is None else there.copy()
+    near = dict(_neighbours(centres, sizes, present & (loading.ratio != 0)))
     ratio, tangents = loading.ratio.tolist(), loading.along.tolist()
     normals, ups = loading.outward.tolist(), along.tolist()
-    present = np.ones(len(centres), bool)
     left = np.full(len(centres), np.inf)
 
     next_flow = np.full(len(centres), np.inf)

@@ -1,6 +1,7 @@
 """From thresholds under each alternative to the share of each choice, and their sum."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from orchestrator.fidelity import calibration
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import Levels
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import of_pile
+from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
@@ -63,68 +64,51 @@ def changes(study: Study, piles: Mapping[str, Pile], cases: Path) -> pd.DataFram
     cases : Path
         Where the runs lie.
     """
-    found: dict[str, dict[float, dict[str, float]]] = {}
-
-    def thresholds(key: str) -> dict[float, dict[str, float]]:
-        if key not in found:
-            found[key] = _thresholds(piles[key], cases)
-        return found[key]
-
-    rows: list[dict[str, Any]] = []
-    for scene in (one for one in study.scenes if isinstance(one.bed, PileBed)):
-        for choice in CHOICES:
-            base = key_of(scene, BASE, choice.levels)
-            for name, _ in _others(choice, scene):
-                key = key_of(scene, name, choice.levels)
-                if base not in piles or key not in piles:
-                    continue
-                alternative = name.partition(": ")[2]
-                for fraction, before in thresholds(base).items():
-                    after = thresholds(key)[fraction]
-                    moved = {one: after[one] / before[one] - 1 for one in QUANTITIES}
-                    rows.append(
-                        {
-                            "scene_id": scene.id,
-                            "scene": label(scene),
-                            "model_class": calibration.model_class(scene),
-                            "choice": choice.name,
-                            "alternative": alternative,
-                            "fraction": fraction,
-                            **moved,
-                        }
-                    )
-    return pd.DataFrame(rows)
+    thresholds = cache(lambda key: list(_thresholds(piles[key], cases)))
+    return pd.DataFrame(
+        _row(scene, choice.name, name.partition(": ")[2], before, after)
+        for scene in study.scenes
+        if isinstance(scene.bed, PileBed)
+        for choice in CHOICES
+        for base in (key_of(scene, BASE, choice.levels),)
+        for name, _ in _others(choice, scene)
+        for key in (key_of(scene, name, choice.levels),)
+        if base in piles and key in piles
+        for before, after in zip(thresholds(base), thresholds(key), strict=True)
+    )
 
 
-def _thresholds(pile: Pile, cases: Path) -> dict[float, dict[str, float]]:
+def _thresholds(pile: Pile, cases: Path) -> Iterator[PileThreshold]:
     motion, speed, scene = pile.motion(cases), pile.face(cases).speed, pile.scene
-    found = {}
     for fraction in scene.protocol.fractions:
-        one = of_pile(motion, speed, fraction, scene.fluid.density)
-        found[fraction] = {"shields": one.tau, "ustar0": one.ustar0}
-    return found
+        yield of_pile(motion, speed, fraction, scene.fluid.density)
+
+
+def _row(
+    scene: Scene, choice: str, alternative: str, before: PileThreshold, after: PileThreshold
+) -> dict[str, Any]:
+    """How far an alternative moves a threshold."""
+    return {
+        "scene_id": scene.id,
+        "scene": label(scene),
+        "model_class": calibration.model_class(scene),
+        "choice": choice,
+        "alternative": alternative,
+        "fraction": before.fraction,
+        "shields": after.tau / before.tau - 1,
+        "ustar0": after.ustar0 / before.ustar0 - 1,
+    }
 
 
 def of_wear(piles: Mapping[str, Wear]) -> pd.DataFrame:
     """The same rows for the choice to keep the flow of the whole pile until the end."""
-    rows: list[dict[str, Any]] = []
-    for scene_id, one in piles.items():
-        scene = one.bed.scene
-        for fraction in (at for at in scene.protocol.fractions if at <= one.fraction):
-            frozen, worn = one.thresholds(fraction)
-            rows.append(
-                {
-                    "scene_id": scene_id,
-                    "scene": label(scene),
-                    "model_class": calibration.model_class(scene),
-                    "choice": FROZEN,
-                    "alternative": f"drawn anew after each {UPDATE:.0%} of N",
-                    "fraction": fraction,
-                    "shields": worn.tau / frozen.tau - 1,
-                    "ustar0": worn.ustar0 / frozen.ustar0 - 1,
-                }
-            )
-    return pd.DataFrame(rows)
+    alternative = f"drawn anew after each {UPDATE:.0%} of N"
+    return pd.DataFrame(
+        _row(one.bed.scene, FROZEN, alternative, *one.thresholds(fraction))
+        for one in piles.values()
+        for fraction in one.bed.scene.protocol.fractions
+        if fraction <= one.fraction
+    )
 
 
 def shares(moved: pd.DataFrame) -> pd.DataFrame:

@@ -17,9 +17,7 @@ from orchestrator import pipeline
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import peeling
 from orchestrator.grains.loaded_bed import LoadedBed
-from orchestrator.grains.loading import Loading
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.runs.case import Case, is_done
@@ -93,12 +91,13 @@ class Wear:
     def go_on(self, cases: Path) -> None:
         """Let the next tenth leave under the solved flow, and draw the bed line anew."""
         self.ran.append(self.case.name)
-        ratio = self._ratio(WallStress.from_csv(cases / self.ran[-1] / WALL_STRESS))
+        stress = WallStress.from_csv(cases / self.ran[-1] / WALL_STRESS)
+        ratio, windward = self.bed.ratio(stress, self.lines[-1]), self.bed.packing.windward
+        leaving = self.bed.leaving(ratio, np.isinf(self.left))
         if len(self.lines) == 1:
-            leaving = self._leaving(ratio)
-            self.first, self.frozen = ratio, leaving[self.bed.packing.windward]
-        counted = np.flatnonzero(self.bed.packing.windward & np.isinf(self.left))
-        flows = np.maximum(self._leaving(ratio)[counted], self.reached)
+            self.first, self.frozen = ratio, leaving
+        here = np.isinf(self.left[windward])
+        counted, flows = np.flatnonzero(windward)[here], np.maximum(leaving[here], self.reached)
         order = np.argsort(flows, kind="stable")
         order = order[np.isfinite(flows[order])]
         total = self.bed.packing.count
@@ -108,36 +107,6 @@ class Wear:
         self.left[chosen], self.speed[chosen] = flows[first], ratio[chosen]
         self.reached = float(flows[first].max(initial=self.reached))
         self.lines.append(sunk(self.bed, np.isinf(self.left)))
-
-    def _leaving(self, ratio: FloatArray) -> FloatArray:
-        """The flow at which each grain that is there would leave, shape (n,)."""
-        there = np.isinf(self.left)
-        whole, tables = self.bed.loading(ratio), self.bed.force_tables
-        found = np.full(len(there), np.inf)
-        found[there] = peeling.flows(
-            self.bed.packing.centres[there],
-            self.bed.packing.sizes[there],
-            Loading(
-                whole.drag,
-                whole.lift,
-                whole.ratio[there],
-                whole.along[there],
-                whole.outward[there],
-            ),
-            [table for table, here in zip(tables, there, strict=True) if here],
-            along=self.bed.tangents[there],
-            marker=self.bed.scene.protocol.displacement_criterion,
-        )
-        return found
-
-    def _ratio(self, stress: WallStress) -> FloatArray:
-        """Local friction velocity over the undisturbed one at each grain, signed, shape (n,)."""
-        how, d = self.bed.scene.forces, self.bed.scene.grain.diameter
-        length = max(d, how.averaging_length * self.bed.bed.height)
-        whole, now = self.lines[0], self.lines[-1]
-        x = np.interp(self.bed.packing.arc_length, whole.arc_lengths, whole.x)
-        tau = stress.mean_over(np.interp(x, now.x, now.arc_lengths) * d, length, how.stress)
-        return np.sign(tau) * np.sqrt(np.abs(tau))
 
     def thresholds(self, fraction: float) -> tuple[PileThreshold, PileThreshold]:
         """Under the flow of the whole pile, and with the bed that changes."""

@@ -7,30 +7,20 @@ import pytest
 
 from orchestrator.experiments.budget import shares
 from orchestrator.experiments.budget.choices import CHOICES
-from orchestrator.study import study
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
+from tests.experiments.budget.conftest import scene
 
 ROWS = {"scene_id": "a", "scene": "a", "model_class": "aligned, rough", "fraction": 0.3}
 
 
-def _scene(**bed: object) -> Scene:
-    fields = "".join(f", {name} = {value!r}" for name, value in bed.items())
-    text = f"""
-        grain = {{ diameter = 1e-3 }}
-        bed = {{ kind = "pile", slope_deg = 15.0, roughness = "d/30"{fields} }}
-    """
-    (scene,) = study.parse(text, name="one", where="test").scenes
-    return scene
-
-
-def _others(choice: str, scene: Scene) -> dict[str, Scene]:
+def _others(choice: str, of: Scene) -> dict[str, Scene]:
     (one,) = (one for one in CHOICES if one.name == choice)
-    return dict(one.scenes(scene))
+    return dict(one.scenes(of))
 
 
 def test_a_choice_changes_nothing_but_itself() -> None:
-    scene = _scene()
+    one = scene()
     parts = {
         "roughness length": "bed",
         "turbulence model": "flow",
@@ -39,29 +29,29 @@ def test_a_choice_changes_nothing_but_itself() -> None:
         "criterion of motion": "protocol",
     }
     for choice, part in parts.items():
-        others = _others(choice, scene)
+        others = _others(choice, one)
         assert others
         for other in others.values():
             changed = {
-                name for name in Scene.model_fields if getattr(other, name) != getattr(scene, name)
+                name for name in Scene.model_fields if getattr(other, name) != getattr(one, name)
             }
             assert changed == {part}
 
 
 def test_what_the_scene_has_already_is_no_alternative() -> None:
-    assert list(_others("roughness length", _scene())) == ["d/10"]
-    assert "level rows" in _others("packing", _scene())
-    assert "level rows" not in _others("packing", _scene(packing="horizontal"))
+    assert list(_others("roughness length", scene())) == ["d/10"]
+    assert "level rows" in _others("packing", scene())
+    assert "level rows" not in _others("packing", scene(packing="horizontal"))
 
 
 def test_what_a_scene_refuses_is_no_alternative() -> None:
     # neighbours of a pocket of more than 60 degrees would overlap
-    assert list(_others("entrainment angle", _scene())) == ["-5°"]
-    assert list(_others("entrainment angle", _scene(entrainment_angle_deg=52.0))) == ["-5°", "+5°"]
+    assert list(_others("entrainment angle", scene())) == ["-5°"]
+    assert list(_others("entrainment angle", scene(entrainment_angle_deg=52.0))) == ["-5°", "+5°"]
 
 
 def test_force_laws_are_those_that_hold() -> None:
-    others = _others("force law", _scene())
+    others = _others("force law", scene())
     assert others
     assert all(law_holds(other) for other in others.values())
     assert "low" not in {other.forces.law for other in others.values()}

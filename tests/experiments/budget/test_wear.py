@@ -9,31 +9,21 @@ from orchestrator.experiments.budget import wear
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.runs.claim import EXPERIMENT
 from orchestrator.runs.workspace import Workspace
-from orchestrator.study import study
-from orchestrator.study.scene import Scene
+from tests.experiments.budget.conftest import scene
 
-
-def _scene(**bed: object) -> Scene:
-    bed = {"height": 0.01, **bed}
-    fields = "".join(f", {name} = {value!r}" for name, value in bed.items())
-    text = f"""
-        grain = {{ diameter = 1e-3 }}
-        bed = {{ kind = "pile", slope_deg = 25.0, roughness = "d/30"{fields} }}
-    """
-    (scene,) = study.parse(text, name="one", where="test").scenes
-    return scene
+PILE = {"slope_deg": 25.0, "height": 0.01}
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal"])
 def test_a_whole_bed_has_not_sunk(packing: str) -> None:
-    bed = LoadedBed(_scene(packing=packing))
+    bed = LoadedBed(scene(**PILE, packing=packing))
     line = wear.sunk(bed, np.ones(len(bed.packing.centres), bool))
     x = np.linspace(line.x[0], line.x[-1], 500)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
 
 
 def test_a_bared_row_sinks_by_a_row() -> None:
-    bed = LoadedBed(_scene())
+    bed = LoadedBed(scene(**PILE))
     s = bed.packing.arc_length
     middle = bed.packing.windward & (s > 0.25 * bed.line.crest_s) & (s < 0.75 * bed.line.crest_s)
     line = wear.sunk(bed, ~middle)
@@ -48,8 +38,8 @@ def test_a_bared_row_sinks_by_a_row() -> None:
 
 
 def test_a_pile_wears_to_its_end(tmp_path: Path) -> None:
-    scene = _scene()
-    (one,) = (piles := wear.wears({scene.id: scene})).values()
+    pile = scene(**PILE)
+    (one,) = (piles := wear.wears({pile.id: pile})).values()
     space = Workspace(tmp_path / "out")
     with space.held(EXPERIMENT, "wear"):
         wear.run(piles, space, workers=2, limit_s=600.0)
@@ -69,4 +59,4 @@ def test_a_pile_wears_to_its_end(tmp_path: Path) -> None:
 
 
 def test_grains_that_the_mesh_cannot_resolve_are_left_out() -> None:
-    assert not wear.wears({"fine": _scene(height=0.2)})
+    assert not wear.wears({"fine": scene(slope_deg=25.0, height=0.2)})
