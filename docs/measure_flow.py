@@ -163,36 +163,29 @@ def models(cases: Path) -> None:
         print(f"| {name} | {flat_mean:.3f} | {means} | {', '.join(f'{x:.1f}' for x in lengths)} |")
 
 
-def hills(cases: Path) -> None:
-    """The theory against the solved flow: mean over the face and at parts of it."""
+def theories(cases: Path) -> None:
+    """Both theories against the solved flow: mean over the face and at parts of it."""
     at = np.array([0.05, 0.1, 0.3, 0.5, 0.7, 0.9, 0.98])
-    print("\n| slope | z0, m | solved | theory | without the bubble |", end="")
+    print("\n| slope | z0, m | solved | theory | mean |", end="")
     print(" | ".join(f" at {part:g}" for part in at), "|\n|" + "---|" * (5 + len(at)))
-    for slope in SLOPES[:-1]:
+    for slope in SLOPES:
         for roughness in ROUGHNESS:
             one = flow(slope, roughness)
-            stress, found = solved(one, cases), theory.hill(triangle(slope, HEIGHT), roughness)
+            stress = solved(one, cases)
             places = at * HEIGHT / np.sin(np.radians(slope))
-            theirs, ours = (np.sqrt(s.mean_over(places, HEIGHT / 40)) for s in (stress, found))
-            mean = windward_mean(one, stress)
-            means = [windward_mean(one, found), bare_triangle(slope, roughness)]
-            errors = [f"{100 * (value / mean - 1):+.0f} %" for value in means]
-            errors += [f"{100 * (a / b - 1):+.0f} %" for a, b in zip(ours, theirs, strict=True)]
-            print(f"| {slope:g} | {roughness:g} | {mean:.3f} | {' | '.join(errors)} |", flush=True)
-
-
-def bare_triangle(slope: float, roughness: float) -> float:
-    """Mean u*/u*_0 on the windward face by the theory of the triangle without a bubble."""
-    rise, half = np.tan(np.radians(slope)), HEIGHT / np.tan(np.radians(slope))
-    edges = np.linspace(0, half, 400)
-    strength, asymmetry = theory.coefficients(half / 2 / roughness)
-    integral = theory.hilbert(edges, np.array([0, half, 2 * half]), np.array([0, HEIGHT, 0]))
-    tau = 1 + strength * (integral + asymmetry * rise)
-    return float(np.mean(np.sqrt(np.maximum(tau, 0))))
+            theirs = np.sqrt(stress.mean_over(places, HEIGHT / 40))
+            for theory_of in (theory.hill, theory.waves):
+                found = theory_of(triangle(slope, HEIGHT), roughness)
+                ours = np.sqrt(found.mean_over(places, HEIGHT / 40))
+                mean = windward_mean(one, stress)
+                ratios = [windward_mean(one, found) / mean, *(ours / theirs)]
+                errors = " | ".join(f"{100 * (ratio - 1):+.0f} %" for ratio in ratios)
+                row = f"{slope:g} | {roughness:g} | {mean:.3f} | {theory_of.__name__}"
+                print(f"| {row} | {errors} |", flush=True)
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1]).absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    for measure in (flat_bed, similarity, levels, models, hills, meshes):
+    for measure in (flat_bed, similarity, levels, models, theories, meshes):
         measure(folder)

@@ -168,6 +168,7 @@ OTHER_MODEL = "standard, with another turbulence model"
 FLOW = (
     Level("flat", "log law on a flat bed: u*_0 everywhere", {"flow.model": "flat"}),
     Level("hill", "linear theory of the flow over a low hill", {"flow.model": "hill"}),
+    Level("waves", "linear theory, each wavelength by itself", {"flow.model": "waves"}),
     Level("shared", "coarse; one solve for each octave of z0/h", _shared),
     Level("coarse", "40 cells on a face, growing by 1.4 away from it", _solve(40, 1.4)),
     Level("short", "20 cells on a face, growing by 1.1", _solve(20, 1.1)),

@@ -15,6 +15,7 @@ from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
+from orchestrator.flow.theory import half_length, seen_by_the_flow
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study.parts import PileBed, UnfitError
@@ -130,9 +131,26 @@ def _bed_line(scene: Scene) -> str | None:
 
 def _theory(scene: Scene) -> str | None:
     bed = _pile(scene)
-    if not bed or scene.flow.model != "hill" or (bed.is_wedge and not bed.obstacles):
+    if not bed or scene.flow.model not in THEORIES:
         return None
-    return "the linear theory is of one form with a straight windward side"
+    try:
+        seen = seen_by_the_flow(of_bed(bed))
+    except UnfitError:  # said elsewhere
+        return None
+    steep = int(np.argmax(seen.slopes))
+    slope = float(np.degrees(np.arctan(seen.slopes[steep])))
+    if slope <= PILE_SLOPES_DEG[1] + 1e-6:
+        return None
+    return f"a bed that rises by {slope:.3g} deg at x = {seen.x[steep]:.4g} m is no low one"
+
+
+def _hill(scene: Scene) -> str | None:
+    bed = _pile(scene)
+    if not bed or scene.flow.model != "hill" or _bed_line(scene):
+        return None
+    if half_length(of_bed(bed)) is not None:
+        return None
+    return "the bed does not fall to half of its height before and behind its top"
 
 
 def _flat(scene: Scene) -> str | None:
@@ -224,6 +242,7 @@ def _scheme(scene: Scene) -> str | None:
 
 PILE_SLOPES_DEG = (10.0, 35.0)
 """Slopes of piles that the mesh and the packing have been tried for."""
+THEORIES = ("hill", "waves")
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Damping ratio, and the largest safe time step up to it."""
 LEAST_DAMPING = 0.03
@@ -260,8 +279,15 @@ LIMITS = (
         "slope",
         "flow.model",
         _theory,
-        "The linear theory is of one form with a straight windward side: others are refused.",
+        f"The linear theories are of beds that rise by {PILE_SLOPES_DEG[1]:g} deg at most.",
         'choose "solve"',
+    ),
+    Limit(
+        "slope",
+        "flow.model",
+        _hill,
+        "The theory of a hill is of beds that fall to half of their height before and behind.",
+        'choose "waves" or "solve"',
     ),
     Limit(
         "slope",

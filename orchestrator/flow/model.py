@@ -77,8 +77,16 @@ class Hill(FlowModel):
     """Linear theory of the flow over a low hill."""
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress by `orchestrator.flow.theory`."""
+        """The stress by `theory.hill`."""
         return theory.hill(self.line, self.scene.solve_roughness)
+
+
+class Waves(FlowModel):
+    """Linear theory of the flow over low waves, each wavelength by itself."""
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress by `theory.waves`."""
+        return theory.waves(self.line, self.scene.solve_roughness)
 
 
 class Solved(FlowModel):
@@ -135,7 +143,12 @@ def _shared(**fields: Any) -> FlowCase:
     return FlowCase(**fields)
 
 
-MODELS: dict[str, type[FlowModel]] = {"flat": Flat, "hill": Hill, "solve": Solved}
+MODELS: dict[str, type[FlowModel]] = {
+    "flat": Flat,
+    "hill": Hill,
+    "waves": Waves,
+    "solve": Solved,
+}
 """The models by what a study file calls them, cheap to dear."""
 
 

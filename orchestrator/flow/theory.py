@@ -1,34 +1,36 @@
-"""The stress on the bed without a solver: linear theory of a low hill, or a flat bed's log law.
+"""The stress on the bed without a solver: linear theory of a low bed, or a flat bed's log law.
 
-The theory is that of Jackson and Hunt (1975) as Hunt, Leibovich and Richards (1988) completed it
-and Kroy, Sauermann and Herrmann (2002) reduced it for dunes: the stress on a hill z = f(x) is ::
+The stress on a bed z = f(x) is, mode by mode of its Fourier transform, ::
 
-    tau/tau_0 = 1 + A (H(x) + B f'(x)),    H(x) = 1/pi p.v. int f'(x')/(x - x') dx'
+    tau/tau_0 = 1 + A H(x) + B f'(x),    H(x) = 1/pi p.v. int f'(x')/(x - x') dx'
 
-with A and B of the half length L at half height over z0. With Lambda = ln(l/z0) of the inner layer,
-l ln(l/z0) = 2 kappa^2 L, the middle layer h_m = L/sqrt(ln(L/z0)), and Euler's gamma ::
+Two theories give A and B. `hill` is that of Jackson and Hunt (1975) as Hunt, Leibovich and Richards
+(1988) completed it and Kroy, Sauermann and Herrmann (2002) reduced it for dunes: one A and one B
+for the whole bed, of the half length L at half height of its highest form over z0. With
+Lambda = ln(l/z0) of the inner layer, l ln(l/z0) = 2 kappa^2 L, the middle layer
+h_m = L/sqrt(ln(L/z0)), and Euler's gamma ::
 
     b = 1 + Lambda + 2 ln(pi/2) + 4 gamma
-    A = 2 b ln(h_m/z0)^2/Lambda^3,    B = pi/b
+    A = 2 b ln(h_m/z0)^2/Lambda^3,    B = A pi/b
 
-The hill that the flow sees is the windward face and the separation streamline behind it: a cubic
-that leaves the crest smoothly, meets the bed smoothly and falls by 14 degrees at most. Under it the
-stress is zero (`LASTS` says from where). So is it where the theory gives less than nothing, at the
-toe of steep faces.
+`waves` takes the A0 and B0 that Fourriere, Claudin and Andreotti (2010) computed for the wavelength
+lambda of each mode, from the fit to them that `of_wavelength` has.
 
-Against the solved flow (h = 0.02 m, z0 = 3.3e-6 ... 1e-4 m) u* has an error of at most 8 % in the
-mean over the windward face for 10 to 25 degrees, of 11 % at 30; from 0.3 to 0.98 of the face of
-12 % at z0/h up to 1/600 and of 20 % at 1/200. On the lowest tenth it is 7 to 60 % too low at 15
-degrees and zero from 25 on. The bare triangle without the streamline is 17 to 31 % too high in the
-mean at 15 degrees already, 64 to 103 % at 30. docs/flow.md has the numbers.
+The bed that the flow sees has separation streamlines where it falls too steeply or bends too
+sharply: cubics that leave it smoothly, land on it level and fall by 14 degrees at most. Under them
+the stress is zero (`LASTS` says from where). So is it where a theory gives less than nothing, at
+the toe of steep faces. docs/flow.md has what either is worth against the solved flow.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from math import ceil, log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
@@ -38,13 +40,15 @@ Array = NDArray[np.float64]
 
 FACES = 100
 """Faces of the bed, per h."""
-CHORDS = 100
-"""Of the separation streamline."""
+CELLS = 2 * FACES
+"""Cells of the transform, per h."""
 LASTS = 0.05
-"""The stress of the crest lasts for this far behind it, h: in the solved flow it falls to half
-within 0.01 to 0.12, and a grain on the crest is not half in the lee."""
+"""The stress of a brink lasts for this far behind it, h: in the solved flow it falls to half
+within 0.01 to 0.12, and a grain on the brink is not half in the lee."""
 STEEPEST = 0.25
-"""Slope of the separation streamline."""
+"""Slope of a separation streamline, and of a bed that the flow still follows down."""
+SHARP_DEG = 15.0
+"""Bend of a brink that the flow does not follow."""
 
 
 @cache
@@ -56,27 +60,37 @@ def flat(line: BedLine) -> WallStress:
 
 @cache
 def hill(line: BedLine, roughness_m: float) -> WallStress:
-    """The stress on the bed of a pile by the linear theory, averaged over each face exactly.
+    """The stress by the theory of one hill, averaged over each face.
 
     Parameters
     ----------
     line : BedLine
-        Of the pile, m.
+        m; it falls to half of its height before and behind its top.
     roughness_m : float
         z0, m.
     """
-    edges, height = _edges(line), float(line.crest[1])
-    x, z = seen_by_the_flow(line)
-    strength, asymmetry = coefficients(_half_length(x, z, height) / roughness_m)
-    rise = np.diff(np.interp(edges, x, z)) / np.diff(edges)
-    tau = 1 + strength * (hilbert(edges, x, z) + asymmetry * rise)
-    middle = (edges[1:] + edges[:-1]) / 2
-    under = (middle > x[1] + LASTS * height) & (middle < x[-1])
-    return _wall_stress(line, edges, np.where(under, 0, np.maximum(tau, 0)))
+    length = half_length(line)
+    assert length is not None, "fidelity/limits.py refuses such a bed"
+    strength, asymmetry = of_hill(length / roughness_m)
+    return _stress(line, lambda _: (strength, strength * asymmetry))
 
 
-def coefficients(length_over_roughness: float) -> tuple[float, float]:
-    """A and B for a hill's half length L over z0."""
+@cache
+def waves(line: BedLine, roughness_m: float) -> WallStress:
+    """The stress by the theory of each wavelength, averaged over each face.
+
+    Parameters
+    ----------
+    line : BedLine
+        m.
+    roughness_m : float
+        z0, m.
+    """
+    return _stress(line, lambda wavelength: of_wavelength(wavelength / roughness_m))
+
+
+def of_hill(length_over_roughness: float) -> tuple[float, float]:
+    """A and B/A for a hill's half length L over z0."""
     inner = asked = 2 * KARMAN**2 * length_over_roughness
     for _ in range(40):  # Newton's iteration for l ln(l/z0) = 2 kappa^2 L
         inner = (inner + asked) / (1 + log(inner))
@@ -86,36 +100,134 @@ def coefficients(length_over_roughness: float) -> tuple[float, float]:
     return 2 * b * middle**2 / depth**3, pi / b
 
 
-def hilbert(edges: Array, x: Array, z: Array) -> Array:
-    """Mean of H over each interval between edges, for a polyline that ends on the flat bed.
+def of_wavelength(wavelength_over_roughness: Array) -> tuple[Array, Array]:
+    """A0 and B0 for wavelengths over z0; waves shorter than z0 have those of z0."""
+    r = np.log(np.maximum(wavelength_over_roughness, 1))
+    a = 1.0702 + 0.093069 * r + 0.10838 * r**2 + 0.024835 * r**3
+    b = 0.036989 + 0.15765 * r + 0.11518 * r**2 + 0.0020249 * r**3
+    return (
+        2 + a / (1 + 0.041603 * r**2 + 0.0010625 * r**4),
+        b / (1 + 0.0028725 * r**2 + 0.00053483 * r**4),
+    )
 
-    Each corner, where the slope jumps by c, gives c/pi times the mean of ln|x - corner|.
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The bed that the flow sees, at equally distant places.
+
+    Attributes
+    ----------
+    x, z : array
+        Places downstream of the foot of the first form, and the height there, m; a crest is one.
+    bubbles : tuple of (float, float)
+        Where the flow leaves the bed and where it meets it again, m.
     """
-    jumps = np.diff(np.diff(z) / np.diff(x), prepend=0, append=0)
-    from_corner = edges[:, None] - x
-    distance = np.where(from_corner == 0, 1, np.abs(from_corner))
-    integral = from_corner * (np.log(distance) - 1)
-    return np.asarray(np.diff(integral @ jumps) / np.diff(edges) / pi)
+
+    x: Array
+    z: Array
+    bubbles: tuple[tuple[float, float], ...]
+
+    @property
+    def slopes(self) -> Array:
+        """Of the cells between the places."""
+        return np.diff(self.z) / np.diff(self.x)
 
 
-def seen_by_the_flow(line: BedLine) -> tuple[Array, Array]:
-    """Corners x, z (m) of the windward face and of the separation streamline behind it."""
-    crest, height_m = line.crest
-    slope = height_m / crest
+@cache
+def seen_by_the_flow(line: BedLine) -> Seen:
+    """A bed line with separation streamlines where the flow does not follow it."""
+    cell, crest = line.h / CELLS, float(line.crest[0])
+    first, last = (ceil(abs(end - crest) / cell) for end in (line.x[0], line.x[-1]))
+    x = crest + cell * np.arange(-first, last + 1, dtype=np.float64)
+    z, bubbles = line.height(x), []
+    slopes = np.diff(line.z) / np.diff(line.x)
+    sharp = (line.bends_deg[1:-1] > SHARP_DEG) & (slopes[1:] < 0)
+    leaves = np.flatnonzero(sharp | (slopes[1:] < -STEEPEST)) + 1
+    end = line.x[0]
+    for corner in leaves:
+        start, top = line.x[corner], line.z[corner]
+        if start < end or (streamline := _streamline(x, z, start, top, slopes[corner - 1])) is None:
+            continue
+        behind, heights = streamline
+        z[behind], end = heights, float(x[behind][-1])
+        bubbles.append((start, end))
+    return Seen(x, z, tuple(bubbles))
+
+
+def _streamline(
+    x: Array, z: Array, start: float, top: float, slope: float
+) -> tuple[slice, Array] | None:
+    """Places under a streamline that leaves the bed with a slope, and its heights there.
+
+    It lands at the first place that it can reach without falling more steeply than it does. None
+    where that is right behind its start.
+    """
     ratio = slope / STEEPEST / 4
-    # to second order in the ratio; the exact length grows without bounds towards 37 degrees
-    length = 1.5 * height_m / STEEPEST * (1 + ratio + 2 * ratio**2)
-    t = np.linspace(0, 1, CHORDS + 1)
-    rise = slope * length
-    z = (1 - t) ** 2 * (height_m * (1 + 2 * t) + rise * t)
-    return np.append(0, crest + length * t), np.append(0, z)
+    # length over drop, to second order; the exact one grows without bounds towards 37 degrees
+    stretch = 1.5 / STEEPEST * (1 + ratio + 2 * ratio**2)
+    first = int(np.searchsorted(x, start, side="right"))
+    drop = top - z[first:]
+    lands = first + int(np.argmax(x[first:] - start >= stretch * drop))
+    if lands - first < 2:
+        return None
+    behind = slice(first, lands + 1)
+    length = x[lands] - start
+    t = (x[behind] - start) / length
+    fall, rise = top - z[lands], slope * length
+    return behind, z[lands] + (1 - t) ** 2 * (fall * (1 + 2 * t) + rise * t)
 
 
-def _half_length(x: Array, z: Array, height_m: float) -> float:
-    """Half of the hill's length at half of the pile's height, m."""
-    top = int(np.argmax(z))
-    down = float(np.interp(-height_m / 2, -z[top:], x[top:]))
-    return float(down - x[1] / 2) / 2
+def half_length(line: BedLine) -> float | None:
+    """Half of the length of the highest form at half of its height, m.
+
+    The form ends where the flow lands behind it. None where the bed does not fall that far before
+    and behind its top.
+    """
+    seen, crest = seen_by_the_flow(line), line.crest
+    half = (float(crest[1]) + min(line.z)) / 2
+    top = int(np.searchsorted(seen.x, crest[0] - line.h / CELLS / 2))
+    below = seen.z <= half
+    if half >= crest[1] or not below[:top].any() or not below[top:].any():
+        return None
+    before, behind = top - 1 - int(np.argmax(below[:top][::-1])), top + int(np.argmax(below[top:]))
+    up = np.interp(half, seen.z[before : before + 2], seen.x[before : before + 2])
+    down = np.interp(-half, -seen.z[behind - 1 : behind + 1], seen.x[behind - 1 : behind + 1])
+    return float(down - up) / 2
+
+
+Coefficients = Callable[[Array], tuple[Array | float, Array | float]]
+"""A and B of wavelengths, m."""
+
+
+def _stress(line: BedLine, coefficients: Coefficients) -> WallStress:
+    seen = seen_by_the_flow(line)
+    tau = np.maximum(1 + response(seen.slopes, float(seen.x[1] - seen.x[0]), coefficients), 0)
+    middle = (seen.x[1:] + seen.x[:-1]) / 2
+    for start, end in seen.bubbles:
+        tau[(middle > start + LASTS * line.h) & (middle < end)] = 0
+    edges = _edges(line)
+    sums = np.append(0, np.cumsum(tau * np.diff(seen.x)))
+    return _wall_stress(line, edges, np.diff(np.interp(edges, seen.x, sums)) / np.diff(edges))
+
+
+def response(slopes: Array, cell: float, coefficients: Coefficients) -> Array:
+    """Mean of A H + B f' over each of some equal cells (m), from the slope of each.
+
+    Before and behind them the bed is level. H is exact for these slopes: each corner, where the
+    slope jumps by c, gives c/pi times the mean of ln|x - corner|.
+    """
+    count = len(slopes)
+    # level bed beside it, so that the transform's next period is far
+    size = next_fast_len(4 * count, real=True)
+    beyond = np.arange(-1.0, count + 1)
+    integral = beyond * (np.log(np.maximum(np.abs(beyond), 1)) - 1)
+    kernel = np.zeros(size)
+    kernel[:count] = np.diff(integral, 2) / pi
+    kernel[-count + 1 :] = -kernel[1:count][::-1]
+    modes = rfft(slopes, size)
+    wavelengths = size * cell / np.maximum(np.arange(len(modes)), 1)
+    a, b = coefficients(wavelengths)
+    return np.asarray(irfft((a * rfft(kernel) + b) * modes, size)[:count])
 
 
 def _edges(line: BedLine) -> Array:

@@ -49,7 +49,7 @@ Fraction = Annotated[float, Field(ge=1e-6, le=1)]
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
-Model = Literal["solve", "hill", "flat"]
+Model = Literal["solve", "waves", "hill", "flat"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
@@ -389,7 +389,8 @@ class Flow(Part):
             about="answer",
             choices={
                 "solve": "OpenFOAM",
-                "hill": "linear theory of the flow over a low hill",
+                "waves": "linear theory with A and B of each wavelength (Fourrière et al. 2010)",
+                "hill": "linear theory with A and B of one low hill (Kroy et al. 2002)",
                 "flat": "log law of a flat bed, u* = u*₀",
             },
         ),

@@ -18,6 +18,7 @@ diameter = 1e-3
 slope_deg = {slope}
 entrainment_angle_deg = {angle}
 """
+FENCE = 'slope_deg = 15.0, obstacles = [{ kind = "fence", x = -0.1, height = 0.01 }]'
 PILE = """
 [grain]
 diameter = 1e-3
@@ -114,10 +115,25 @@ def test_a_flat_bed_is_not_solved() -> None:
     limits.check_study(study.parse(text + 'flow = { model = "flat" }', name="f", where="f"))
 
 
-def test_the_theory_is_of_one_form() -> None:
-    text = 'grain = { diameter = 1e-3 }\nflow = { model = "hill" }\nbed = { kind = "pile", '
-    with pytest.raises(InputError, match="the linear theory is of one form"):
-        limits.check_study(
-            study.parse(text + 'shape = "cosine", slope_deg = 15.0 }', name="t", where="t")
-        )
-    limits.check_study(study.parse(text + "slope_deg = 15.0 }", name="t", where="t"))
+@pytest.mark.parametrize(
+    ("model", "bed", "what"),
+    [
+        ("hill", "slope_deg = 15.0", ""),
+        ("hill", 'shape = "cosine", slope_deg = 15.0, forms = 3', ""),
+        ("hill", 'shape = "step up", slope_deg = 15.0', "does not fall to half of its height"),
+        ("waves", 'shape = "step up", slope_deg = 15.0', ""),
+        ("hill", FENCE, "rises by 75 deg at x = -0.1"),
+        ("waves", FENCE, "rises by 75 deg at x = -0.1"),
+    ],
+)
+def test_the_theories_are_of_low_beds(model: str, bed: str, what: str) -> None:
+    text = (
+        f'grain = {{ diameter = 1e-3 }}\nflow = {{ model = "{model}" }}\n'
+        f'bed = {{ kind = "pile", {bed} }}'
+    )
+    asked = study.parse(text, name="t", where="t")
+    if not what:
+        limits.check_study(asked)
+        return
+    with pytest.raises(InputError, match=what):
+        limits.check_study(asked)
