@@ -15,9 +15,15 @@ from orchestrator.study.closed_form import law_holds
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene, roughness_length
 
-QUASISTATIC: Levels = {"flow": "coarse", "grains": "peeling"}
-DYNAMIC: Levels = {"flow": "coarse", "grains": "1 layer, fast"}
-"""Levels on which a choice is changed: without dynamics, and for those that dynamics alone feel."""
+QUASISTATIC, DYNAMIC = "peeling", "1 layer, fast"
+"""Levels of the grains on which a choice is changed: without dynamics, and for those that dynamics
+alone feel."""
+DYNAMIC_POURED = "4 layers, fast"
+"""The same on poured beds, where fewer mobile layers hold back the grains on them."""
+COARSE = "coarse"
+"""Level of a solved flow; another flow model is kept."""
+SEEDS = (1, 2, 3)
+"""How many other draws of a random packing are as good."""
 Alternatives = Mapping[str, Fields]
 """Values of fields by the name of the alternative."""
 
@@ -34,17 +40,28 @@ class Choice:
         Why its alternatives are as good.
     others : callable
         The alternatives for a scene, those that are the scene's own left out.
-    levels : mapping
-        On which it is changed.
+    grains : str
+        The level of the grains on which it is changed.
+    of_solved_flow : bool
+        Whether it moves nothing under a flow that is not solved.
     """
 
     name: str
     why: str
     others: Callable[[Scene], Alternatives]
-    levels: Levels
+    grains: str
+    of_solved_flow: bool = False
+
+    def levels(self, scene: Scene) -> Levels:
+        """The levels on which it is changed in a scene."""
+        poured = scene.is_poured and self.grains == DYNAMIC
+        grains: Levels = {"grains": DYNAMIC_POURED if poured else self.grains}
+        return {"flow": COARSE, **grains} if scene.flow.model == "solve" else grains
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """The scene with each alternative that can be asked of it, by the alternative's name."""
+        if self.of_solved_flow and scene.flow.model != "solve":
+            return
         for name, fields in self.others(scene).items():
             other = _asked(scene, fields)
             if other is not None and other != scene:
@@ -97,11 +114,22 @@ def _laws(scene: Scene) -> Alternatives:
     return {label: one for label, one, other in asked if other is not None and law_holds(other)}
 
 
+def _pockets(scene: Scene) -> Alternatives:
+    """Angles of a lattice's pockets; the grains of a poured bed have their own."""
+    return {} if scene.is_poured else _beside("bed.entrainment_angle_deg", -5.0, 5.0)(scene)
+
+
+def _exposures(scene: Scene) -> Alternatives:
+    return _fixed("forces.exposure", "alike", "protrusion")(scene) if scene.is_poured else {}
+
+
 def _packings(scene: Scene) -> Alternatives:
-    """The other packings of the plane, random gaps by three seeds."""
+    """Of a poured bed other seeds; else the other packings of the plane, random gaps by seeds."""
+    if scene.is_poured:
+        return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
     rows = {"rows along the slope": "aligned", "level rows": "horizontal"}
     found: dict[str, Fields] = {name: {"bed.packing": value} for name, value in rows.items()}
-    for seed in (1, 2, 3):
+    for seed in SEEDS:
         gaps = {"bed.packing": "disordered", "bed.disorder": 0.05, "bed.seed": seed}
         found[f"random gaps, seed {seed}"] = gaps
     return found
@@ -113,24 +141,28 @@ CHOICES = (
         "A wall function asks for no one height of the cells on the bed.",
         _first_cells,
         QUASISTATIC,
+        of_solved_flow=True,
     ),
     Choice(
         "turbulence model",
         "No model is right for all flows that separate.",
         _fixed("flow.turbulence_model", "kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"),
         QUASISTATIC,
+        of_solved_flow=True,
     ),
     Choice(
         "reading of the stress",
         "The paper reads it off the first cells by Eq. 10.",
         _fixed("forces.stress", "wall", "eq10"),
         QUASISTATIC,
+        of_solved_flow=True,
     ),
     Choice(
         "averaging length",
         "The stress at a sharp crest has no limit; it is averaged on a length.",
         _around("forces.averaging_length", 0.5, 2.0),
         QUASISTATIC,
+        of_solved_flow=True,
     ),
     Choice(
         "force law",
@@ -147,7 +179,7 @@ CHOICES = (
     Choice(
         "entrainment angle",
         "The pockets of one bed differ by more than that.",
-        _beside("bed.entrainment_angle_deg", -5.0, 5.0),
+        _pockets,
         QUASISTATIC,
     ),
     Choice(
@@ -163,6 +195,12 @@ CHOICES = (
         QUASISTATIC,
     ),
     Choice(
+        "exposure",
+        "The flow meets all grains of a poured bed at one height, or each at its own.",
+        _exposures,
+        QUASISTATIC,
+    ),
+    Choice(
         "criterion of motion",
         "What counts as moved is a convention: between a sixth and a half of a diameter.",
         _fixed("protocol.displacement_criterion", 0.15, 0.5),
@@ -170,7 +208,7 @@ CHOICES = (
     ),
     Choice(
         "friction angle",
-        "That of a sand is known to a few degrees.",
+        "That of a sand is known to a few degrees. A poured bed is poured anew by it.",
         _beside("grain.friction_angle_deg", -5.0, 5.0),
         DYNAMIC,
     ),
@@ -185,4 +223,5 @@ def label(scene: Scene) -> str:
     rows = {"aligned": "rows along the slope", "horizontal": "level rows"}
     named = rows.get(bed.packing, f"{bed.packing}, seed {bed.seed}")
     size = f"{1e3 * scene.grain.diameter:g} mm, ρ_f {fluid.density:g} kg/m³, ν {fluid.viscosity:g}"
-    return f"{bed.slope_deg:g}°, {size} m²/s, {named}"
+    slope = "level" if bed.shape == "flat" else f"{bed.slope_deg:g}°"
+    return f"{slope}, {size} m²/s, {named}"

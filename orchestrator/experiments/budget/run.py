@@ -43,8 +43,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
             where=study.name,
             remedy='give a group `bed.kind = "pile"`',
         )
-    planned = plan.of(asked, study.name)
     space = Workspace(out.absolute())
+    planned = plan.of(asked, study.name, cases=space.cases)
     with space.held(EXPERIMENT, "budget") as folder:
         space.describe(EXPERIMENT, "budget", list(planned.cases))
         todo = pipeline.missing(planned, space)
@@ -62,7 +62,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
                 where=str(out),
                 remedy="`orchestrator status` names the causes; the same command continues",
             )
-        worn = wear.wears({one.id: one for one in study.scenes if _is_solved(one)})
+        solved = {one.id: one for one in study.scenes if _is_solved(one)}
+        worn = wear.wears(solved, space.cases, done)
         wear.run(worn, space, workers=workers, limit_s=study.time_limit_s)
         ran = [*planned.cases, *(name for one in worn.values() for name in one.ran)]
         space.describe(EXPERIMENT, "budget", ran)

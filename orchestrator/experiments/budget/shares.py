@@ -33,7 +33,7 @@ def decisions(study: Study) -> dict[str, Decision]:
         for scene in study.scenes
         if isinstance(scene.bed, PileBed)
         for choice in CHOICES
-        for levels in (choice.levels,)
+        for levels in (choice.levels(scene),)
         for name, other in ((BASE, scene), *_others(choice, scene))
     }
 
@@ -70,9 +70,10 @@ def changes(study: Study, piles: Mapping[str, Pile], cases: Path) -> pd.DataFram
         for scene in study.scenes
         if isinstance(scene.bed, PileBed)
         for choice in CHOICES
-        for base in (key_of(scene, BASE, choice.levels),)
+        for levels in (choice.levels(scene),)
+        for base in (key_of(scene, BASE, levels),)
         for name, _ in _others(choice, scene)
-        for key in (key_of(scene, name, choice.levels),)
+        for key in (key_of(scene, name, levels),)
         if base in piles and key in piles
         for before, after in zip(thresholds(base), thresholds(key), strict=True)
     )

@@ -5,7 +5,7 @@ each further tenth of the counted grains has left, the bed line sinks to the gra
 OpenFOAM solves the flow over it, and the grains go on by peeling under the new stress.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from pathlib import Path
@@ -159,10 +159,17 @@ def _cells(scene: Scene) -> int:
     return ceil(hypot(float(line.crest[0]), float(line.crest[1])) * 2 / EDGE)
 
 
-def wears(scenes: Mapping[str, Scene]) -> dict[str, Wear]:
-    """The piles whose grains the mesh can resolve, by the ids of their scenes."""
-    resolved = (name for name, scene in scenes.items() if _cells(scene) <= MOST_CELLS)
-    return {name: Wear(LoadedBed(scenes[name])) for name in resolved}
+def wears(scenes: Mapping[str, Scene], cases: Path, done: Container[str]) -> dict[str, Wear]:
+    """The piles whose grains the mesh can resolve, by the ids of their scenes.
+
+    A poured bed has to be among the cases that are done, by name.
+    """
+    beds = {name: LoadedBed(scene, cases) for name, scene in scenes.items()}
+    return {
+        name: Wear(bed)
+        for name, bed in beds.items()
+        if _cells(bed.scene) <= MOST_CELLS and all(run.name in done for run in bed.pouring)
+    }
 
 
 def run(piles: Mapping[str, Wear], space: Workspace, *, workers: int, limit_s: float) -> None:

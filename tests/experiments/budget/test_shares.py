@@ -50,6 +50,14 @@ def test_what_a_scene_refuses_is_no_alternative() -> None:
     assert list(_others("entrainment angle", scene(entrainment_angle_deg=52.0))) == ["-5°", "+5°"]
 
 
+def test_a_lattice_has_pockets_and_a_poured_bed_an_exposure() -> None:
+    poured = scene(packing="poured")
+    assert set(_others("packing", poured)) == {f"poured, seed {seed}" for seed in (1, 2, 3)}
+    assert list(_others("exposure", poured)) == ["protrusion"]
+    assert not _others("entrainment angle", poured)
+    assert not _others("exposure", scene())
+
+
 def test_force_laws_are_those_that_hold() -> None:
     others = _others("force law", scene())
     assert others

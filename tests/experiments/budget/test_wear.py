@@ -39,7 +39,7 @@ def test_a_bared_row_sinks_by_a_row() -> None:
 
 def test_a_pile_wears_to_its_end(tmp_path: Path) -> None:
     pile = scene(**PILE)
-    (one,) = (piles := wear.wears({pile.id: pile})).values()
+    (one,) = (piles := wear.wears({pile.id: pile}, tmp_path, ())).values()
     space = Workspace(tmp_path / "out")
     with space.held(EXPERIMENT, "wear"):
         wear.run(piles, space, workers=2, limit_s=600.0)
@@ -58,5 +58,5 @@ def test_a_pile_wears_to_its_end(tmp_path: Path) -> None:
     assert worn.ustar0 != frozen.ustar0
 
 
-def test_grains_that_the_mesh_cannot_resolve_are_left_out() -> None:
-    assert not wear.wears({"fine": scene(slope_deg=25.0, height=0.2)})
+def test_grains_that_the_mesh_cannot_resolve_are_left_out(tmp_path: Path) -> None:
+    assert not wear.wears({"fine": scene(slope_deg=25.0, height=0.2)}, tmp_path, ())
