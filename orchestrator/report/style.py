@@ -1,14 +1,16 @@
 """How all figures look: sizes, colours by meaning, markers, files."""
 
 from collections.abc import Sequence
-from io import BytesIO
+from io import BytesIO, StringIO
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib import colormaps, rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_mixed import MixedModeRenderer
+from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 from matplotlib.legend_handler import HandlerTuple
@@ -127,11 +129,35 @@ def _leading(x: float, digits: str) -> str:
     return text if text.strip("0.")[0] in digits else ""
 
 
+class _Sheet(FigureCanvasSVG):
+    """SVG by one renderer: matplotlib's own way takes a second one, which reads each text anew."""
+
+    def __init__(self, figure: Canvas, out: StringIO) -> None:
+        super().__init__(figure)
+        figure.dpi = self.fixed_dpi
+        width, height = figure.get_size_inches()
+        pixels = rcParams["savefig.dpi"]
+        drawn = (width * self.fixed_dpi, height * self.fixed_dpi, out)
+        # matplotlib has no types for its renderers
+        vectors: Any = RendererSVG(  # type: ignore[no-untyped-call]
+            *drawn, image_dpi=pixels, metadata={"Date": None}
+        )
+        self.renderer: Any = MixedModeRenderer(  # type: ignore[no-untyped-call]
+            figure, width, height, pixels, vectors
+        )
+
+    def get_renderer(self) -> Any:
+        """The one that the layout measures with."""
+        return self.renderer
+
+
 def svg(figure: Canvas) -> bytes:
     """A figure as SVG, without a date in it."""
-    out = BytesIO()
-    figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+    out = StringIO()
+    sheet = _Sheet(figure, out)
+    figure.draw(sheet.renderer)  # lays out, then draws
+    sheet.renderer.finalize()
+    return out.getvalue().encode()
 
 
 def save(figure: Canvas, folder: Folder, name: str) -> bytes:
