@@ -62,7 +62,9 @@ def _needs_check(answer: Decision) -> bool:
 
 
 def _by_dem(scene: Scene, tolerance: float) -> Decision:
-    asked = changed(scene, {"protocol.method": "dem", "flow.model": "solve"})
+    assert isinstance(scene.bed, PileBed)
+    flow = "flat" if scene.bed.is_level else "solve"
+    asked = changed(scene, {"protocol.method": "dem", "flow.model": flow})
     return decide(asked, tolerance, CHEAP)
 
 

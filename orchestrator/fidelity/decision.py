@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from orchestrator.fidelity import calibration, levels
 from orchestrator.fidelity.calibration import UNKNOWN, Known
-from orchestrator.fidelity.levels import LEVELS, Levels, Part, changed
+from orchestrator.fidelity.levels import FLAT, LEVELS, Levels, Part, changed
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -144,11 +144,13 @@ def _known(scene: Scene, named: Levels) -> Known:
 def _asks_for(scene: Scene) -> str:
     """How a scene wants to be answered; empty where the tool may choose.
 
-    It may where DEM in a held, solved flow is asked for, which is what the levels approximate.
+    It may where DEM in a held, solved flow is asked for, which is what the levels approximate. Over
+    a level bed no flow is solved.
     """
     if scene.protocol.method != "dem":
         return f"the study asks for the method {scene.protocol.method}"
-    if scene.flow.model != "solve":
+    level = isinstance(scene.bed, PileBed) and scene.bed.is_level
+    if scene.flow.model != ("flat" if level else "solve"):
         return f"the study asks for the flow model {scene.flow.model}"
     if scene.protocol.waiting_time < QUIET_ENOUGH:
         return "the study asks for a ramp of the flow"
@@ -187,13 +189,17 @@ class _Pair(NamedTuple):
 
 def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Iterator[_Pair]:
     parts = [part for part, _ in classes]
-    for names in itertools.product(*(_above(part, above.get(part)) for part in parts)):
+    offered = (_above(part, found, above.get(part)) for part, found in classes)
+    for names in itertools.product(*offered):
         named = tuple(zip(parts, names, strict=True))
         found = calibration.known(dict(named), dict(classes), fractions)
         yield _Pair(named, max(one.total for one in found), found[0].cost_core_s)
 
 
-def _above(part: Part, name: str | None) -> list[str]:
+def _above(part: Part, scene_class: str, name: str | None) -> list[str]:
+    """The levels above one; over a level bed there is no other flow."""
+    if scene_class == calibration.LEVEL:
+        return [FLAT]
     listed = [one.name for one in LEVELS[part]]
     start = 0 if name is None else listed.index(name) + 1
     return [one.name for one in LEVELS[part][start:] if one.same_model]

@@ -25,6 +25,8 @@ OCTAVES = 2.0
 """Flows are shared within this ratio of z0."""
 FULL = 1000
 """More layers than any pile has."""
+FLAT = "flat"
+"""The level of the flow that leaves out all forms: exact over a level bed."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,17 @@ def _paper_stiffness(scene: Scene) -> Fields:
     return {**one_layer, **FAST, "grain.stiffness": paper_stiffness(scene)}
 
 
+def _reference(scene: Scene) -> Fields:
+    """On a poured bed each further layer that may move lets grains go earlier, up to the sixth."""
+    layers, rules = (6, SLOW) if scene.is_poured else (3, SLOWEST)
+    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
+
+
+def _soft_reference(scene: Scene) -> Fields:
+    layers, rules = (FULL, SOFT) if scene.is_poured else (4, SOFTEST)
+    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
+
+
 def _rules(
     stiffness: float, time_step: float, waiting_time: float, load_increment: float
 ) -> Fields:
@@ -160,13 +173,14 @@ FAST = _rules(1e3, 0.3, 6.0, 0.03)
 SLOW = _rules(1e4, 0.2, 10.0, 0.01)
 SLOWEST = _rules(1e4, 0.2, 15.0, 0.004)
 SOFTEST = _rules(1e3, 0.3, 15.0, 0.004)
+SOFT = _rules(1e3, 0.3, 10.0, 0.01)
 STANDARD = _solve(40, 1.1)
 RNG = {**STANDARD, "flow.turbulence_model": "RNGkEpsilon"}
 REALIZABLE = {**STANDARD, "flow.turbulence_model": "realizableKE"}
 OTHER_MODEL = "standard, with another turbulence model"
 
 FLOW = (
-    Level("flat", "log law on a flat bed: u*_0 everywhere", {"flow.model": "flat"}),
+    Level(FLAT, "log law on a flat bed: u*_0 everywhere", {"flow.model": "flat"}),
     Level("hill", "linear theory of the flow over a low hill", {"flow.model": "hill"}),
     Level("waves", "linear theory, each wavelength by itself", {"flow.model": "waves"}),
     Level("shared", "coarse; one solve for each octave of z0/h", _shared),
@@ -203,8 +217,16 @@ GRAINS = (
         _paper_stiffness,
         most_grains=40,
     ),
-    _dem("soft reference", 4, SOFTEST, meaning="the reference on softer grains, 4 layers"),
-    _dem("reference", 3, SLOWEST),
+    Level(
+        "soft reference",
+        "the reference on softer grains, 4 layers; of a poured bed all",
+        _soft_reference,
+    ),
+    Level(
+        "reference",
+        "DEM, 3 mobile layers, load steps 0.4 % apart; of a poured bed 6 layers, 1 %",
+        _reference,
+    ),
 )
 """Levels of the grains."""
 

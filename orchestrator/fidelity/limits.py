@@ -155,7 +155,7 @@ def _hill(scene: Scene) -> str | None:
 
 def _flat(scene: Scene) -> str | None:
     bed = _solved(scene)
-    level = bed and bed.shape == "flat" and not bed.profile and not bed.obstacles
+    level = bed and bed.is_level
     return "over a flat bed there is nothing to solve: u* is u*_0 everywhere" if level else None
 
 

@@ -350,6 +350,11 @@ class PileBed(Bed):
         return self.counted or ("all" if everywhere else "windward")
 
     @property
+    def is_level(self) -> bool:
+        """Whether the flow finds nothing on it that it has to go over or round."""
+        return self.shape == "flat" and not self.profile and not self.obstacles
+
+    @property
     def is_triangle(self) -> bool:
         """Whether it is the paper's bed: one triangle of two equal faces, the windward counted."""
         equal = self.shape == "triangle" and self.lee_slope == self.slope_deg

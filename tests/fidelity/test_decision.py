@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.fidelity import calibration
-from orchestrator.fidelity.decision import Bound, as_asked, decide, on_levels
+from orchestrator.fidelity.calibration import Known
+from orchestrator.fidelity.decision import Bound, _cheapest, as_asked, decide, on_levels
 from orchestrator.fidelity.levels import AS_ASKED, LEVELS, Levels, changed, level
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
@@ -121,6 +122,29 @@ def test_a_way_to_the_answer_that_is_asked_for_is_kept(
     decision = decide(asked, 0.5)
     assert decision.scene == asked
     assert word in decision.why
+
+
+def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
+    pile: MakePile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    errors = {"peeling": 0.8, "1 layer, fast": 0.4, "4 layers, fast": 0.1, "reference": 0.0}
+    costs = dict(zip(errors, (0.1, 1.0, 3.0, 60.0), strict=True))
+    fractions = pile().protocol.fractions
+    table = {
+        ("grains", name, "poured, flat"): {at: Known(error, 0.05, costs[name]) for at in fractions}
+        for name, error in errors.items()
+    }
+    monkeypatch.setattr(calibration, "measured", lambda: table)
+    monkeypatch.setattr("orchestrator.fidelity.decision._cheapest", _cheapest.__wrapped__)
+    level_bed = {"packing": "poured", "shape": "flat", "slope_deg": 0.0}
+    asked = changed(pile(**level_bed), {"flow.model": "flat"})
+    for tolerance, grains in ((0.9, "peeling"), (0.2, "4 layers, fast"), (0.1, "reference")):
+        chosen = decide(asked, tolerance)
+        assert chosen.levels == {"flow": "flat", "grains": grains}
+        assert chosen.error_estimate == errors[grains] + 0.05
+        assert chosen.scene.flow.model == "flat"
+    overruled = decide(asked, 0.9, Bound({"flow": "flat", "grains": "peeling"}, "overruled"))
+    assert overruled.levels == {"flow": "flat", "grains": "1 layer, fast"}
 
 
 def test_grains_that_lift_off_before_they_roll_are_left_to_dem(pile: MakePile) -> None:

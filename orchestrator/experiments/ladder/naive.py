@@ -29,7 +29,7 @@ WHOLE = level("grains", "full pile, fast")
 
 
 def small(study: Study) -> Scene:
-    """The lowest pile of a study, in grains, that is answered by DEM.
+    """The lowest pile of a study, in grains, that is answered by DEM; a lattice if it has one.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def small(study: Study) -> Scene:
         for scene in study.scenes
         if isinstance(scene.bed, PileBed) and scene.protocol.method == "dem"
     )
-    found = min(piles, key=_height, default=None)
+    found = min(piles, key=lambda one: (one.is_poured, _height(one)), default=None)
     if found is None:
         raise InputError("it has no pile that is answered by DEM", where=study.name)
     return found
@@ -91,7 +91,7 @@ def _extrapolated(small: Pile, fast: Pile, cases: Path, cpu_s: Mapping[str, floa
     if not {small.case.name, fast.case.name} <= cpu_s.keys():
         return math.nan
     of_step = cpu_s[small.case.name] / _load_steps(small, cases)
-    whole = Pile(WHOLE.answer(fast.scene))
+    whole = Pile(WHOLE.answer(fast.scene), cases)
     grains = whole.packing.mobile.sum() / small.packing.mobile.sum()
     return float(of_step * grains * _load_steps(fast, cases))
 

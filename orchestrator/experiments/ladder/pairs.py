@@ -4,7 +4,6 @@ The grains' levels are run on the reference's flow, the flow's with the grains b
 each error is that of one part; a few pairs as they are used show that the errors add up.
 """
 
-import math
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,9 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator.bed.cover import counted_segments
+from orchestrator.bed.shapes import of_bed
 from orchestrator.fidelity import calibration, spread
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import LEVELS, Level, Part, level
+from orchestrator.fidelity.levels import FLAT, LEVELS, Level, Part, level
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.study.parts import PileBed
@@ -30,6 +31,9 @@ Row = dict[str, Any]
 REFERENCE: Pair = ("fine", "reference")
 AGAIN: Pair = ("fine", "soft reference")
 """The same with every number of the grains' run changed: the reference's own uncertainty."""
+LEVEL_REFERENCE: Pair = (FLAT, REFERENCE[1])
+LEVEL_AGAIN: Pair = (FLAT, AGAIN[1])
+"""The same of a level bed, over which no flow is solved."""
 FINER: Pair = ("finest", "peeling")
 BESIDE = "peeling"
 """The grains' level beside which the flow's are measured."""
@@ -55,7 +59,7 @@ def decisions(study: Study) -> dict[str, Decision]:
         )
         for scene in study.scenes
         if isinstance(scene.bed, PileBed)
-        for pair in _pairs(scene)
+        for pair in _pairs(scene.bed, scene)
     }
 
 
@@ -64,26 +68,30 @@ def pair_of(decision: Decision) -> Pair:
     return decision.levels["flow"], decision.levels["grains"]
 
 
-def key_of(asked: Mapping[str, Decision], pair: Pair) -> str:
-    """The name of the first pile that is answered on a pair."""
-    return next(key for key, one in asked.items() if pair_of(one) == pair)
+def key_of(asked: Mapping[str, Decision], grains: str) -> str:
+    """The name of the first pile whose grains are answered on a level."""
+    return next(key for key, one in asked.items() if one.levels["grains"] == grains)
 
 
-def _pairs(scene: Scene) -> Iterator[Pair]:
-    for flow in _affordable("flow", scene):
+def _pairs(bed: PileBed, scene: Scene) -> Iterator[Pair]:
+    by_dem = scene.protocol.method == "dem"
+    if bed.is_level:
+        yield from ((FLAT, one.name) for one in _affordable("grains", bed, scene) if by_dem)
+        return
+    for flow in _affordable("flow", bed, scene):
         yield flow.name, BESIDE
-    if scene.protocol.method == "dem":
-        yield from ((REFERENCE[0], grains.name) for grains in _affordable("grains", scene))
+    if by_dem:
+        yield from ((REFERENCE[0], one.name) for one in _affordable("grains", bed, scene))
         yield from USED
 
 
-def _affordable(part: Part, scene: Scene) -> Iterator[Level]:
-    assert isinstance(scene.bed, PileBed)
-    face = scene.bed.height / math.sin(math.radians(scene.bed.slope_deg))
+def _affordable(part: Part, bed: PileBed, scene: Scene) -> Iterator[Level]:
+    line = of_bed(bed)
+    exposed = line.lengths[counted_segments(line, bed.counts)].sum() / scene.grain.diameter
     for one in LEVELS[part]:
-        if one.on_lattices and scene.bed.packing == "disordered":
+        if one.on_lattices and bed.packing == "disordered":
             continue
-        if one.most_grains is None or face / scene.grain.diameter <= one.most_grains:
+        if one.most_grains is None or exposed <= one.most_grains * (1 + 1e-9):
             yield one
 
 
@@ -124,7 +132,7 @@ def _point(decision: Decision, pile: Pile, cases: Path, cpu_s: Mapping[str, floa
         "scene_id": scene.id,
         "scene": label(scene),
         **point(scene),
-        "packing": pile.bed.packing,
+        "packing": pile.bed.packing + (", level bed" if pile.bed.is_level else ""),
         "asked": scene.protocol.method,
         **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
         "count": motion.count,
@@ -146,4 +154,6 @@ def label(scene: Scene) -> str:
     words = [f"{scene.bed.slope_deg:g}°", size, law]
     if scene.bed.packing == "disordered":
         words.append(f"gaps {scene.bed.disorder:g} d")
+    if scene.is_poured:
+        words.append(f"poured, seed {scene.bed.seed}")
     return ", ".join(words)

@@ -8,11 +8,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.experiments.ladder.pairs import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.experiments.ladder.pairs import (
+    AGAIN,
+    BESIDE,
+    FINER,
+    LEVEL_AGAIN,
+    LEVEL_REFERENCE,
+    REFERENCE,
+)
+from orchestrator.fidelity import calibration
 from orchestrator.fidelity.levels import Part
 from orchestrator.report.results import split
 
 Row = dict[str, Any]
+REFERENCES = ((REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), ((REFERENCE[0], BESIDE), FINER))
+"""The dearest pair of a scene, the first of these that it has, and one as good."""
 ERRORS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
 TAU, CURVE = "tau_", "curve_"
 """Beginnings of the columns of thresholds: at the asked fractions, and along the curve."""
@@ -35,8 +45,7 @@ def _columns(table: pd.DataFrame, start: str) -> list[str]:
 def _against(own: pd.DataFrame) -> pd.DataFrame:
     pairs = list(zip(own["flow_level"], own["grain_level"], strict=True))
     by_pair = dict(zip(pairs, own.index, strict=True))
-    by_dem = REFERENCE in by_pair
-    dearest, again = (REFERENCE, AGAIN) if by_dem else ((REFERENCE[0], BESIDE), FINER)
+    dearest, again = next((one for one in REFERENCES if one[0] in by_pair), REFERENCES[0])
     if dearest not in by_pair:
         return own.iloc[:0]
     taus, curve = _columns(own, TAU), _columns(own, CURVE)
@@ -111,7 +120,9 @@ def known(found: pd.DataFrame) -> pd.DataFrame:
     The error is the largest over the scenes, infinite where one of the two did not reach the
     fraction; the uncertainty is how far the reference itself moved on scenes of that class.
     """
-    grains = found[(found["flow_level"] == REFERENCE[0]) & (found["asked"] == "dem")]
+    level = found["class_flow"] == calibration.LEVEL
+    beside = level.map({True: LEVEL_REFERENCE[0], False: REFERENCE[0]})
+    grains = found[(found["flow_level"] == beside) & (found["asked"] == "dem")]
     flow = found[(found["grain_level"] == BESIDE) & found["same_model"]]
     rows = [
         *_known("grains", "grain_level", grains, REFERENCE[1], AGAIN[1]),

@@ -37,8 +37,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     """
     limits.check_study(study)
     routes, asked = naive.decisions(naive.small(study)), pairs.decisions(study)
-    planned = plan.of({**asked, **routes}, study.name)
     space = Workspace(out.absolute())
+    planned = plan.of({**asked, **routes}, study.name, cases=space.cases)
     with space.held(EXPERIMENT, "ladder") as folder:
         space.describe(EXPERIMENT, "ladder", list(planned.cases))
         todo = pipeline.missing(planned, space)
@@ -65,7 +65,7 @@ def _tables(
             where=str(cases.parent),
             remedy="`orchestrator status` names the causes; the same command continues",
         )
-    fast = piles[pairs.key_of(asked, (pairs.REFERENCE[0], naive.FAST))]
+    fast = piles[pairs.key_of(asked, naive.FAST)]
     return {
         "points": ranking.with_front(compared),
         "levels": ranking.known(points),

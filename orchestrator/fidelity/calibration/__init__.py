@@ -12,7 +12,7 @@ from functools import cache, reduce
 from operator import add
 from pathlib import Path
 
-from orchestrator.fidelity.levels import Levels, Part
+from orchestrator.fidelity.levels import FLAT, Levels, Part
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -58,6 +58,9 @@ class Known:
 
 
 UNKNOWN = Known(math.inf, 0.0, math.inf)
+EXACT = Known(0.0, 0.0, 0.0)
+LEVEL = "level bed"
+"""The class for the flow of beds over which u* is u*_0 everywhere."""
 
 
 def scene_class(part: Part, scene: Scene) -> str:
@@ -69,6 +72,8 @@ def scene_class(part: Part, scene: Scene) -> str:
     assert isinstance(scene.bed, PileBed)
     ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
     ending += _shape(scene.bed)
+    if part == "flow" and scene.bed.is_level:
+        return LEVEL
     if part == "flow":
         return scene.forces.stress + ending
     packing: str = scene.bed.packing
@@ -110,6 +115,8 @@ def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float
 
 def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known:
     """What is known of one level at a fraction; infinite errors where nothing is."""
+    if (level, scene_class) == (FLAT, LEVEL):
+        return EXACT
     rows = measured().get((part, level, scene_class), {})
     if fraction in rows or not rows:
         return rows.get(fraction, UNKNOWN)

@@ -7,7 +7,16 @@ import pandas as pd
 import pytest
 
 from orchestrator.experiments.ladder import ranking
-from orchestrator.experiments.ladder.pairs import AGAIN, BESIDE, FINER, REFERENCE
+from orchestrator.experiments.ladder.pairs import (
+    AGAIN,
+    BESIDE,
+    FINER,
+    LEVEL_AGAIN,
+    LEVEL_REFERENCE,
+    REFERENCE,
+)
+from orchestrator.fidelity.calibration import LEVEL
+from orchestrator.fidelity.levels import FLAT
 
 TAU = {"tau_0.1": 1.0, "tau_0.5": 2.0, "curve_0.50": 2.0}
 
@@ -77,6 +86,26 @@ def test_known_errors_stand_beside_the_references_own_uncertainty() -> None:
     # the flow's error is against the dearest flow with the same grains
     assert found.loc[("flow", "coarse", 0.5), "error"] == pytest.approx(0.05)
     assert (found["scenes"] == 1).all()
+
+
+def test_a_level_bed_is_held_against_a_reference_without_a_solved_flow() -> None:
+    over: dict[str, Any] = {"scene_id": "b", "class_flow": LEVEL, "class_grains": "poured, flat"}
+    level = [
+        _point(LEVEL_REFERENCE, **over),
+        _point(LEVEL_AGAIN, 1.05, **over),
+        _point((LEVEL_REFERENCE[0], BESIDE), 1.4, **over),
+    ]
+    # a pile beside it is no reference of it, nor its flat flow one of the levels of the grains
+    table = pd.concat([_table(), pd.DataFrame([*level, _point((FLAT, BESIDE), 0.7)])])
+    known = ranking.known(table.reset_index(drop=True))
+    found = known.set_index(["scene_class", "level", "fraction"])
+    assert found.loc[("poured, flat", BESIDE, 0.5), "error"] == pytest.approx(0.4)
+    assert found.loc[("poured, flat", BESIDE, 0.5), "uncertainty"] == pytest.approx(0.05)
+    assert found.loc[("aligned", BESIDE, 0.5), "error"] == pytest.approx(0.02)
+    assert found.loc[("wall", FLAT, 0.5), "error"] == pytest.approx(1 - 0.7 / 0.98)
+    assert LEVEL not in set(known["scene_class"])
+    errors = ranking.errors(table.reset_index(drop=True)).set_index(["scene_id", "grain_level"])
+    assert errors.loc[("b", BESIDE), "error_50"] == pytest.approx(0.4)
 
 
 def test_what_only_one_of_two_reaches_is_infinitely_off() -> None:
