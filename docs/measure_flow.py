@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.bed.line import BedLine
 from orchestrator.bed.shapes import triangle
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
@@ -49,7 +50,7 @@ def flow(slope: float, roughness: float) -> FlowCase:
 def solved(one: FlowCase, cases: Path) -> WallStress:
     """The stress of a case, run if it has not been."""
     if not case.is_done(one, cases):
-        engine.execute(one, cases, 600.0, threading.Event())
+        engine.execute(one, cases, 3600.0, threading.Event())
     return WallStress.from_csv(cases / one.name / WALL_STRESS)
 
 
@@ -184,8 +185,46 @@ def theories(cases: Path) -> None:
                 print(f"| {row} | {errors} |", flush=True)
 
 
+def waves(cases: Path) -> None:
+    """A and B of waves of a cosine, solved and by both theories: from the middle one of three."""
+    print(
+        "\n| slope | lambda/z0 | solved: A | B | waves: A | B | hill: A | B |\n" + "|---" * 8 + "|"
+    )
+    for slope in (5.0, 10.0, 15.0, 20.0):
+        for ratio in (1e3, 1e4, 1e5):
+            one = wavy(slope, 1 / ratio)
+            found = [solved(one, cases)]
+            assert one.line
+            found += [theory_of(one.line, 1 / ratio) for theory_of in (theory.waves, theory.hill)]
+            numbers = (f"{a:.2f} | {b:.2f}" for a, b in (phases(one, each) for each in found))
+            print(f"| {slope:g} | {ratio:g} | {' | '.join(numbers)} |", flush=True)
+
+
+def wavy(slope: float, roughness: float) -> FlowCase:
+    """Flow over three waves of 1 m, by their steepest slope."""
+    height = np.tan(np.radians(slope)) / np.pi
+    x = np.linspace(0, 3, 241)
+    z = height / 2 * (1 - np.cos(2 * np.pi * x))
+    line = BedLine((-10.0, *x.tolist(), 13.0), (0.0, *z.tolist(), 0.0), height)
+    first = max(1 / 2000, 2.5 * roughness)
+    one = FlowCase(slope, height, roughness, 10.0, 1e-5, first, line=line)
+    return replace(one, lid=5 / height, upstream=3 / height, downstream=3 / height)
+
+
+def phases(one: FlowCase, stress: WallStress) -> tuple[float, float]:
+    """A and B of the middle wave."""
+    edges = np.linspace(1, 2, 81)
+    assert one.line
+    s = np.interp(edges, one.line.x, one.line.arc_lengths)
+    tau = stress.mean_over((s[1:] + s[:-1]) / 2, np.diff(s))
+    phase = 2 * np.pi * (edges[1:] + edges[:-1]) / 2 - np.pi
+    steepness = np.pi * one.height_m
+    a, b = (2 * np.mean(tau * wave) / steepness for wave in (np.cos(phase), -np.sin(phase)))
+    return float(a), float(b)
+
+
 if __name__ == "__main__":
     folder = Path(sys.argv[1]).absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    for measure in (flat_bed, similarity, levels, models, theories, meshes):
+    for measure in (flat_bed, similarity, levels, models, theories, waves, meshes):
         measure(folder)

@@ -5,10 +5,11 @@ A form is an array of corners, shape (n, 2), from its foot at the origin to its 
 
 from collections.abc import Callable
 from functools import cache
-from math import cos, exp, pi, radians, sin, sqrt, tan
+from math import cos, exp, log, pi, radians, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.obstacles import with_obstacles
@@ -143,6 +144,35 @@ def _gaussian(bed: PileBed) -> FloatArray:
     return np.column_stack([deviation * (t + GAUSSIAN_END), z])
 
 
+def _rushil(bed: PileBed) -> FloatArray:
+    """A hill of the experiment RUSHIL; its steepest slope is the bed's."""
+    x, z = rushil_hill(rushil_aspect(bed.slope_deg))
+    return bed.height * np.column_stack([x - x[0], z])
+
+
+def rushil_hill(aspect: float) -> tuple[FloatArray, FloatArray]:
+    """X from the top and z of a hill of RUSHIL over its height, by its half length over that.
+
+    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
+    case 69: xi = a sin(t) runs from one foot to the other.
+    """
+    t = np.linspace(-pi / 2, pi / 2, 2 * CHORDS + 1)
+    m = 1 / aspect + sqrt(1 / aspect**2 + 1)
+    q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
+    return aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+
+
+@cache
+def rushil_aspect(slope_deg: float) -> float:
+    """Half length over height of the hill of RUSHIL that is so steep, degrees."""
+
+    def steeper(logarithm: float) -> float:
+        x, z = rushil_hill(exp(logarithm))
+        return float(np.max(np.diff(z) / np.diff(x))) - tan(radians(slope_deg))
+
+    return exp(brentq(steeper, log(0.1), log(1e3)))
+
+
 def _step_up(bed: PileBed) -> FloatArray:
     face = bed.height / tan(radians(bed.slope_deg))
     return np.array([[0, 0], [face, bed.height], [face + bed.level_length, bed.height]])
@@ -159,6 +189,7 @@ FORMS: dict[str, Callable[[PileBed], FloatArray]] = {
     "dune": _dune,
     "cosine": _cosine,
     "gaussian": _gaussian,
+    "rushil": _rushil,
     "trapezoid": lambda bed: _trapezoid(bed, bed.level_length),
     "step up": _step_up,
     "step down": _step_down,

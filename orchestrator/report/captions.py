@@ -196,6 +196,17 @@ def where() -> str:
     )
 
 
+def hills() -> str:
+    """Of hills that others measured."""
+    return (
+        "Hills of the wind-tunnel experiment RUSHIL, each with the flow of each turbulence model: "
+        "signed friction velocity along the bed over the undisturbed one, and below it where the "
+        "flow runs back, computed (bars) and measured (black: its end, a line; the experiment "
+        "found none behind the two gentler hills). The stress on the bed was not measured. The "
+        "table flow has the numbers and where the measured ones are from."
+    )
+
+
 def averaged(piles: Iterable[Pile]) -> str:
     """The length of bed that the stress on a grain is averaged over."""
     return f"max(d, {_values('averaging_length', piles)})"

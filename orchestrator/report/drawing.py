@@ -12,6 +12,7 @@ from orchestrator.errors import OrchestratorError
 from orchestrator.report import (
     FIGURES,
     compared,
+    hills,
     mixture,
     overview,
     piles,
@@ -33,7 +34,7 @@ SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (7, (mixture.draw,)),
     (4, (compared.draw, single.draw)),
     (0, (bed.draw,)),
-    (8, (where.draw,)),
+    (8, (where.draw, hills.draw)),
     (5, (stress.draw,)),
     (6, (flow.draw, mesh.draw)),
     (1, (overview.draw,)),

@@ -55,7 +55,7 @@ Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
 Standing = Literal["alike", "protrusion"]
 Shape = Literal[
-    "triangle", "dune", "cosine", "gaussian", "trapezoid", "step up", "step down", "flat"
+    "triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "step up", "step down", "flat"
 ]
 Range = tuple[float, float]
 File = Annotated[
@@ -232,6 +232,7 @@ class PileBed(Bed):
                 "dune": "a windward side and a slip face",
                 "cosine": "one wave of a cosine, from trough to trough",
                 "gaussian": "a Gaussian hill",
+                "rushil": "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
                 "trapezoid": "two straight faces and a level top",
                 "step up": "a straight face up to higher ground",
                 "step down": "a straight face down to lower ground",

@@ -31,7 +31,7 @@ BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
-FORMS = ("triangle", "dune", "cosine", "gaussian", "trapezoid")
+FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
 FIELDS_OF_SHAPES = {
     "windward": ("dune",),
     "brink_radius": ("dune",),

@@ -54,6 +54,8 @@ COLUMNS: dict[str, str] = {
     "downstream_over_h": "flat bed behind the forms over h",
     "separation_over_h": "where reversed flow begins behind the top, over h; empty: nowhere",
     "reattachment_over_h": "where it ends, over h",
+    "measured_reattachment_over_h": "where it ended in a wind tunnel, over h; empty: nowhere",
+    "measured_source": "where the measured number is from",
     "ustar_top": "u*/u*_0 of the wall stress at the top",
     "ustar_mean": "its mean from the foot to the top",
     "ustar_largest": "its largest value on the bed",

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.bed.shapes import rushil_aspect
 from orchestrator.flow import diagnostics
 from orchestrator.grains.pile import Pile
+from orchestrator.physics.hills import MeasuredHill, measured
 from orchestrator.tables.scenes import Row
 
 
@@ -32,4 +34,21 @@ def row(pile: Pile, cases: Path) -> Row:
         "ustar_top": float(np.interp(line.crest_s, stress.s_m, ustar)),
         "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
         "ustar_largest": float(ustar.max()),
+        **_beside(measured_hill(pile)),
     }
+
+
+def measured_hill(pile: Pile) -> MeasuredHill | None:
+    """The hill of a wind tunnel that a pile is, if any."""
+    bed, flow = pile.bed, pile.flow
+    if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
+        return None
+    return measured(rushil_aspect(bed.slope_deg), flow.height_m / flow.roughness_m)
+
+
+def _beside(hill: MeasuredHill | None) -> Row:
+    """What was measured: columns of flows over such hills alone."""
+    if hill is None:
+        return {}
+    length = hill.reattachment or np.nan
+    return {"measured_reattachment_over_h": length, "measured_source": hill.source}

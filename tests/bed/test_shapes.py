@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import of_bed, triangle
+from orchestrator.bed.shapes import of_bed, rushil_aspect, rushil_hill, triangle
 from orchestrator.study.parts import Obstacle, PileBed, UnfitError
 
 H = 0.02
@@ -24,6 +24,7 @@ SHAPES: dict[str, dict[str, Any]] = {
     "curved and rounded": {"shape": "dune", "windward": "curved", "brink_radius": H},
     "cosine": {"shape": "cosine"},
     "gaussian": {"shape": "gaussian"},
+    "rushil": {"shape": "rushil"},
     "trapezoid": {"shape": "trapezoid"},
     "step up": {"shape": "step up", "slope_deg": 40.0},
     "step down": {"shape": "step down", "slope_deg": 0.0},
@@ -52,7 +53,19 @@ def test_a_line_goes_downstream_between_flat_beds(name: str) -> None:
     assert np.interp(0.0, line.x, line.arc_lengths) == 0
 
 
-@pytest.mark.parametrize("name", ["triangle", "dune", "cosine", "gaussian", "trapezoid", "train"])
+@pytest.mark.parametrize(("aspect", "slope"), [(3.0, 26.2), (5.0, 16.4), (8.0, 10.5)])
+def test_the_hills_of_rushil_have_their_length(aspect: float, slope: float) -> None:
+    x, z = rushil_hill(aspect)
+    assert (x[0], x[-1], z[40]) == pytest.approx((-aspect, aspect, 1))
+    # the whole slope of the formula, which the experiment's three hills have
+    assert rushil_aspect(slope) == pytest.approx(aspect, rel=5e-3)
+    foot = z[1] / (x[1] - x[0])
+    assert foot < 0.1 * np.tan(np.radians(slope))
+
+
+@pytest.mark.parametrize(
+    "name", ["triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "train"]
+)
 def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
     line = of_bed(bed(**SHAPES[name]))
     assert max(line.z) == pytest.approx(H)
