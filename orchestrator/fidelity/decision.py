@@ -152,6 +152,8 @@ def _asks_for(scene: Scene) -> str:
     level = isinstance(scene.bed, PileBed) and scene.bed.is_level
     if scene.flow.model != ("flat" if level else "solve"):
         return f"the study asks for the flow model {scene.flow.model}"
+    if scene.protocol.update:
+        return "the study asks for a bed that changes, for which no error is known"
     if scene.protocol.waiting_time < QUIET_ENOUGH:
         return "the study asks for a ramp of the flow"
     return ""

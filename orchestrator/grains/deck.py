@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-FIXED, MOBILE, COUNTED, PUSHED = 1, 2, 3, 4
-"""Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only."""
+GONE, FIXED, MOBILE, COUNTED, PUSHED = 0, 1, 2, 3, 4
+"""Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only. Those that
+have gone are in no deck."""
 
 MEANING = {
     "diameter": "d of the units below; of every grain, or the median of a mixture, m",
@@ -45,7 +46,7 @@ class GrainTable:
     position : ndarray, shape (n, 3)
         x, y, z of the centres, m.
     kind : ndarray of int, shape (n,)
-        One of FIXED, MOBILE, COUNTED, PUSHED.
+        One of GONE, FIXED, MOBILE, COUNTED, PUSHED.
     along : ndarray, shape (n, 2)
         Unit vector downstream along the bed, in which displacement is counted.
     sizes : ndarray, shape (n,)
@@ -69,17 +70,17 @@ class GrainTable:
     @property
     def smallest(self) -> float:
         """Diameter of the smallest grain that may move, d."""
-        return float(self.sizes[self.kind != FIXED].min())
+        return float(self.sizes[self.kind > FIXED].min())
 
     @property
     def last_mobile(self) -> float:
         """The furthest x of a grain that may move, m."""
-        return float(self.position[self.kind != FIXED, 0].max())
+        return float(self.position[self.kind > FIXED, 0].max())
 
     @property
     def mobile_count(self) -> int:
         """How many grains may move."""
-        return int((self.kind != FIXED).sum())
+        return int((self.kind > FIXED).sum())
 
 
 def write(
@@ -136,8 +137,9 @@ def _write_sets(path: Path, grains: NDArray[np.int64], sets: FloatArray) -> None
 
 def _data_file(grains: GrainTable, margin: float) -> str:
     # a rounded bound would lose the grains that lie on it: every number has all its digits
-    low = (grains.position.min(axis=0) - margin).tolist()
-    high = (grains.position.max(axis=0) + margin).tolist()
+    there = grains.kind != GONE
+    low = (grains.position[there].min(axis=0) - margin).tolist()
+    high = (grains.position[there].max(axis=0) + margin).tolist()
     bounds = "".join(
         f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in zip(low, high, "xyz", strict=True)
     )
@@ -146,6 +148,7 @@ def _data_file(grains: GrainTable, margin: float) -> str:
     rows = "".join(
         f"{number} {kind} {diameter!r} {grains.density!r} {x!r} {y!r} {z!r}\n"
         for number, (kind, diameter, (x, y, z)) in enumerate(columns, 1)
+        if kind != GONE
     )
-    head = f"grains: id type diameter density x y z\n\n{len(grains.kind)} atoms\n4 atom types\n\n"
+    head = f"grains: id type diameter density x y z\n\n{there.sum()} atoms\n4 atom types\n\n"
     return f"{head}{bounds}\nAtoms\n\n{rows}"

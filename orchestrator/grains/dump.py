@@ -125,6 +125,13 @@ def _track(state: FloatArray, along: FloatArray, diameter: FloatArray) -> Track:
     )
 
 
+def last_places(directory: Path) -> pd.DataFrame:
+    """X and z (m) of the mobile grains that are there at the end of a run, by their ids."""
+    bed = read_dump(directory / BED, BED_COLUMNS)
+    last: pd.DataFrame = bed.rows[bed.rows["step"] == bed.steps[-1]]
+    return last.set_index("id")[["x", "z"]]
+
+
 @dataclass(frozen=True)
 class Dump:
     """A text dump.

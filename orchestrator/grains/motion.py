@@ -1,5 +1,6 @@
 """What the counted grains of a deck did: who moved, at which flow, and how."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -40,7 +41,7 @@ class Motion:
     Attributes
     ----------
     flow : ndarray, shape (levels + 1,)
-        The flow of each load step, rising, in the deck's unit; first the flow of the settling.
+        The flow of each load step, never falling, in the deck's unit; first that of the settling.
     level : ndarray of int, shape (N,)
         Hold (index into `flow`) in which a grain moved by the rule of `counting`; 0 for never.
     fallen : ndarray of int, shape (N,)
@@ -80,10 +81,27 @@ class Motion:
             exact=True,
         )
 
+    @classmethod
+    def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
+        """The motion in runs that go on from one another: of each which of the N it counts."""
+        found = cls.of_flows(np.full(len(runs[0][0]), np.inf))
+        level, fallen, carried, mode = found.level, found.fallen, found.carried, found.mode
+        flow, before = [runs[0][1].flow[:1]], 0
+        for counted, run in runs:
+            level[counted] = np.where(run.level > 0, run.level + before, 0)
+            first = (fallen[counted] == 0) & (run.fallen > 0)
+            fallen[counted] = np.where(first, run.fallen + before, fallen[counted])
+            carried[counted], mode[counted] = run.carried, run.mode
+            flow.append(run.flow[1:])
+            before += len(run.flow) - 1
+        return cls(np.concatenate(flow), level, fallen, carried, mode)
+
     @property
     def low(self) -> FloatArray:
         """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
-        return self.flow if self.exact else self.flow[np.maximum(np.arange(len(self.flow)), 1) - 1]
+        # two load steps of one flow are before and after the bed has changed
+        lower = np.searchsorted(self.flow, self.flow) - 1
+        return self.flow if self.exact else self.flow[np.maximum(lower, 0)]
 
     def moved_by(self, level: int) -> BoolArray:
         """Which grains have moved by the end of a load step."""

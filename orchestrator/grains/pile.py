@@ -1,13 +1,14 @@
 """A pile of grains and its answer: the bed under its flow, with the scene's threshold method."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from orchestrator.grains.loaded_bed import LoadedBed
-from orchestrator.grains.method import METHODS, Method
+from orchestrator.grains.loaded_bed import Face, LoadedBed
+from orchestrator.grains.method import METHODS, Dem, Method
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile_case import PileCase
+from orchestrator.grains.wear import Flow, WornFlow
 from orchestrator.runs.case import Case
 
 
@@ -26,10 +27,28 @@ class Pile(LoadedBed):
         return (*self.model.cases, *self.pouring, *self.method.cases)
 
     @property
+    def by_dem(self) -> bool:
+        """Whether LIGGGHTS moves its grains."""
+        return isinstance(self.method, Dem)
+
+    @property
     def case(self) -> PileCase:
-        """The run of LIGGGHTS, of a scene that asks for DEM."""
-        (case,) = self.method.cases
-        return case
+        """The last run of LIGGGHTS, of a scene that asks for DEM."""
+        assert isinstance(self.method, Dem)
+        return self.method.runs[-1]
+
+    @property
+    def flows(self) -> tuple[Flow, ...]:
+        """The runs of the flow, one after another on a bed that changes."""
+        worn = (run for run in self.method.cases if isinstance(run, WornFlow))
+        return (*self.model.cases, *worn)
+
+    def face(self, cases: Path) -> Face:
+        """The windward grains, each with the stress on it; on a bed that changes, as it moved."""
+        found = super().face(cases)
+        if not self.scene.protocol.update:
+            return found
+        return replace(found, speed=self.method.last(cases).speed[self.packing.windward])
 
     def motion(self, cases: Path) -> Motion:
         """What the windward grains do; `cases` holds the finished runs."""

@@ -7,9 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.grains import deck, motion, protocol, rest
+from orchestrator.grains import deck, dump, motion, protocol, rest, wear
 from orchestrator.grains.case import GrainCase
+from orchestrator.grains.deck import GrainTable
 from orchestrator.grains.loaded_bed import FloatArray, LoadedBed
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.wear import BoolArray, Worn, WornFlow
 from orchestrator.runs.case import Case
 from orchestrator.study.scene import Scene
 
@@ -20,11 +23,24 @@ grain in flight is gone, diameters."""
 
 @dataclass(frozen=True)
 class PileCase(GrainCase):
-    """The grains of one pile."""
+    """The grains of one pile, or those that are there in one of its rounds.
+
+    Attributes
+    ----------
+    scene : Scene
+        Of the pile.
+    flow : WornFlow or None
+        The flow of the round; None: that of the whole pile.
+    before : PileCase or None
+        The run that this one goes on from.
+    """
 
     scene: Scene
+    flow: WornFlow | None = None
+    before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
     recipe: ClassVar[int] = 9
+    derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, wear.GRAINS)
 
     @cached_property
     def loaded(self) -> LoadedBed:
@@ -33,8 +49,9 @@ class PileCase(GrainCase):
 
     @property
     def needs(self) -> tuple[Case, ...]:
-        """The runs of its flow model, and the one that pours its bed."""
-        return (*self.loaded.model.cases, *self.loaded.pouring)
+        """The runs of its flow model, the one that it goes on from, and the one that pours."""
+        flows = self.loaded.model.cases if self.flow is None else (self.flow,)
+        return (*flows, *((self.before,) if self.before else ()), *self.loaded.pouring)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -49,29 +66,63 @@ class PileCase(GrainCase):
         most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
         length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
         grains = length * (min(self.loaded.bed.mobile_layers, most) + 3)
-        load_steps = np.log(3.5) / np.log1p(rules.load_increment)
+        load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
         bed = LoadedBed(self.scene, cases)
-        ratio = bed.ustar_over_ustar0(cases)
-        rising = flows(bed, ratio)
+        ratio, worn = self._state(bed, cases)
+        if self.before is None:
+            rising = flows(bed, ratio)
+        else:
+            reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
+            rising = flows_from(reached, bed, ratio, worn.there)
         force = bed.loading(ratio).in_steps(rising.tolist())
-        grains, margin = table(bed, ratio), MARGIN * self.scene.grain.diameter
-        deck.write(directory, grains, _numbers(bed, grains), rising, force, margin=margin)
+        grains, margin = table(bed, ratio, worn), MARGIN * self.scene.grain.diameter
+        numbers = _numbers(bed, grains, self._enough(bed))
+        deck.write(directory, grains, numbers, rising, force, margin=margin)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""
         self.check(directory)
         grain, cases = self.scene.grain, directory.parent
         bed = LoadedBed(self.scene, cases)
-        grains = table(bed, bed.ustar_over_ustar0(cases))
+        ratio, worn = self._state(bed, cases)
+        grains = table(bed, ratio, worn)
         rest.check(directory, grains, self.scene.weight, grain.stiffness, all_rest=True)
         found = motion.read(
             directory, grains, self.scene.protocol.displacement_criterion, falls_out=False
         )
         found.to_csv(directory, grains)
+        if self.scene.protocol.update:
+            self._after(directory, worn, ratio, found, grains).to_csv(directory)
+
+    def _state(self, bed: LoadedBed, cases: Path) -> tuple[FloatArray, Worn]:
+        """The flow on each grain, and the grains, when the run begins."""
+        if self.flow is None:
+            return bed.ustar_over_ustar0(cases), Worn.whole(bed)
+        return wear.ratio(bed, self.flow, cases), wear.grains(bed, self.flow, cases)
+
+    def _enough(self, bed: LoadedBed) -> int:
+        """How many counted grains may still lie when the run ends."""
+        if self.scene.protocol.update:
+            round_ = wear.number(self.flow) if self.flow else 0
+            return bed.packing.count - wear.goal(bed, round_)
+        return int((1 - self.scene.protocol.final_fraction) * bed.packing.count + 1e-9)
+
+    def _after(
+        self, directory: Path, worn: Worn, ratio: FloatArray, found: Motion, grains: GrainTable
+    ) -> Worn:
+        """The grains when the run has ended; those that have moved are taken off the bed."""
+        counted = grains.counted_ids - 1
+        left = worn.left.copy()
+        left[counted] = np.where(found.level > 0, found.flow[found.level], np.inf)
+        places = dump.last_places(directory) / self.scene.grain.diameter
+        seen = np.where((grains.kind == deck.FIXED)[:, None], worn.places, np.nan)
+        seen[places.index - 1] = places
+        seen[np.isfinite(left)] = np.nan
+        return Worn(seen, left, np.where(worn.there, ratio, worn.speed))
 
 
 def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
@@ -92,16 +143,24 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
 
 
-def table(bed: LoadedBed, ratio: FloatArray) -> deck.GrainTable:
+def flows_from(reached: float, bed: LoadedBed, ratio: FloatArray, there: BoolArray) -> FloatArray:
+    """The same where a run goes on from the flow that the one before has reached."""
+    step = bed.scene.protocol.load_increment
+    thresholds = bed.leaving(ratio, there)
+    last = thresholds[np.isfinite(thresholds)].max(initial=reached)
+    return protocol.flows(reached, max(protocol.BEYOND * last, reached * (1 + step)), step)
+
+
+def table(bed: LoadedBed, ratio: FloatArray, worn: Worn) -> GrainTable:
     """The grains of the deck; `ratio` as `flows` takes it."""
     packed, d = bed.packing, bed.scene.grain.diameter
     kind = np.select(
-        [~packed.mobile, packed.windward, packed.lee],
-        [deck.FIXED, deck.COUNTED, deck.PUSHED],
+        [~worn.there, ~packed.mobile, packed.windward, packed.lee],
+        [deck.GONE, deck.FIXED, deck.COUNTED, deck.PUSHED],
         deck.MOBILE,
     )
-    x, z = packed.centres.T * d
-    return deck.GrainTable(
+    x, z = worn.places.T * d
+    return GrainTable(
         position=np.column_stack([x, np.zeros_like(x), z]),
         kind=kind,
         along=bed.downflow(ratio),
@@ -111,7 +170,7 @@ def table(bed: LoadedBed, ratio: FloatArray) -> deck.GrainTable:
     )
 
 
-def _numbers(bed: LoadedBed, grains: deck.GrainTable) -> dict[str, float | int]:
+def _numbers(bed: LoadedBed, grains: GrainTable, enough: int) -> dict[str, float | int]:
     """The parameters of the deck."""
     rules, d = bed.scene.protocol, bed.scene.grain.diameter
     slope, ridge = bed.line.roof(MARGIN + 0.5)
@@ -121,7 +180,7 @@ def _numbers(bed: LoadedBed, grains: deck.GrainTable) -> dict[str, float | int]:
         "density": bed.scene.grain.density,
         "gravity": bed.scene.reduced_gravity,
         **protocol.contact(bed.scene.grain, rules),
-        **protocol.raising(rules, int((1 - rules.final_fraction) * bed.packing.count + 1e-9)),
+        **protocol.raising(rules, enough),
         "slope": slope,
         "ceiling_x": ridge[0] * d,
         "ceiling_z": ridge[1] * d,

@@ -288,15 +288,21 @@ def bed(results: Results, pile: Pile) -> str:
     moved = (
         f"moved, that is {_values('displacement_criterion', [pile])} downstream along the bed; "
         "hollow: left the box, where it lay"
-        if pile.method.cases
+        if pile.by_dem
         else f"moves by then, by {pile.scene.protocol.method}, a method without dynamics"
     )
-    when = "at the end of a load step" if pile.method.cases else "as packed, at a flow"
+    when = "at the end of a load step" if pile.by_dem else "as packed, at a flow"
+    wears = (
+        f"Blue line: the bed line, drawn anew after each {pile.scene.protocol.update:.0%} of the "
+        "grains; hollow: gone, where it lay. "
+        if pile.scene.protocol.update
+        else ""
+    )
     return (
         f"After Fig. 13 of the paper. Grains {when}; orange: {moved}; pale "
         "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. The shade of blue is "
-        "the speed of the flow by OpenFOAM, over that at the lid; it does not see the grains. d is "
-        f"one diameter. {_pile(results, pile)}"
+        "the speed of the flow by OpenFOAM over the whole pile, over that at the lid; it does not "
+        f"see the grains. {wears}d is one diameter. {_pile(results, pile)}"
     )
 
 

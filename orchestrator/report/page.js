@@ -39,6 +39,8 @@ for (const box of document.querySelectorAll("[data-steps]")) {
       circle.setAttribute("cy", y);
       circle.setAttribute("class", moved ? (gone ? "v g" : "v") : under[i]);
     });
+    const line = data.lines?.findLast(([first]) => first <= step);
+    if (line) box.querySelector(".line").setAttribute("d", line[1]);
     const [n, N] = [data.moved[step], data.count];
     box.querySelector("output").textContent = `${data.step} ${step} of ${data.frames.length}: `
       + `u*₀ = ${data.flow[step]} m/s, n/N = ${n}/${N} = ${Math.round(100 * n / N)} %`;

@@ -105,6 +105,9 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "DEM": lambda scene: scene.protocol.method == "dem",
     "DEM of piles": lambda scene: isinstance(scene.bed, PileBed) and scene.protocol.method == "dem",
     "DEM and peeling": lambda scene: scene.protocol.method != "pivot",
+    "DEM and peeling of piles": lambda scene: (
+        isinstance(scene.bed, PileBed) and scene.protocol.method != "pivot"
+    ),
 }
 
 

@@ -18,6 +18,7 @@ Scope = Literal[
     "DEM",
     "DEM of piles",
     "DEM and peeling",
+    "DEM and peeling of piles",
 ]
 """The scenes on which a field has an effect."""
 About = Literal["question", "answer", "replica"]

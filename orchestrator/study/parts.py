@@ -205,6 +205,7 @@ class Obstacle(Part):
 
 
 SLIP_FACE_DEG = 30.0
+LEAST_UPDATE = 0.02
 LEVEL = 4.0
 
 
@@ -612,6 +613,22 @@ class Protocol(Part):
         float, Field(ge=1e-3, le=2), Info("time step", unit="√(m/K)", scope="DEM", about="answer")
     ] = 0.2
     """time step of the grains' integration"""
+    update: Annotated[
+        float,
+        Field(ge=0, le=0.5),
+        _unless(0.0),
+        Info("update of the bed", unit="of N", scope="DEM and peeling of piles"),
+    ] = 0.0
+    """part of the counted grains after which the bed line is drawn anew through the grains that are
+    there, and the flow solved over it, until the last of the fractions; 0 keeps the flow of the
+    whole pile, as in the paper"""
+
+    @model_validator(mode="after")
+    def _updates_are_few(self) -> Self:
+        if 0 < self.update < LEAST_UPDATE:
+            what = f"{self.update:g} of the grains: each update is a solve of the flow"
+            raise UnfitError("protocol.update", what, f"0, or at least {LEAST_UPDATE:g}")
+        return self
 
     @field_validator("fractions", mode="before")
     @classmethod

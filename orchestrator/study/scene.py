@@ -74,7 +74,25 @@ class Scene(Part):
                 check_mesh(self.bed.height, self.first_cell_height)
         else:
             check_grain(self.bed, self.grain.diameter)
+        if self.protocol.update:
+            self._check_update()
         return self
+
+    def _check_update(self) -> None:
+        """A bed that changes needs a flow that sees a row go, and grains that free others."""
+        never = "leave it out"
+        if not isinstance(self.bed, PileBed):
+            raise UnfitError("protocol.update", "a single grain leaves no bed that changes", never)
+        if self.flow.model != "solve":
+            what = f'the flow model "{self.flow.model}" knows no bed that changes'
+            raise UnfitError("protocol.update", what, f'flow.model = "solve", or {never}')
+        if self.protocol.method == "pivot":
+            what = "each grain by itself frees no other"
+            raise UnfitError("protocol.update", what, f'the method "peeling" or "dem", or {never}')
+        if self.first_cell_height > self.grain.diameter:
+            what = f"the first cell, {self.first_cell_height:g} m, is higher than a grain"
+            remedy = f"set flow.first_cell_height to at most the diameter, or {never}"
+            raise UnfitError("protocol.update", what, remedy)
 
     @cached_property
     def id(self) -> str:

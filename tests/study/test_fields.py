@@ -50,7 +50,7 @@ def other_value(one: Quantity, scene: Scene) -> Any:
     if isinstance(value, str):
         words = one.info.choices or get_args(fields.declared(one).annotation)
         return next(word for word in words if word not in (value, "paper"))
-    return value + 1 if isinstance(value, int) else 0.95 * value or 1.0
+    return value + 1 if isinstance(value, int) else 0.95 * value or 0.5
 
 
 @pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)

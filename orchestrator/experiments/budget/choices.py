@@ -22,6 +22,8 @@ DYNAMIC_POURED = "4 layers, fast"
 """The same on poured beds, where fewer mobile layers hold back the grains on them."""
 COARSE = "coarse"
 """Level of a solved flow; another flow model is kept."""
+FROZEN = "frozen bed"
+"""What the choice is called that the flow of the whole pile acts until the end."""
 SEEDS = (1, 2, 3)
 """How many other draws of a random packing are as good."""
 Alternatives = Mapping[str, Fields]
@@ -211,6 +213,14 @@ CHOICES = (
         "That of a sand is known to a few degrees. A poured bed is poured anew by it.",
         _beside("grain.friction_angle_deg", -5.0, 5.0),
         DYNAMIC,
+    ),
+    Choice(
+        FROZEN,
+        "The paper, and every level, keeps the flow of the whole pile until the last grain has "
+        "gone. Else the bed line is drawn anew after each tenth.",
+        _fixed("protocol.update", 0.1),
+        QUASISTATIC,
+        of_solved_flow=True,
     ),
 )
 """Every shared choice."""

@@ -1,6 +1,7 @@
-"""The figure of the bed that changes: who has left at which flow, and the bed line as it wears."""
+"""The figure of the bed that changes: its thresholds, and the bed line as it wears."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -9,23 +10,28 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.experiments.budget.choices import label
-from orchestrator.experiments.budget.wear import LAST, Wear
+from orchestrator.grains import wear
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
 
 MOST = 4
 """Piles that are drawn; the table has all."""
 
 
-def draw(piles: Sequence[Wear]) -> Canvas:
-    """A row for each pile: its curve of n/N, and its bed line after each tenth."""
+def draw(piles: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
+    """A row for each pile, frozen and changing: θ at each n/N, and its bed line in each round."""
     shown = piles[:MOST]
     figure = style.canvas(1.9 * len(shown) + 0.6)
     grid = figure.subplots(len(shown), 2, squeeze=False)
-    for (left, right), one in zip(grid, shown, strict=True):
-        _curves(left, one)
-        _lines(right, one)
-        left.set_title(label(one.bed.scene), loc="left", fontsize=8)
-    grid[-1, 0].set_xlabel("undisturbed friction velocity $u^*_0$, m/s")
+    for (left, right), (frozen, changing) in zip(grid, shown, strict=True):
+        _curve(left, frozen, cases, "0.5", "--")
+        _curve(left, changing, cases, "#0072b2", "-")
+        left.set(xlim=(0, max(changing.scene.protocol.fractions)), ylabel="Shields number $θ$")
+        left.set_ylim(bottom=0)
+        _lines(right, changing, cases)
+        left.set_title(label(frozen.scene), loc="left", fontsize=8)
+    grid[-1, 0].set_xlabel("n/N")
     grid[-1, 1].set_xlabel("x / h")
     samples = [
         Line2D([], [], color="0.5", ls="--", label="flow of the whole pile"),
@@ -35,20 +41,21 @@ def draw(piles: Sequence[Wear]) -> Canvas:
     return figure
 
 
-def _curves(ax: Axes, one: Wear) -> None:
-    count = one.bed.packing.count
-    worn = one.left[one.bed.packing.windward]
-    for flows, colour, style_of in ((one.frozen, "0.5", "--"), (worn, "#0072b2", "-")):
-        known = np.sort(flows[np.isfinite(flows)])[: int(LAST * count) + 1]
-        moved = np.arange(1, len(known) + 1) / count
-        ax.step(known, moved, where="post", color=colour, ls=style_of)
-    ax.set(ylim=(0, LAST), ylabel="n/N")
+def _curve(ax: Axes, pile: Pile, cases: Path, colour: str, dashes: str) -> None:
+    motion, speed = pile.motion(cases), pile.face(cases).speed
+    count = round(max(pile.scene.protocol.fractions) * motion.count)
+    fractions = np.arange(1, count + 1) / motion.count
+    scene = pile.scene
+    tau = [of_pile(motion, speed, float(one), scene.fluid.density).tau for one in fractions]
+    shields = np.array(tau) * np.pi / 6 * scene.grain.diameter**2 / scene.weight
+    ax.plot(fractions, shields, color=colour, ls=dashes)
 
 
-def _lines(ax: Axes, one: Wear) -> None:
-    h = one.lines[0].h
-    for number, line in enumerate(one.lines):
-        colour = colormaps["YlGnBu"](0.35 + 0.65 * number / len(one.lines))
+def _lines(ax: Axes, pile: Pile, cases: Path) -> None:
+    h, count = pile.line.h, len(pile.flows)
+    for number, flow in enumerate(pile.flows):
+        line = wear.line(pile, flow, cases)
+        colour = colormaps["YlGnBu"](0.35 + 0.65 * number / count)
         ax.plot(np.array(line.x) / h, np.array(line.z) / h, color=colour, lw=0.9)
-    start, end = one.lines[0].x[1] / h, float(one.lines[0].crest[0]) / h
+    start, end = pile.line.x[1] / h, float(pile.line.crest[0]) / h
     ax.set(xlim=(start, end + 0.4), ylabel="z / h")

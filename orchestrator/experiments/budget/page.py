@@ -1,14 +1,15 @@
 """The page of the budget: a tornado for each scene, the shares, the alternatives."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import pandas as pd
 
 from orchestrator.experiments.budget import curves, tornado
-from orchestrator.experiments.budget.choices import CHOICES
-from orchestrator.experiments.budget.shares import FROZEN, QUANTITIES
-from orchestrator.experiments.budget.wear import Wear
+from orchestrator.experiments.budget.choices import CHOICES, FROZEN
+from orchestrator.experiments.budget.shares import QUANTITIES
 from orchestrator.fidelity.spread import together
+from orchestrator.grains.pile import Pile
 from orchestrator.report import document
 from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
@@ -33,7 +34,7 @@ CHANGING = (
     "frozen one, less 1."
 )
 WEAR = (
-    "Left: the grains that have left. Right: the bed line at the start and after each tenth, "
+    "Left: the threshold at each n/N. Right: the bed line at the start and after each tenth, "
     "darker as it wears; its edges are rounded over 2 d. Grains that come to light are not loaded."
 )
 SYMBOLS = {"shields": "θ", "ustar0": "u*₀"}
@@ -46,20 +47,20 @@ LIMITS = (
 def write(
     tables: Mapping[str, pd.DataFrame],
     lost: pd.DataFrame,
-    worn: Sequence[Wear],
+    worn: Sequence[tuple[Pile, Pile]],
     space: Workspace,
     solvers: Mapping[str, str],
 ) -> None:
     """Write the page from the tables ``changes`` and ``shares``; `lost` has no answer.
 
-    The piles that wore are drawn as well.
+    `worn` are piles on the frozen bed, each beside the same on one that changes.
     """
     shared = tables["shares"]
     scenes = [
         _scene(number, rows)
         for number, (_, rows) in enumerate(shared.groupby("scene_id", sort=False), 1)
     ]
-    changing = [_changing(tables["changes"], worn)] if worn else []
+    changing = [_changing(tables["changes"], worn, space.cases)] if worn else []
     sections = [_all(shared), *changing, *scenes, _choices(tables["changes"], lost)]
     document.write(TITLE, sections, space.folder, space.page.name, solvers)
 
@@ -82,8 +83,8 @@ def _all(shared: pd.DataFrame) -> Section:
     )
 
 
-def _changing(moved: pd.DataFrame, worn: Sequence[Wear]) -> Section:
-    drawing = Figure("wear", "Frozen bed and bed that changes", WEAR, (), curves.draw(worn))
+def _changing(moved: pd.DataFrame, worn: Sequence[tuple[Pile, Pile]], cases: Path) -> Section:
+    drawing = Figure("wear", "Frozen bed and bed that changes", WEAR, (), curves.draw(worn, cases))
     rows = moved[moved["choice"] == FROZEN]
     table = pd.DataFrame(
         {
@@ -121,9 +122,6 @@ def _choices(moved: pd.DataFrame, lost: pd.DataFrame) -> Section:
         for one in CHOICES
         if one.name in tried
     ]
-    if FROZEN in tried:
-        why = "The paper, and every level, keeps the flow of the whole pile."
-        rows.append({"choice": FROZEN, "alternatives": tried[FROZEN], "why": why})
     listed = [pd.DataFrame(rows), *([] if lost.empty else [lost])]
     text = "" if lost.empty else "The alternatives of the second table have no answer."
     return Section(

@@ -8,7 +8,7 @@ import pandas as pd
 from orchestrator import pipeline, plan
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.experiments import tables
-from orchestrator.experiments.budget import shares, wear
+from orchestrator.experiments.budget import shares
 from orchestrator.experiments.budget.choices import label
 from orchestrator.fidelity import limits
 from orchestrator.pipeline import Finished
@@ -17,8 +17,6 @@ from orchestrator.report import settings
 from orchestrator.runs.case import programs
 from orchestrator.runs.claim import EXPERIMENT
 from orchestrator.runs.workspace import MARKERS, Workspace
-from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 
@@ -62,13 +60,6 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
                 where=str(out),
                 remedy="`orchestrator status` names the causes; the same command continues",
             )
-        solved = {one.id: one for one in study.scenes if _is_solved(one)}
-        worn = wear.wears(solved, space.cases, done)
-        wear.run(worn, space, workers=workers, limit_s=study.time_limit_s)
-        ran = [*planned.cases, *(name for one in worn.values() for name in one.ran)]
-        space.describe(EXPERIMENT, "budget", ran)
-        worn = {name: one for name, one in worn.items() if one.fraction > 0}
-        moved = pd.concat([moved, shares.of_wear(worn)], ignore_index=True)
         shared = shares.shares(moved)
         made = {"changes": moved, "shares": shared, "budget": shares.known(shared)}
         lost = _lost(planned, ready, failures)
@@ -76,12 +67,9 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
             from orchestrator.experiments.budget import page
 
             tables.write(made, folder)
-            page.write(made, lost, list(worn.values()), space, programs(space.cases, planned.cases))
+            worn = list(shares.worn(study, ready))
+            page.write(made, lost, worn, space, programs(space.cases, planned.cases))
     return Finished(space.page, len(todo), _of_the_scenes(planned, failures))
-
-
-def _is_solved(scene: Scene) -> bool:
-    return isinstance(scene.bed, PileBed) and scene.flow.model == "solve"
 
 
 def _lost(

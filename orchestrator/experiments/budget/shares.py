@@ -7,8 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.experiments.budget.choices import CHOICES, Choice, label
-from orchestrator.experiments.budget.wear import UPDATE, Wear
+from orchestrator.experiments.budget.choices import CHOICES, FROZEN, Choice, label
 from orchestrator.fidelity import calibration
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import Levels
@@ -22,8 +21,6 @@ QUANTITIES = ("shields", "ustar0")
 """What moves: the Shields number of the mean stress on the grains that moved, and the undisturbed
 friction velocity at which they did."""
 BASE = "as asked"
-FROZEN = "frozen bed"
-"""What the choice is called that the flow of the whole pile acts until the end."""
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -101,15 +98,15 @@ def _row(
     }
 
 
-def of_wear(piles: Mapping[str, Wear]) -> pd.DataFrame:
-    """The same rows for the choice to keep the flow of the whole pile until the end."""
-    alternative = f"drawn anew after each {UPDATE:.0%} of N"
-    return pd.DataFrame(
-        _row(one.bed.scene, FROZEN, alternative, *one.thresholds(fraction))
-        for one in piles.values()
-        for fraction in one.bed.scene.protocol.fractions
-        if fraction <= one.fraction
-    )
+def worn(study: Study, piles: Mapping[str, Pile]) -> Iterator[tuple[Pile, Pile]]:
+    """Each pile on the frozen bed and on one that changes; arguments as in `changes`."""
+    (choice,) = (one for one in CHOICES if one.name == FROZEN)
+    for scene in study.scenes:
+        for name, _ in _others(choice, scene) if isinstance(scene.bed, PileBed) else ():
+            levels = choice.levels(scene)
+            keys = [key_of(scene, one, levels) for one in (BASE, name)]
+            if all(key in piles for key in keys):
+                yield piles[keys[0]], piles[keys[1]]
 
 
 def shares(moved: pd.DataFrame) -> pd.DataFrame:

@@ -14,7 +14,10 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image
 
-from orchestrator.grains import dump, motion
+from orchestrator.bed.line import BedLine
+from orchestrator.grains import dump, motion, wear
+from orchestrator.grains.method import Dem
+from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, labels, page
 from orchestrator.report.figure import Figure
@@ -47,12 +50,15 @@ class Steps:
         Load step in which a grain moved; 0 if it never did, or is not counted.
     flow : ndarray, shape (K + 1,)
         Undisturbed friction velocity, m/s.
+    lines : tuple of (int, BedLine)
+        The bed lines, each with the first load step under its flow; one, on a frozen bed.
     """
 
     pile: Pile
     places: FloatArray
     level: NDArray[np.int64]
     flow: FloatArray
+    lines: tuple[tuple[int, BedLine], ...]
 
     def moved(self, step: int) -> int:
         """How many of the counted grains have moved by the end of a load step."""
@@ -70,22 +76,36 @@ def read(pile: Pile, cases: Path) -> Steps:
     packing = pile.packing
     found, level = pile.motion(cases), np.zeros(len(packing.centres), np.int64)
     level[packing.windward] = found.level
-    places = _by_dem(pile, cases) if pile.method.cases else packing.centres[None]
-    steps = (len(places) if pile.method.cases else len(found.flow), *packing.centres.shape)
-    return Steps(pile, np.broadcast_to(places, steps), level, found.flow[: steps[0]])
+    if isinstance(pile.method, Dem):
+        after = [_by_dem(pile, cases / run.name) for run in pile.method.runs]
+        places = np.concatenate([packing.centres[None], *after])
+    else:
+        places = np.broadcast_to(packing.centres, (len(found.flow), *packing.centres.shape))
+    lines = ((0, pile.line), *_lines(pile, found, cases))
+    if len(lines) > 1:
+        gone = (level > 0) & (level <= np.arange(len(places))[:, None])
+        places = np.where(gone[..., None], np.nan, places)
+    return Steps(pile, places, level, found.flow[: len(places)], lines)
 
 
-def _by_dem(pile: Pile, cases: Path) -> FloatArray:
-    """The places of the grains as packed and at the end of each load step, from the dumps, d."""
-    directory, packing = cases / pile.case.name, pile.packing
+def _lines(pile: Pile, found: Motion, cases: Path) -> Iterator[tuple[int, BedLine]]:
+    """Each bed line with the step at which the first grain moves under its flow."""
+    for worn in pile.flows[1:]:
+        left = wear.grains(pile, worn, cases).left
+        before = int(np.searchsorted(found.moved, np.isfinite(left).sum(), side="right"))
+        yield before, wear.line(pile, worn, cases)
+
+
+def _by_dem(pile: Pile, directory: Path) -> FloatArray:
+    """The places of the grains at the end of each load step of a run, from its dump, d."""
+    packing = pile.packing
     samples = pd.read_csv(directory / motion.SAMPLES)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
     rows = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS).rows
-    places = np.full((len(ends) + 1, len(packing.centres), 2), np.nan)
+    places = np.full((len(ends), len(packing.centres), 2), np.nan)
     places[:] = np.where(packing.mobile[:, None], np.nan, packing.centres)
-    places[0] = packing.centres
     d = pile.scene.grain.diameter
-    places[np.searchsorted(ends, rows["step"]) + 1, rows["id"] - 1] = rows[["x", "z"]] / d
+    places[np.searchsorted(ends, rows["step"]), rows["id"] - 1] = rows[["x", "z"]] / d
     return places
 
 
@@ -111,14 +131,15 @@ def draw(results: Results) -> Iterator[Figure]:
 def chosen(results: Results) -> Iterator[Pile]:
     """The pile that stands for all of its slope: of the largest grains, usable if any is.
 
-    One by DEM comes before others; one whose files were pruned stands for nothing.
+    One by DEM comes before others, one that changes before one that is frozen; one whose files were
+    pruned stands for nothing.
     """
     for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
         order = rows.assign(valid=valid(rows)).sort_values(
             ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
         )
         piles = [results.shown(str(scene_id)) for scene_id in order["scene_id"]]
-        piles.sort(key=lambda pile: not pile.method.cases)
+        piles.sort(key=lambda pile: (not pile.by_dem, not pile.scene.protocol.update))
         yield from itertools.islice(filter(results.has_files, piles), 1)
 
 
@@ -135,7 +156,7 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         frames.append([_triple(i, places[i]) for i in np.flatnonzero(new).tolist()])
         last[new] = places[new]
     return {
-        "step": "load step" if steps.pile.method.cases else "flow",
+        "step": "load step" if steps.pile.by_dem else "flow",
         "shown": shown,
         "count": steps.pile.packing.count,
         "flow": [float(f"{flow:.4g}") for flow in steps.flow],
@@ -143,7 +164,19 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
         "frames": [list(itertools.chain(*frame)) for frame in frames],
+        **({"lines": _paths(steps)} if len(steps.lines) > 1 else {}),
     }
+
+
+def _paths(steps: Steps) -> list[list[Any]]:
+    """Each bed line as a path of the picture, after the step from which on it is there."""
+    left, right, *_ = window(steps.pile)
+    return [[step, "M" + _path(line, left, right)[1:]] for step, line in steps.lines]
+
+
+def _path(line: BedLine, left: float, right: float) -> str:
+    x = np.unique([left, *np.clip(line.x, left, right), right])
+    return " ".join(f"L{a:.2f} {-b:.2f}" for a, b in zip(x, line.height(x), strict=True))
 
 
 def _triple(number: int, place: FloatArray) -> tuple[int, float | None, float | None]:
@@ -172,10 +205,6 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     base = np.where(packing.windward, "e", "m")
     moved = (steps.level > 0) & (steps.level <= shown)
     look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
-    ground = np.unique([left, *np.clip(pile.line.x, left, right), right])
-    path = " ".join(
-        f"L{x:.2f} {-z:.2f}" for x, z in zip(ground, pile.line.height(ground), strict=True)
-    )
     return page.fill(
         "bed.svg.j2",
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
@@ -183,7 +212,10 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         right=right,
         top=top,
         bottom=bottom,
-        ground=f"M{left:.2f} {-bottom:.2f} {path} L{right:.2f} {-bottom:.2f}Z",
+        ground=f"M{left:.2f} {-bottom:.2f} {_path(pile.line, left, right)} "
+        f"L{right:.2f} {-bottom:.2f}Z",
+        line=[path for step, path in _paths(steps) if step <= shown][-1],
+        wears=len(steps.lines) > 1,
         flow=_flow(pile, cases, (left, right, bottom, top)),
         fixed=_circles(packing.centres, packing.sizes, ~packing.mobile & inside),
         mobile=zip(

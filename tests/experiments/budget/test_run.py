@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.budget import shares
-from orchestrator.experiments.budget.choices import CHOICES
+from orchestrator.experiments.budget.choices import CHOICES, FROZEN
 from orchestrator.experiments.budget.run import run
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
@@ -35,7 +35,7 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     finished = run(asked, tmp_path / "out", workers=2)
     assert not finished.failures
     shared = pd.read_csv(tmp_path / "out" / "tables" / "shares.csv")
-    assert set(shared["choice"]) == {one.name for one in CHOICES} - {OF_LATTICES} | {shares.FROZEN}
+    assert set(shared["choice"]) == {one.name for one in CHOICES} - {OF_LATTICES} | {FROZEN}
     moved = (
         shared.groupby("choice")["shields_high"].max()
         + shared.groupby("choice")["shields_low"].max()

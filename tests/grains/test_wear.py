@@ -1,0 +1,199 @@
+"""The bed that changes."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from orchestrator import pipeline, plan
+from orchestrator.errors import InputError
+from orchestrator.flow.case import FlowCase
+from orchestrator.grains import wear
+from orchestrator.grains.loaded_bed import LoadedBed
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.wear import Worn
+from orchestrator.runs.claim import STUDY
+from orchestrator.runs.workspace import Workspace
+from orchestrator.study import study
+from orchestrator.study.scene import Scene
+
+PILE = """
+grain = {{ diameter = 1e-3, stiffness = 1e3 }}
+bed = {{ kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30", mobile_layers = 1 }}
+flow = {{ expansion_ratio = 1.4 }}
+[protocol]
+load_increment = 0.03
+waiting_time = 6.0
+time_step = 0.3
+fractions = [0.25, 0.5, 0.75]
+{more}
+"""
+
+
+def _scene(more: str = "") -> Scene:
+    (found,) = study.parse(PILE.format(more=more), name="one", where="test").scenes
+    return found
+
+
+class Done(NamedTuple):
+    """A pile whose runs are done, and where they lie."""
+
+    pile: Pile
+    cases: Path
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Done]:
+    """One pile by both methods, on a bed that changes and on a frozen one."""
+    space = Workspace(tmp_path_factory.mktemp("wear") / "out")
+    found = {}
+    with space.held(STUDY, "wear"):
+        for method in ("peeling", "dem"):
+            for update in (0.0, 0.25):
+                more = f'method = "{method}"\nupdate = {update}'
+                asked = study.parse(PILE.format(more=more), name="one", where="test")
+                planned = plan.make(asked)
+                todo = pipeline.missing(planned, space)
+                assert not pipeline.complete(todo, space, workers=2, limit_s=600.0)
+                (pile,) = planned.piles.values()
+                found[method if update else f"{method}, frozen"] = Done(pile, space.cases)
+    return found
+
+
+@pytest.mark.parametrize("packing", ["aligned", "horizontal"])
+def test_a_whole_bed_has_not_sunk(packing: str) -> None:
+    (scene,) = study.parse(
+        PILE.format(more="").replace('"pile",', f'"pile", packing = "{packing}",'),
+        name="one",
+        where="test",
+    ).scenes
+    bed = LoadedBed(scene)
+    line = wear.sunk(bed, Worn.whole(bed))
+    x = np.linspace(line.x[0], line.x[-1], 500)
+    assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
+
+
+def test_a_bared_row_sinks_by_a_row() -> None:
+    bed = LoadedBed(_scene())
+    s = bed.packing.arc_length
+    middle = bed.packing.windward & (s > 0.25 * bed.line.crest_s) & (s < 0.75 * bed.line.crest_s)
+    whole = Worn.whole(bed)
+    line = wear.sunk(bed, Worn(whole.gone(middle), whole.left, whole.speed))
+    # rows are sin(beta) apart along the normal, so much over the cosine of the slope upright
+    row = np.sin(np.radians(60.0)) / np.cos(np.radians(25.0))
+    x = float(bed.line.crest[0]) / 2
+    sunk = bed.line.height(np.array([x])) - line.height(np.array([x]))
+    assert sunk == pytest.approx(row, abs=0.3)
+    for untouched in (0.1, 0.95):
+        x = untouched * float(bed.line.crest[0])
+        assert line.height(np.array([x])) == pytest.approx(bed.line.height(np.array([x])), abs=1e-6)
+
+
+def test_worn_grains_survive_their_file(tmp_path: Path) -> None:
+    whole = Worn.whole(LoadedBed(_scene()))
+    gone = np.arange(len(whole.left)) % 3 == 0
+    one = Worn(whole.gone(gone), np.where(gone, np.pi / 7, np.inf), np.where(gone, 1 / 3, 0.0))
+    one.to_csv(tmp_path)
+    again = Worn.from_csv(tmp_path)
+    for before, after in zip(vars(one).values(), vars(again).values(), strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+@pytest.mark.parametrize("method", ["peeling", "dem"])
+def test_a_bed_changes_after_each_part_of_its_grains(worn: dict[str, Done], method: str) -> None:
+    pile, cases = worn[method]
+    assert [wear.number(flow) for flow in pile.flows] == [0, 1, 2]
+    count, windward = pile.packing.count, pile.packing.windward
+    gone = [np.isfinite(wear.grains(pile, flow, cases).left[windward]) for flow in pile.flows]
+    for number, part in enumerate(gone[1:]):
+        assert part.sum() >= wear.goal(pile, number)
+    # what has moved never comes back, and the line never rises
+    assert all(np.all(after >= before) for before, after in pairwise(gone))
+    lines = [wear.line(pile, flow, cases) for flow in pile.flows]
+    x = np.linspace(lines[0].x[0], lines[0].x[-1], 300)
+    for before, later in pairwise(lines):
+        assert np.all(later.height(x) <= before.height(x) + 0.02)
+        assert np.any(later.height(x) < before.height(x) - 0.5)
+    motion = pile.motion(cases)
+    assert motion.count == count
+    assert motion.fraction[-1] >= 0.75
+    assert np.all(np.diff(motion.flow) >= 0)
+
+
+@pytest.mark.parametrize("method", ["peeling", "dem"])
+def test_until_the_first_update_nothing_differs(worn: dict[str, Done], method: str) -> None:
+    changing, frozen = worn[method], worn[f"{method}, frozen"]
+    ours, theirs = (one.pile.motion(one.cases) for one in (changing, frozen))
+    first = int(np.argmax(ours.fraction >= 0.25))
+    np.testing.assert_array_equal(ours.flow[: first + 1], theirs.flow[: first + 1])
+    np.testing.assert_array_equal(ours.moved[: first + 1], theirs.moved[: first + 1])
+    speeds = [one.pile.face(one.cases).speed for one in (changing, frozen)]
+    early, later = ours.moved_by(first), ~ours.moved_by(first)
+    np.testing.assert_array_equal(speeds[0][early], speeds[1][early])
+    assert np.all(speeds[0][later] != speeds[1][later])
+
+
+def test_the_methods_agree_on_a_bed_that_changes(worn: dict[str, Done]) -> None:
+    by_peeling, by_dem = (worn[one].pile.motion(worn[one].cases) for one in ("peeling", "dem"))
+    for fraction in (0.25, 0.5, 0.75):
+        flows = [one.flow[np.argmax(one.fraction >= fraction)] for one in (by_peeling, by_dem)]
+        assert flows[1] / flows[0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_runs_that_go_on_are_one_motion() -> None:
+    first = Motion(
+        flow=np.array([0.7, 1.0, 1.1]),
+        level=np.array([1, 0, 2]),
+        fallen=np.array([0, 1, 0]),
+        carried=np.array([False, False, True]),
+        mode=np.array([1, 0, 3]),
+    )
+    second = Motion(
+        flow=np.array([0.8, 1.1, 1.2]),
+        level=np.array([1]),
+        fallen=np.array([0]),
+        carried=np.array([False]),
+        mode=np.array([2]),
+    )
+    found = Motion.chained([(np.ones(3, bool), first), (np.array([False, True, False]), second)])
+    assert found.level.tolist() == [1, 3, 2]
+    assert found.fallen.tolist() == [0, 1, 0]
+    assert found.mode.tolist() == [1, 2, 3]
+    assert found.carried.tolist() == [False, False, True]
+    assert found.flow.tolist() == [0.7, 1.0, 1.1, 1.1, 1.2]
+    # the bed changed at one flow: what goes then was last seen at rest at the flow below it
+    assert found.low.tolist() == [0.7, 0.7, 1.0, 1.0, 1.1]
+
+
+def test_a_frozen_bed_keeps_its_identity() -> None:
+    frozen, changing = _scene(), _scene("update = 0.1")
+    assert "update" not in frozen.model_dump()["protocol"]
+    assert frozen.id == _scene("update = 0.0").id != changing.id
+    assert Pile(frozen).flow.name == Pile(changing).flow.name
+    assert all(isinstance(flow, FlowCase) for flow in Pile(frozen).flows)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ('method = "pivot"\nupdate = 0.1', "frees no other"),
+        ("update = 0.001", "a solve of the flow"),
+        ('update = 0.1\n[flow]\nmodel = "hill"', "knows no bed that changes"),
+        ("update = 0.1\n[flow]\nfirst_cell_height = 2e-3", "higher than a grain"),
+    ],
+)
+def test_what_a_bed_that_changes_needs(change: str, word: str) -> None:
+    text = PILE.format(more=change)
+    if "[flow]" in change:
+        text = text.replace("flow = { expansion_ratio = 1.4 }\n", "")
+    with pytest.raises(InputError, match=word):
+        study.parse(text, name="one", where="test")
+
+
+def test_a_single_grain_has_no_bed_that_changes() -> None:
+    text = "grain = { diameter = 1e-3 }\nprotocol = { update = 0.1 }"
+    with pytest.raises(InputError, match=r"protocol\.update"):
+        study.parse(text, name="one", where="test")
