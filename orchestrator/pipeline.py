@@ -87,9 +87,10 @@ def run(
         failures: dict[str, OrchestratorError] = {}
         while todo := _without(planned.cases, {*states, *failures}):
             started += len(todo)
-            failures |= complete(
-                todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
-            )
+            with report.loading():
+                failures |= complete(
+                    todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
+                )
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
             _describe(space, study, planned)

@@ -1,6 +1,8 @@
 """Figures and page of a study."""
 
-from collections.abc import Mapping, Sequence
+import contextlib
+import threading
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,27 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 FIGURES = "figures"
+LOADED_AFTER_S = 1.0
+"""Time that the first runs have for themselves before the drawing libraries are loaded, s."""
+
+
+@contextlib.contextmanager
+def loading() -> Iterator[None]:
+    """Import what draws beside the runs of a block: after the last of them nobody waits for it."""
+    with settings.own():
+        pass  # matplotlib is imported here: that changes what other threads see of the environment
+    timer = threading.Timer(LOADED_AFTER_S, _load)
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+
+
+def _load() -> None:
+    with contextlib.suppress(Exception), settings.own():  # who draws says what does not load
+        from orchestrator.report import drawing, page  # noqa: F401
 
 
 def write(

@@ -29,14 +29,18 @@ from orchestrator.runs.folder import Folder
 
 Draw = Callable[[Results], Iterable[Figure]]
 SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
+    (5, (single.by_angle,)),
     (2, (piles.extended,)),
     (3, (piles.fractions,)),
-    (7, (mixture.draw,)),
-    (4, (compared.draw, single.draw)),
+    (9, (stress.draw,)),
+    (10, (flow.draw,)),
     (0, (bed.draw,)),
-    (8, (where.draw, hills.draw)),
-    (5, (stress.draw,)),
-    (6, (flow.draw, mesh.draw)),
+    (6, (single.by_slope,)),
+    (12, (where.draw, hills.draw)),
+    (8, (mixture.draw,)),
+    (4, (compared.draw,)),
+    (11, (mesh.draw,)),
+    (7, (single.accuracy,)),
     (1, (overview.draw,)),
 )
 """What is drawn in one process, the dearest first, and its place on the page."""

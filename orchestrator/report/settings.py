@@ -31,9 +31,8 @@ RC: Mapping[Any, Any] = {
 VARIABLES: Mapping[str, str | None] = {
     "MATPLOTLIBRC": os.devnull,
     "MPLBACKEND": None,
-    "SOURCE_DATE_EPOCH": None,  # no figure holds a date
 }
-"""What matplotlib is told by the environment."""
+"""What matplotlib is told by the environment when it is imported."""
 
 
 @contextlib.contextmanager
@@ -48,20 +47,20 @@ def own() -> Iterator[None]:
     level = log.level
     log.setLevel(logging.ERROR)  # a cache that cannot be kept is nothing to the user
     try:
-        with _environment(VARIABLES):
-            matplotlib = _matplotlib()
-            defaults = dict(matplotlib.rcParamsDefault)
-            del defaults["backend"]  # figures are made without a window
-            with matplotlib.rc_context({**defaults, **RC}):
-                yield
+        matplotlib = _matplotlib()
+        defaults = dict(matplotlib.rcParamsDefault)
+        del defaults["backend"]  # figures are made without a window
+        with matplotlib.rc_context({**defaults, **RC}):
+            yield
     finally:
         log.setLevel(level)
 
 
 def _matplotlib() -> Any:
+    if "matplotlib" in sys.modules:
+        return sys.modules["matplotlib"]
     # a file in the working directory comes before all others
-    known = "matplotlib" in sys.modules
-    with contextlib.nullcontext() if known else _working_in(Path(__file__).parent):
+    with _environment(VARIABLES), _working_in(Path(__file__).parent):
         import matplotlib
     return matplotlib
 

@@ -20,20 +20,31 @@ SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "force_law")
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 
 
-def draw(results: Results) -> Iterator[Figure]:
-    """The figures that the study's single grains give, one at a time; ramps are not thresholds."""
-    grains = results.beds("grain")
-    grains = grains[held(grains)]
-    dem = by_dem(results.joined("single_grain"))
-    dem = dem[held(dem)] if len(dem) else dem
-    flat = grains[grains["alpha_deg"] == 0]
+def by_angle(results: Results) -> Iterator[Figure]:
+    """Figs. 5 and 6: single grains on a flat bed by entrainment angle, of one force law."""
+    flat = _held(results)
+    flat = flat[flat["alpha_deg"] == 0]
     if len(flat) and not laws.many(flat["force_law"]):
-        yield from _pair(results, flat, dem, "beta_deg", "horizontal bed")
-    for (beta,), scenes in split(grains, "beta_deg"):
+        yield from _pair(results, flat, _dem(results), "beta_deg", "horizontal bed")
+
+
+def by_slope(results: Results) -> Iterator[Figure]:
+    """Figs. 7 and 8: single grains on slopes, a figure for each entrainment angle."""
+    for (beta,), scenes in split(_held(results), "beta_deg"):
         if (scenes["alpha_deg"] > 0).any():
-            yield from _pair(results, scenes, dem, "alpha_deg", f"slope, β = {beta:g}°")
-    if len(dem) and dem["ustar_m_s"].notna().any():
-        yield _accuracy(results, dem)
+            yield from _pair(results, scenes, _dem(results), "alpha_deg", f"slope, β = {beta:g}°")
+
+
+def _held(results: Results) -> pd.DataFrame:
+    """The scenes of single grains whose flow is held; ramps are not thresholds."""
+    grains = results.beds("grain")
+    return grains[held(grains)]
+
+
+def _dem(results: Results) -> pd.DataFrame:
+    """What DEM found of them."""
+    dem = by_dem(results.joined("single_grain"))
+    return dem[held(dem)] if len(dem) else dem
 
 
 def _pair(
@@ -128,8 +139,11 @@ def _panel(
     return references
 
 
-def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
+def accuracy(results: Results) -> Iterator[Figure]:
     """u* of DEM over that of the closed form, a panel for each increment of the load steps."""
+    dem = _dem(results)
+    if dem.empty or not dem["ustar_m_s"].notna().any():
+        return
     ratio = dem["ustar_closed_form_m_s"]
     rows = dem.assign(
         value=dem["ustar_m_s"] / ratio,
@@ -153,7 +167,7 @@ def _accuracy(results: Results, dem: pd.DataFrame) -> Figure:
     entries = _colour_entries(rows, "alpha_deg", colours)
     style.legends(figure, entries, [*shields.point_entries(rows), *variants])
     cases = tuple(sorted(set(dem["case"])))
-    return Figure(
+    yield Figure(
         "accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure, fold=True
     )
 

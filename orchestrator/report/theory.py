@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from orchestrator.physics.exposure import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import Threshold, shields_at, threshold
+from orchestrator.physics.threshold import Threshold, shields_at
 from orchestrator.report import laws
 from orchestrator.report.results import split
+from orchestrator.study.closed_form import known
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +24,11 @@ SWEEP_M = (5e-5, 1e-3)
 POINTS = 240
 WIDER = 10.0
 """Factor on Re* by which lines go on beyond a study's grains: axes cut them."""
+GRAIN = [
+    "d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s",
+    "rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2",
+]  # fmt: skip
+"""Columns of all that the closed form depends on, in its order."""
 WHOLE = np.geomspace(1e-4, 1e6, 2001)
 """Re* of any grain."""
 
@@ -108,24 +114,16 @@ def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
-    found = [thresholds(own).reynolds for _, own in split(scenes, "force_law")]
-    reynolds = np.concatenate(found)
+    groups = split(scenes, "force_law")
+    found = [one.reynolds for (law,), own in groups for one in thresholds(own, str(law))]
+    reynolds = np.array(found, float)
     reynolds = reynolds[np.isfinite(reynolds)]
     return float(reynolds.min()), float(reynolds.max())
 
 
-def thresholds(scenes: pd.DataFrame) -> Threshold:
-    """The closed form of the single grains of rows under one law."""
-    d = scenes["d_m"].to_numpy(float)
-    fluid = scenes["rho_f_kg_m3"], scenes["nu_m2_s"], scenes["alpha_s"]
-    return threshold(
-        LAWS[str(scenes["force_law"].iloc[0])],
-        Exposure(d, scenes["z0_over_d"] * d, *fluid),
-        density=scenes["rho_sol_kg_m3"],
-        slope_deg=scenes["alpha_deg"],
-        entrainment_angle_deg=scenes["beta_deg"],
-        gravity=scenes["g_m_s2"],
-    )
+def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
+    """The closed form of the single grains of some rows under a law."""
+    return known(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
 
 
 def sweep(scenes: pd.DataFrame) -> FloatArray:

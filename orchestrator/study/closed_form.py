@@ -71,12 +71,7 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
 
 def closed_forms(scenes: Sequence[Scene], name: str) -> list[Threshold]:
     """The thresholds of many scenes under one force law, a hundred times faster than in turn."""
-    keys = [(name, _grain(scene)) for scene in scenes]
-    new = list(dict.fromkeys(key for key in keys if key not in _KNOWN))
-    if new:
-        columns = np.array([grain for _, grain in new]).T
-        _KNOWN.update(zip(new, _split(_threshold(LAWS[name], *columns)), strict=True))
-    return [_KNOWN[key] for key in keys]
+    return known(name, [_grain(scene) for scene in scenes])
 
 
 def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
@@ -86,10 +81,23 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     """
     *others, _, angle_deg, gravity = _grain(scene)
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
-    columns = [np.full(len(slopes), value) for value in others]
-    ends = [np.full(len(slopes), value) for value in (angle_deg, gravity)]
-    found = _threshold(law(scene), *columns, slopes, *ends).friction_velocity
+    grains = [(*others, slope, angle_deg, gravity) for slope in slopes.tolist()]
+    found = np.array([one.friction_velocity for one in known(scene.forces.law, grains)], float)
     return np.asarray(np.nan_to_num(found, nan=0.0, posinf=np.inf)[place])
+
+
+def known(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold]:
+    """The thresholds of grains under a law; each is found once.
+
+    A grain is its diameter, roughness length, fluid density, viscosity, lift coefficient, density,
+    slope, entrainment angle and gravity: all that the closed form depends on.
+    """
+    keys = [(name, grain) for grain in grains]
+    new = list(dict.fromkeys(key for key in keys if key not in _KNOWN))
+    if new:
+        columns = np.array([grain for _, grain in new]).T
+        _KNOWN.update(zip(new, _split(_threshold(LAWS[name], *columns)), strict=True))
+    return [_KNOWN[key] for key in keys]
 
 
 def _grain(scene: Scene) -> tuple[float, ...]:

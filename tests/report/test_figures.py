@@ -25,6 +25,12 @@ def pile_figures(results: Results) -> Iterator[Figure]:
     yield from piles.extended(results)
 
 
+def single_figures(results: Results) -> Iterator[Figure]:
+    yield from single.by_angle(results)
+    yield from single.by_slope(results)
+    yield from single.accuracy(results)
+
+
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
     found = {}
     for figure in figures:
@@ -49,7 +55,7 @@ def rows(table: pd.DataFrame, x: str, y: str) -> Points:
 
 @pytest.fixture(scope="module")
 def grains(results: Results) -> dict[str, list[Axes]]:
-    return drawn(single.draw(results))
+    return drawn(single_figures(results))
 
 
 @pytest.fixture(scope="module")
@@ -60,10 +66,10 @@ def heaps(results: Results) -> dict[str, list[Axes]]:
 def test_study_has_the_figures_of_its_beds(results: Results) -> None:
     names = {"dem-horizontal", "dem-slope-beta60", "accuracy"}
     one = only(results, "grain")
-    assert {figure.name for figure in single.draw(one)} == names
+    assert {figure.name for figure in single_figures(one)} == names
     assert list(pile_figures(one)) == list(stress.draw(one)) == []
     heap = only(results, "pile")
-    assert list(single.draw(heap)) == []
+    assert list(single_figures(heap)) == []
     assert [figure.name for figure in pile_figures(heap)] == [
         "fractions-alpha15", "extended-shields-d30",
     ]  # fmt: skip
@@ -216,7 +222,7 @@ def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
 def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None:
     none = {name: pd.DataFrame() for name in results.tables}
     empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
-    assert {figure.name for figure in single.draw(empty)} == {
+    assert {figure.name for figure in single_figures(empty)} == {
         "closed-form-horizontal", "closed-form-slope-beta60",
     }  # fmt: skip
     assert list(pile_figures(empty)) == list(stress.draw(empty)) == []
@@ -224,12 +230,14 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
 
 def test_ramps_are_no_points_of_the_diagrams(results: Results) -> None:
     ramps = {**results.tables, "scenes": results.tables["scenes"].assign(waiting_time=1.0)}
-    assert list(single.draw(replace(results, tables=ramps))) == []
+    assert list(single_figures(replace(results, tables=ramps))) == []
 
 
 def test_diameters_beyond_the_papers_are_crossed(results: Results) -> None:
     large = results.tables["single_grain"].assign(d_m=1.5e-3)
-    found = drawn(single.draw(replace(results, tables={**results.tables, "single_grain": large})))
+    found = drawn(
+        single_figures(replace(results, tables={**results.tables, "single_grain": large}))
+    )
     ax = found["dem-horizontal"][0]
     points, crosses = (
         sum(np.size(line.get_xdata()) for line in marked(ax, *marks))

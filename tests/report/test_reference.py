@@ -80,11 +80,12 @@ def test_closed_form_lines_are_solid_where_their_equation_holds(bed: pd.DataFram
 def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
     scenes = bed.assign(force_law=law)
     (line,) = [one for one in theory.branches(scenes) if one.law == law]
-    exact = theory.thresholds(scenes)
-    read = np.interp(np.log(exact.reynolds), np.log(line.reynolds), np.log(line.shields))
-    assert np.exp(read) == pytest.approx(exact.shields, rel=1e-3)
-    held = np.interp(exact.reynolds, line.reynolds, line.valid)
-    assert (held == exact.valid)[(held == 0) | (held == 1)].all()
+    exact = theory.thresholds(scenes, law)
+    reynolds = np.array([one.reynolds for one in exact])
+    read = np.interp(np.log(reynolds), np.log(line.reynolds), np.log(line.shields))
+    assert np.exp(read) == pytest.approx([one.shields for one in exact], rel=1e-3)
+    held = np.interp(reynolds, line.reynolds, line.valid)
+    assert (held == [one.valid for one in exact])[(held == 0) | (held == 1)].all()
 
 
 def test_the_fluid_does_not_move_a_line(bed: pd.DataFrame) -> None:
