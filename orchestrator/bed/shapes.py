@@ -156,10 +156,13 @@ def rushil_hill(aspect: float) -> tuple[FloatArray, FloatArray]:
     L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
     case 69: xi = a sin(t) runs from one foot to the other.
     """
-    t = np.linspace(-pi / 2, pi / 2, 2 * CHORDS + 1)
+    t = np.linspace(-pi / 2, pi / 2, 100 * CHORDS + 1)
     m = 1 / aspect + sqrt(1 / aspect**2 + 1)
     q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
-    return aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+    xs, zs = aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+    # equal steps of t would crowd at the feet, where x is level in it
+    x = np.linspace(-aspect, aspect, 2 * CHORDS + 1)
+    return x, np.interp(x, xs, zs)
 
 
 @cache

@@ -134,7 +134,7 @@ class FlowCase(Case):
         for name, value in self._plain.items():
             if isinstance(value, str) or value is None:
                 continue
-            if value == 0 and name in ("slope_deg", "non_orthogonal_correctors"):
+            if value == 0 and name in ("slope_deg", "non_orthogonal_correctors", "closed"):
                 continue
             if not isfinite(value) or value <= 0.0:
                 raise InputError(f"{value!r} is not a positive number", where=name)
@@ -232,7 +232,7 @@ class FlowCase(Case):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the case's numbers into the template's files, and mesh it."""
-        _set_values(
+        set_values(
             directory / "parameters",
             freeStream=self.speed_m_s,
             speedHeight=SPEED_HEIGHT * self.height_m,
@@ -245,7 +245,7 @@ class FlowCase(Case):
             convection=self.convection_scheme,
             correctors=self.non_orthogonal_correctors,
         )
-        _set_values(
+        set_values(
             directory / "parameters.geo",
             slope_deg=self.slope_deg,
             height=self.height_m,
@@ -254,10 +254,14 @@ class FlowCase(Case):
             growth=self.growth,
             growth_far=self.growth_far,
         )
+        self._write_top(directory)
         write_line(self.grid, directory / "bed_line.geo")
         if self.profile:
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
         write_mesh(directory)
+
+    def _write_top(self, directory: Path) -> None:
+        """Write what is above the flow; of a boundary layer there is nothing more to say."""
 
     def collect(self, directory: Path) -> None:
         """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
@@ -280,8 +284,12 @@ class FlowCase(Case):
             roughness=self.roughness_m,
             reynolds=self.ustar0_m_s / self.viscosity_m2_s,
         )
-        diagnostics.to_csv(found, directory / DIAGNOSTICS)
+        diagnostics.to_csv({**found, **self.of_the_top(directory)}, directory / DIAGNOSTICS)
         self._check_approach(found["approach_ustar_over_log_law"], directory)
+
+    def of_the_top(self, directory: Path) -> dict[str, Diagnostic]:
+        """Diagnostics of what is above the flow."""
+        return {}
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():
@@ -310,7 +318,7 @@ class FlowCase(Case):
             )
 
 
-def _set_values(path: Path, **values: float | str) -> None:
+def set_values(path: Path, **values: float | str) -> None:
     """Replace the values in a template's list; its comments stay."""
     text = path.read_text(encoding="utf-8")
     for name, value in values.items():

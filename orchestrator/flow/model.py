@@ -11,6 +11,7 @@ from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
+from orchestrator.flow.channel import ChannelFlow
 from orchestrator.flow.stress import WallStress, undisturbed_ustar
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import BUILDABLE_DEG, Scene
@@ -103,11 +104,13 @@ class Solved(FlowModel):
         """
         bed, flow = self.scene.bed, self.scene.flow
         assert isinstance(bed, PileBed)
+        channel = {} if flow.depth is None else {"closed": flow.top == "closed channel"}
         try:
             return _shared(
+                **channel,
                 line=self.line,
                 profile=bed.profile,
-                lid=flow.lid,
+                lid=flow.depth / bed.height if flow.depth else flow.lid,
                 upstream=flow.upstream,
                 downstream=flow.downstream,
                 # on a gentler profile cells are as fine as on flat bed
@@ -140,7 +143,7 @@ class Solved(FlowModel):
 @cache
 def _shared(**fields: Any) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
-    return FlowCase(**fields)
+    return ChannelFlow(**fields) if "closed" in fields else FlowCase(**fields)
 
 
 MODELS: dict[str, type[FlowModel]] = {

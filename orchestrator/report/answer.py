@@ -75,7 +75,9 @@ def _of_grain(row: pd.Series) -> str:
 def _flow(row: pd.Series, column: str) -> str:
     ustar = row[column]
     wind = ""
-    if row["rho_f_kg_m3"] < GAS_BELOW:
+    if pd.notna(row.get("mean_speed_m_s")):
+        wind = f", {row['mean_speed_m_s']:.2g} m/s in the mean over {row['depth_m']:g} m of depth"
+    elif row["rho_f_kg_m3"] < GAS_BELOW:
         wind = f", {float(log_law_speed(ustar, 1.0, row['z0_m'])):.2g} m/s wind at 1 m"
     return f"u* {ustar:.2g} m/s{wind}"
 

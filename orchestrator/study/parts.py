@@ -50,6 +50,7 @@ Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 Stress = Literal["wall", "eq10"]
 Method = Literal["dem", "peeling", "pivot"]
 Model = Literal["solve", "waves", "hill", "flat"]
+Top = Literal["open water", "closed channel", "boundary layer"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Forced = Literal["exposed", "all but crest", "all but toe"]
@@ -470,12 +471,32 @@ class Flow(Part):
         Convection, Info("convection scheme", scope="solved flows", about="answer")
     ] = "linearUpwind"
     """OpenFOAM's scheme for the convection of U"""
+    top: Annotated[
+        Top,
+        _unless("boundary layer"),
+        Info(
+            "top of the flow",
+            column="flow_top",
+            scope="piles",
+            choices={
+                "open water": "a level surface without stress",
+                "closed channel": "a wall as rough as the bed",
+                "boundary layer": "the log layer goes on above",
+            },
+        ),
+    ] = "boundary layer"
+    """what the flow has above"""
+    depth: Annotated[
+        Length | None, _unless(None), Info("depth", "D", "m", "depth_m", scope="piles")
+    ] = None
+    """depth of open water or of a closed channel over the flat bed"""
     lid: Annotated[
         float,
         Field(ge=3, le=1000, exclude_if=lambda value: value == 100.0),
         Info("lid", unit="h", scope="solved flows", about="answer"),
     ] = 100.0
-    """height of the lid above the flat bed; the flow there is that of the undisturbed log layer"""
+    """height of a boundary layer's lid above the flat bed; the flow there is that of the
+    undisturbed log layer"""
     upstream: Annotated[
         float,
         Field(ge=3, le=1000, exclude_if=lambda value: value == 80.0),

@@ -29,6 +29,8 @@ from orchestrator.study.sizes import Sizes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+LEAST_DEPTH = 3.0
+"""Of a channel, heights of the forms: the rows of its mesh are level at half of it."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
@@ -70,6 +72,7 @@ class Scene(Part):
             check_protrusion(self.forces.law, is_poured=self.is_poured)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
+            check_top(self.flow, self.bed.height)
             if self.flow.model == "solve":
                 check_mesh(self.bed.height, self.first_cell_height)
         else:
@@ -222,6 +225,23 @@ def check_pile(bed: PileBed, diameter: float) -> None:
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
             "a pile needs some rows: raise bed.height or lower grain.diameter",
         )
+
+
+def check_top(flow: Flow, height: float) -> None:
+    """Open water and a closed channel have a depth, which forms do not fill."""
+    if flow.top == "boundary layer":
+        if flow.depth:
+            remedy = 'leave it out, or choose flow.top = "open water"'
+            raise UnfitError("flow.depth", "a boundary layer has none", remedy)
+        return
+    if not flow.depth:
+        raise UnfitError("flow.depth", f"the depth of {flow.top} is missing", "give it, in m")
+    if flow.depth < LEAST_DEPTH * height:
+        what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms, {height:g} m"
+        raise UnfitError("flow.depth", what, "raise it, or lower bed.height")
+    if flow.model not in ("solve", "flat"):
+        what = f"the theory {flow.model} is of a flow without a top"
+        raise UnfitError("flow.model", what, 'choose "solve" or "flat"')
 
 
 def check_shape(bed: PileBed) -> None:

@@ -35,6 +35,9 @@ COLUMNS: dict[str, str] = {
     "mean_ustar_over_ustar0": "mean of ustar_over_ustar0 over the form's counted grains",
     "over_first_form": "ustar0 over that at which as much of the first form has gone",
     "u_1m_m_s": "undisturbed wind or current 1 m above flat bed, by the log law",
+    "mean_speed_m_s": "mean speed of the undisturbed flow over the depth of a channel, by the log"
+    " law",
+    "discharge_m2_s": "the same times the depth: discharge for each metre of width",
     "x_m": "along the flow, from the windward toe",
     "z_m": "above the flat bed",
     "ustar_over_ustar0_wall": "signed friction velocity of the wall stress over ustar0",

@@ -11,6 +11,7 @@ import pandas as pd
 from orchestrator.fidelity import checks
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.spread import spread
+from orchestrator.flow.channel import mean_speed
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
 from orchestrator.grains.loaded_bed import Face
@@ -172,7 +173,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
-            "u_1m_m_s": found.ustar0 / undisturbed_ustar(1.0, 1.0, scene.bed.roughness),
+            **_speeds(scene, found.ustar0),
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
@@ -230,6 +231,15 @@ def check_rows(
                 "agree": one.agree,
                 "case": pile.case.name,
             }
+
+
+def _speeds(scene: Scene, ustar0: float) -> Row:
+    """What a field user measures: the speed at 1 m, or of a channel its mean and the discharge."""
+    z0, flow = scene.bed.roughness, scene.flow
+    if flow.depth is None:
+        return {"u_1m_m_s": ustar0 / undisturbed_ustar(1.0, 1.0, z0)}
+    mean = mean_speed(ustar0, flow.depth, z0, closed=flow.top == "closed channel")
+    return {"mean_speed_m_s": mean, "discharge_m2_s": mean * flow.depth}
 
 
 def _lid_speed_ratio(pile: Pile) -> float:

@@ -26,15 +26,17 @@ law = "high"
 """
 UNCHANGEABLE = ("bed.kind", "protocol.fractions", "bed.profile", "bed.smoothing", "bed.obstacles")
 CHANGEABLE = [one for one in fields.FIELDS if one.name not in UNCHANGEABLE]
-OF_SHAPES: dict[str, dict[str, Any]] = {
+NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},
     "bed.brink_radius": {"bed.shape": "dune"},
     "bed.lee_slope_deg": {"bed.lee_slope_deg": 20.0},
     "bed.length": {"bed.shape": "trapezoid", "bed.length": 0.1},
     "bed.spacing": {"bed.forms": 3, "bed.spacing": 0.5},
     "bed.counted": {"bed.counted": "windward"},
+    "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
+    "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
 }
-"""What a bed must have for a field to say something."""
+"""What a scene must have for a field to say something."""
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +75,8 @@ def test_columns_are_distinct_and_explained() -> None:
 def test_scenes_that_differ_in_a_field_are_not_equal_in_all_else(
     one: Quantity, scene: Scene
 ) -> None:
-    if one.name in OF_SHAPES:
-        scene = changed(scene, OF_SHAPES[one.name])
+    if one.name in NEEDED:
+        scene = changed(scene, NEEDED[one.name])
     if one.info.scope == "single grains":
         scene = study.parse("grain = { diameter = 1e-3 }", name="test", where="test").scenes[0]
     if one.info.scope == "poured beds":

@@ -1,0 +1,1 @@
+../pile/bed_line.geo
