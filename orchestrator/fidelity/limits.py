@@ -4,6 +4,7 @@ Each limit was read off a map of `orchestrator stability`, which runs scenes bey
 table lies in ``calibration/maps.csv``.
 """
 
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
+from orchestrator.fidelity import spread
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.flow.theory import half_length, seen_by_the_flow
@@ -240,6 +242,19 @@ def _scheme(scene: Scene) -> str | None:
     return f"{scene.flow.convection_scheme} does not converge to the same answer, or not at all"
 
 
+def frozen_bed(scene: Scene, fraction: float) -> float:
+    """How far the threshold is known to move on a bed that changes, relative; NaN if not known.
+
+    The largest over the scenes of the class: of one packing, on a smooth, transitional or rough
+    bed. A scene whose bed changes has no frozen one, and neither has a flow that is not solved.
+    """
+    if scene.protocol.update or not _solved(scene):
+        return math.nan
+    return spread.of_choice(scene, fraction, spread.FROZEN)
+
+
+FROZEN_BED = 0.05
+"""Known change of a threshold, relative, up to which the flow of the whole pile may act on."""
 PILE_SLOPES_DEG = (10.0, 35.0)
 """Slopes of piles that the mesh and the packing have been tried for."""
 THEORIES = ("hill", "waves")

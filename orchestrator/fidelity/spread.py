@@ -51,6 +51,8 @@ class Spread:
 
 PACKING = "packing"
 """The choice whose share says nothing of a bed whose packing is known."""
+FROZEN = "frozen bed"
+"""The choice that the flow of the whole pile acts until the last grain has gone."""
 UNKNOWN = Spread(math.nan, math.nan, "")
 
 
@@ -61,11 +63,20 @@ def together(values: Iterable[float]) -> float:
 
 def spread(scene: Scene, fraction: float) -> Spread:
     """The spread of the threshold of a pile at a fraction of its grains."""
+    shares = _shares(scene, fraction)
+    return _of(shares) if shares else UNKNOWN
+
+
+def of_choice(scene: Scene, fraction: float, choice: str) -> float:
+    """How far one choice is known to move the threshold, down or up, relative; else NaN."""
+    found = (max(one.low, one.high) for one in _shares(scene, fraction) if one.choice == choice)
+    return next(found, math.nan)
+
+
+def _shares(scene: Scene, fraction: float) -> tuple[Share, ...]:
     rows = _measured().get(calibration.model_class(scene), {})
-    if not rows:
-        return UNKNOWN
     # between the fractions that were measured the nearest one speaks
-    return _of(rows[min(rows, key=lambda known: abs(known - fraction))])
+    return rows[min(rows, key=lambda known: abs(known - fraction))] if rows else ()
 
 
 def floor(scene: Scene) -> float:

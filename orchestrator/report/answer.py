@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.log_law import log_law_speed
 from orchestrator.report import labels
 from orchestrator.report.apart import varying
@@ -23,7 +24,8 @@ def sentences(results: Results) -> list[str]:
     piles = results.joined("pile_threshold")
     if len(piles):
         found = [_of_pile(row, results) for row in _ends(piles)]
-        return [*found, *_warnings(piles), *_worth(piles, results.study.tolerance)]
+        worth = _worth(piles, results.study.tolerance)
+        return [*found, *_warnings(piles), *_frozen(piles), *worth]
     single = results.joined("single_grain")
     return [*map(_of_grain, _grain_ends(single)), *_warnings(single)] if len(single) else []
 
@@ -104,6 +106,19 @@ def _worth(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
             f"The tolerance of {tolerance:.0%} is about numerics. The choices that all models here "
             f"share move the same thresholds by −{low.max():.0%} … +{high.max():.0%}, most by "
             f"{known['model_share'].mode().iloc[0]} (see `orchestrator budget`)."
+        )
+
+
+def _frozen(piles: pd.DataFrame) -> Iterator[str]:
+    """Where the flow of the whole pile is known to be too little to go by."""
+    beyond = piles["frozen_bed"] > FROZEN_BED
+    if beyond.any():
+        least, most = piles.loc[beyond, "fraction"].min(), piles["frozen_bed"].max()
+        yield (
+            "The flow of the whole pile acts until the last grain has gone. On a bed that changes "
+            f"(protocol.update = 0.1) {int(beyond.sum())} of {len(piles)} thresholds are known to "
+            f"move by more than {FROZEN_BED:.0%}, up to {most:.0%}, from n/N = {least:.0%} on "
+            "(column frozen_bed)."
         )
 
 

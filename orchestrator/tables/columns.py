@@ -28,6 +28,9 @@ COLUMNS: dict[str, str] = {
     "changed one at a time by `orchestrator budget`; empty where they were not measured",
     "shields_model_high": "upper end of the same",
     "model_share": "the shared choice that moves the threshold most",
+    "frozen_bed": "how far shields is known to move, relative, where the bed line is drawn anew as"
+    " the grains leave (protocol.update): the most in its class in `orchestrator budget`; empty"
+    " where it is not known, or the bed changes",
     "drag_over_weight": "drag over the submerged weight, closed form, at the threshold",
     "s_m": "arc length along the bed line from the windward toe",
     "s_over_h": "the same over h",

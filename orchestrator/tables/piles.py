@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.fidelity import checks
+from orchestrator.fidelity import checks, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.spread import spread
 from orchestrator.flow.channel import mean_speed
@@ -170,6 +170,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "shields": _shields(scene, found.tau),
             **_interval(scene, found, answer.decision.error_estimate or 0.0),
             **_model_interval(answer.decision.asked, fraction, _shields(scene, found.tau)),
+            "frozen_bed": limits.frozen_bed(answer.decision.asked, fraction),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),

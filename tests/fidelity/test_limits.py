@@ -1,5 +1,6 @@
 """What a plan refuses, what it is warned of, and what a study file may still ask for."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -137,3 +138,11 @@ def test_the_theories_are_of_low_beds(model: str, bed: str, what: str) -> None:
         return
     with pytest.raises(InputError, match=what):
         limits.check_study(asked)
+
+
+def test_a_frozen_bed_is_known_to_move_a_row() -> None:
+    (pile,) = _parse(PILE).scenes
+    assert limits.frozen_bed(pile, 0.1) < limits.FROZEN_BED < limits.frozen_bed(pile, 0.7)
+    for other in (PILE.replace("solve", "hill"), PILE + "[protocol]\nupdate = 0.1\n"):
+        (scene,) = _parse(other).scenes
+        assert math.isnan(limits.frozen_bed(scene, 0.7))

@@ -32,3 +32,11 @@ def test_what_was_measured_is_known_at_every_fraction(pile: MakePile) -> None:
         assert 0 < found.low <= 1
         assert found.high > 0
         assert found.dominant
+
+
+def test_one_choice_is_known_by_itself(pile: MakePile) -> None:
+    moved = [spread.of_choice(pile(), fraction, spread.FROZEN) for fraction in (0.1, 0.7)]
+    # until the first update nothing has changed
+    assert 0 <= moved[0] < 0.05 < moved[1]
+    assert math.isnan(spread.of_choice(pile(), 0.3, "no choice"))
+    assert math.isnan(spread.of_choice(pile(shape="dune"), 0.3, spread.FROZEN))

@@ -138,6 +138,15 @@ def test_verdicts_turn_with_the_numbers(results: Results, judged: dict[str, Clai
     assert judged["piles.above_single"].verdict == "reproduced"
 
 
+@pytest.mark.parametrize(("moved", "verdict"), [(0.04, "reproduced"), (0.2, "not")])
+def test_coupling_is_judged_by_what_the_frozen_bed_moves(
+    results: Results, moved: float, verdict: Verdict
+) -> None:
+    found = changed(results.tables, "pile_threshold", lambda t: t.assign(frozen_bed=moved))
+    assert found["model.coupling"].verdict == verdict
+    assert f"moved by up to {moved:.0%}" in found["model.coupling"].measured[0]
+
+
 @pytest.fixture(scope="module")
 def exact() -> Tables:
     """Single grains of the preset of the paper, as if DEM gave the closed form."""

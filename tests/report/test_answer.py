@@ -31,3 +31,11 @@ def test_a_tolerance_below_the_models_interval_is_told() -> None:
 )
 def test_nothing_is_told_of_others(low: float, high: float, tolerance: float | None) -> None:
     assert not list(answer._worth(_piles(low, high), tolerance))
+
+
+def test_what_the_frozen_bed_is_known_to_move_is_told() -> None:
+    piles = pd.DataFrame({"fraction": [0.1, 0.3, 0.7, 0.7], "frozen_bed": [0, 0.06, 0.2, math.nan]})
+    (said,) = answer._frozen(piles)
+    assert "2 of 4 thresholds" in said
+    assert "up to 20%, from n/N = 30% on" in said
+    assert not list(answer._frozen(piles[:1]))

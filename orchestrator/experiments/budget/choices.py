@@ -10,6 +10,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import Fields, Levels, changed
+from orchestrator.fidelity.spread import FROZEN
 from orchestrator.physics.laws import LAWS
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.parts import PileBed
@@ -22,8 +23,6 @@ DYNAMIC_POURED = "4 layers, fast"
 """The same on poured beds, where fewer mobile layers hold back the grains on them."""
 COARSE = "coarse"
 """Level of a solved flow; another flow model is kept."""
-FROZEN = "frozen bed"
-"""What the choice is called that the flow of the whole pile acts until the end."""
 SEEDS = (1, 2, 3)
 """How many other draws of a random packing are as good."""
 Alternatives = Mapping[str, Fields]

@@ -6,9 +6,9 @@ from pathlib import Path
 import pandas as pd
 
 from orchestrator.experiments.budget import curves, tornado
-from orchestrator.experiments.budget.choices import CHOICES, FROZEN
+from orchestrator.experiments.budget.choices import CHOICES
 from orchestrator.experiments.budget.shares import QUANTITIES
-from orchestrator.fidelity.spread import together
+from orchestrator.fidelity.spread import FROZEN, together
 from orchestrator.grains.pile import Pile
 from orchestrator.report import document
 from orchestrator.report.document import Section

@@ -7,10 +7,11 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.experiments.budget.choices import CHOICES, FROZEN, Choice, label
+from orchestrator.experiments.budget.choices import CHOICES, Choice, label
 from orchestrator.fidelity import calibration
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import Levels
+from orchestrator.fidelity.spread import FROZEN
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.study.parts import PileBed

@@ -30,6 +30,7 @@ JUDGES: tuple[Callable[[Evidence], Claim], ...] = (
     model.conditioning,
     model.regimes,
     model.stress,
+    model.coupling,
 )
 """One for each claim: in the paper's order, then those on its method."""
 FOLDER = Path(__file__).parent

@@ -141,6 +141,7 @@ EMPTY = (
     "mode",
     "s_m",
     "moved_in_load_step",
+    "frozen_bed",
 )
 """Columns of results that are asked for even of tables without rows."""
 

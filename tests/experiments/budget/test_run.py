@@ -7,8 +7,9 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.experiments.budget import shares
-from orchestrator.experiments.budget.choices import CHOICES, FROZEN
+from orchestrator.experiments.budget.choices import CHOICES
 from orchestrator.experiments.budget.run import run
+from orchestrator.fidelity.spread import FROZEN
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 
