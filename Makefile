@@ -3,6 +3,8 @@
 
 PYTHON = .venv/bin/python
 ARGS =
+# Processes of tests: ARGS=-n0 runs them in one.
+PARALLEL = -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL = help
 .PHONY: help study test test-faults calibration lint setup lock clean
@@ -15,10 +17,10 @@ study: setup  ## run the study
 	$(PYTHON) -m orchestrator study $(ARGS)
 
 test: lint  ## lint, then run the tests
-	SKIP_NOTHING=1 $(PYTHON) -m pytest --ignore=tests/faults $(ARGS)
+	SKIP_NOTHING=1 $(PYTHON) -m pytest $(PARALLEL) --ignore=tests/faults $(ARGS)
 
 test-faults: lint  ## kill, harm and starve a small study, and count what it survives: minutes
-	$(PYTHON) -m pytest tests/faults $(ARGS)
+	$(PYTHON) -m pytest $(PARALLEL) tests/faults $(ARGS)
 
 calibration: setup  ## measure the fidelity levels and the maps anew, for the package and its docs
 	$(PYTHON) -m orchestrator ladder

@@ -1,11 +1,13 @@
 """What several tests share."""
 
+import contextlib
+import fcntl
 import os
 import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs import assets, process
 from orchestrator.solvers import liggghts
 from tests import small_study
+from tests.faults import bench
 
 Deck = Callable[..., str]
 
@@ -72,7 +75,35 @@ def orchestrator(tmp_path: Path) -> Command:
     return run
 
 
+Shared = Callable[[str], contextlib.AbstractContextManager[Path]]
+
+
 @pytest.fixture(scope="session")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Shared:
+    """A directory by its name, one for all processes of a test run; one of them at a time."""
+    own = tmp_path_factory.getbasetemp()
+    root = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+    @contextlib.contextmanager
+    def held(name: str) -> Iterator[Path]:
+        folder = root / f"shared-{name}"
+        folder.mkdir(exist_ok=True)
+        with (root / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield folder
+
+    return held
+
+
+@pytest.fixture(scope="session")
+def results(shared: Shared) -> Results:
     """The small study, finished, in a directory whose name asks for trouble."""
-    return small_study.run(tmp_path_factory.mktemp("study") / """grains d'été "1" & #2 %20""")
+    with shared("results") as folder:
+        return small_study.run(folder / """grains d'été "1" & #2 %20""")
+
+
+@pytest.fixture(scope="session")
+def finished_pile(shared: Shared) -> Path:
+    """The directory of a finished study, undisturbed: a pile, its flow, two single grains."""
+    with shared("pile") as folder:
+        return bench.undisturbed(folder, bench.HEAD + bench.CELLS + bench.PILE)

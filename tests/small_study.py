@@ -36,12 +36,14 @@ grain = {{ diameter = 1e-3 }}
 
 
 def run(out: Path) -> Results:
-    """Run it in a directory."""
-    (out / "cases").mkdir(parents=True)
+    """Run what is missing of it in a directory."""
+    cases = out / "cases"
+    cases.mkdir(parents=True, exist_ok=True)
     asked = study.parse(TEXT, name="small", where="test")
     planned = plan.make(asked)
-    with engine.local(out / "cases", workers=2, limit_s=120.0) as pool:
-        assert not engine.run(planned.cases, pool, lambda outcome: None)
-    cases = out / "cases"
+    done = planned.done(cases)
+    todo = {name: one for name, one in planned.cases.items() if name not in done}
+    with engine.local(cases, workers=2, limit_s=120.0) as pool:
+        assert not engine.run(todo, pool, lambda outcome: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
-    return Results(asked, planned, made, out / "cases")
+    return Results(asked, planned, made, cases)

@@ -21,7 +21,10 @@ DAMPING = 26.0
 ROUGHEST = 2000.0
 """ks ustar/nu up to which the correlation of the shift is in use."""
 SMOOTHEST, TALLEST = 1e-3, 1e9
-"""Wall units between which the integrals are tabulated; below, the speed is y to 16 digits."""
+"""Wall units between which the integrals are tabulated.
+
+Below, the speed is y to 16 digits; above, the shear is that of the log law to 9.
+"""
 STEP = 0.03
 """Of the table in ln y: interpolation errs by less than 1e-12, relative."""
 
@@ -66,13 +69,19 @@ def _mixing_length(y: FloatArray) -> FloatArray:
 def _speed(y: FloatArray) -> FloatArray:
     """Integral of the shear from the shifted wall."""
     table = _tables()[0](np.log(np.clip(y, SMOOTHEST, TALLEST)))
-    return np.where(y < SMOOTHEST, y, table)
+    return np.where(y < SMOOTHEST, y, table + _log_above(y))
 
 
 def _summed(y: FloatArray) -> FloatArray:
     """Integral of the speed from the shifted wall."""
     table = _tables()[1](np.log(np.clip(y, SMOOTHEST, TALLEST)))
-    return np.where(y < SMOOTHEST, y**2 / 2, table)
+    above = np.maximum(y - TALLEST, 0) * (_tables()[0](np.log(TALLEST)) - 1 / KARMAN)
+    return np.where(y < SMOOTHEST, y**2 / 2, table + above + y * _log_above(y))
+
+
+def _log_above(y: FloatArray) -> FloatArray:
+    """What the log law adds to the speed at the end of the table."""
+    return np.log(np.maximum(y / TALLEST, 1)) / KARMAN
 
 
 @cache

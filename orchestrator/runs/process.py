@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from orchestrator.errors import Interrupted
+from orchestrator.runs import signals
 
 GRACE_S = 2.0
 POLL_S = 0.1
@@ -171,7 +172,7 @@ def _dies_with_its_parent() -> list[str]:
 
 def follow(parent: int) -> None:
     """Make this forked process end with its parent, and leave the signals of a user to that."""
-    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+    for number in signals.ENDING:
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)

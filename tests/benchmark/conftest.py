@@ -7,6 +7,7 @@ import pytest
 from orchestrator import pipeline
 from orchestrator.benchmark.export import export
 from orchestrator.study import study
+from tests.conftest import Shared
 
 ROOT = Path(__file__).parents[2]
 NATIVE = ROOT / "examples" / "native"
@@ -29,29 +30,34 @@ bed = { slope_deg = 10.0 }
 """One small pile, one grain."""
 
 
+def _exported(root: Path, source: Path | None, levels: tuple[int, ...] = ()) -> Path:
+    """A pack, exported unless it is there."""
+    if not (root / "manifest.json").exists():
+        export(root, source, levels)
+    return root
+
+
 @pytest.fixture(scope="session")
-def formulas(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def formulas(shared: Shared) -> Path:
     """A pack of levels 1 and 2."""
-    root = tmp_path_factory.mktemp("packs") / "formulas"
-    export(root, None, ())
-    return root
+    with shared("packs") as folder:
+        return _exported(folder / "formulas", None)
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished(shared: Shared) -> Path:
     """The directory of a finished study."""
-    out = tmp_path_factory.mktemp("studies") / "small"
-    ended = pipeline.run(study.parse(STUDY, name="small", where="small"), out, workers=2)
-    assert not ended.failures
-    return out
+    with shared("studies") as folder:
+        asked = study.parse(STUDY, name="small", where="small")
+        assert not pipeline.run(asked, folder / "small", workers=2).failures
+        return folder / "small"
 
 
 @pytest.fixture(scope="session")
-def all_levels(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def all_levels(finished: Path, shared: Shared) -> Path:
     """A pack of all levels."""
-    root = tmp_path_factory.mktemp("packs") / "all"
-    export(root, finished, ())
-    return root
+    with shared("packs") as folder:
+        return _exported(folder / "all", finished)
 
 
 THEORY = """
@@ -77,21 +83,19 @@ bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", {b
 def _theory(folder: Path, **fields: object) -> Path:
     """A pack of level 4."""
     asked = study.parse(THEORY.format(**fields), name="theory", where="theory")
-    ended = pipeline.run(asked, folder / "study", workers=1)
-    assert not ended.failures
-    export(folder / "pack", folder / "study", (4,))
-    return folder / "pack"
+    assert not pipeline.run(asked, folder / "study", workers=1).failures
+    return _exported(folder / "pack", folder / "study", (4,))
 
 
 @pytest.fixture(scope="session")
-def lift_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def lift_off(shared: Shared) -> Path:
     """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
-    folder = tmp_path_factory.mktemp("lift-off")
-    return _theory(folder, law="low", diameter=5e-4, bed="mobile_layers = 1")
+    with shared("lift-off") as folder:
+        return _theory(folder, law="low", diameter=5e-4, bed="mobile_layers = 1")
 
 
 @pytest.fixture(scope="session")
-def level_rows(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def level_rows(shared: Shared) -> Path:
     """A pack of one pile of level rows, which empties in chains."""
-    folder = tmp_path_factory.mktemp("level-rows")
-    return _theory(folder, law="high", diameter=5e-4, bed='packing = "horizontal"')
+    with shared("level-rows") as folder:
+        return _theory(folder, law="high", diameter=5e-4, bed='packing = "horizontal"')

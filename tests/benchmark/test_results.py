@@ -13,8 +13,8 @@ from orchestrator.benchmark.answer import AnswerError
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import claim
+from tests.benchmark.programs import TAIL, program
 from tests.benchmark.test_adversary import SMALL, TWO, _run
-from tests.benchmark.test_solvers import TAIL, _program
 
 
 def _refused(formulas: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:
@@ -56,7 +56,7 @@ def test_results_of_another_solver_or_pack_stay(
         _run(all_levels, tmp_path, TAIL)
     _run(formulas, tmp_path, TAIL)
     (results / ".lock").unlink()
-    with claim.claimed(results, claim.RESULTS, _program(tmp_path, TAIL)):
+    with claim.claimed(results, claim.RESULTS, program(tmp_path, TAIL)):
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
             _run(formulas, tmp_path, TAIL)
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
@@ -91,6 +91,14 @@ def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) ->
     assert "nothing is known of how its answers were made" in found.page.read_text()
 
 
+@pytest.fixture(scope="module")
+def one_answer(formulas: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a solver that passes, of one scene."""
+    folder = tmp_path_factory.mktemp("one")
+    assert not _run(formulas, folder, TAIL, Choice(patterns=("2-incline-5",))).failures
+    return folder / "results"
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -104,10 +112,9 @@ def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) ->
         f'{{"seconds": {10**400}}}',
     ],
 )
-def test_results_of_a_stranger(formulas: Path, tmp_path: Path, text: str) -> None:
+def test_results_of_a_stranger(formulas: Path, one_answer: Path, tmp_path: Path, text: str) -> None:
     given = tmp_path / "given"
-    _run(formulas, tmp_path, TAIL, Choice(patterns=("2-incline-5",)))
-    shutil.copytree(tmp_path / "results", given)
+    shutil.copytree(one_answer, given)
     for path in given.rglob("used.json"):
         path.write_text(text)
     found = runner.compare(formulas, [given], None, Choice(patterns=("2-incline-5",)))

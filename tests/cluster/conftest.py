@@ -11,6 +11,8 @@ import pytest
 
 from tests.cluster import slurm
 from tests.cluster.slurm import Slurm
+from tests.conftest import Shared
+from tests.faults.bench import undisturbed
 
 STUDY = """
 time_limit = 100
@@ -85,19 +87,10 @@ def start(tmp_path: Path, queue: Slurm) -> Iterator[Start]:
 
 
 @pytest.fixture(scope="session")
-def local_tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def local_tables(shared: Shared) -> dict[str, bytes]:
     """The tables of the study as this machine alone makes them."""
-    folder = tmp_path_factory.mktemp("local")
-    (folder / "small.toml").write_text(STUDY)
-    subprocess.run(
-        [sys.executable, "-m", "orchestrator", "study", "small.toml", "--out", "out"],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent.parent.parent)},
-        check=True,
-        capture_output=True,
-        timeout=300,
-    )
-    return tables(folder / "out")
+    with shared("local") as folder:
+        return tables(undisturbed(folder, STUDY))
 
 
 def tables(out: Path) -> dict[str, bytes]:

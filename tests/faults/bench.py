@@ -116,6 +116,16 @@ class Bench:
         assert not list(self.out.rglob("*.tmp"))
 
 
+def undisturbed(folder: Path, text: str) -> Path:
+    """The directory of a study that has run to its end; it is run once."""
+    bench = Bench(folder, folder / "out")
+    if not (bench.out / "report.html").is_file():
+        (folder / "small.toml").write_text(text)
+        code, said = bench.study()
+        assert code == 0, said
+    return bench.out
+
+
 def ended(driver: "subprocess.Popen[str]", limit_s: float = 600.0) -> tuple[int, str]:
     """Wait for a driver; its exit code and all that it said, which holds no traceback."""
     out, said = driver.communicate(timeout=limit_s)

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.faults.bench import CELLS, HEAD, PILE, Bench
+from tests.conftest import Shared
+from tests.faults.bench import CELLS, HEAD, PILE, Bench, undisturbed
 from tests.faults.ledger import Ledger
 
 LEDGER = Ledger()
@@ -15,6 +17,17 @@ LEDGER = Ledger()
 @pytest.fixture(scope="session")
 def ledger() -> Ledger:
     return LEDGER
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    # a process among several has a place for what it tells the one that started it
+    if (output := getattr(session.config, "workeroutput", None)) is not None:
+        output["ledger"] = LEDGER.told()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    LEDGER.hear(getattr(node, "workeroutput", {}).get("ledger", []))
 
 
 def pytest_terminal_summary(
@@ -27,24 +40,11 @@ def pytest_terminal_summary(
         terminalreporter.write_line(LEDGER.table().to_string(index=False))
 
 
-def _undisturbed(folder: Path, text: str) -> Path:
-    (folder / "small.toml").write_text(text)
-    bench = Bench(folder, folder / "out")
-    code, said = bench.study()
-    assert code == 0, said
-    return bench.out
-
-
 @pytest.fixture(scope="session")
-def finished_pile(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished study of a pile and two cells, undisturbed."""
-    return _undisturbed(tmp_path_factory.mktemp("pile"), HEAD + CELLS + PILE)
-
-
-@pytest.fixture(scope="session")
-def finished_cells(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished_cells(shared: Shared) -> Path:
     """A finished study of two cells, undisturbed."""
-    return _undisturbed(tmp_path_factory.mktemp("cells"), HEAD + CELLS)
+    with shared("cells") as folder:
+        return undisturbed(folder, HEAD + CELLS)
 
 
 @pytest.fixture

@@ -23,10 +23,19 @@ class Ledger:
         yield
         self.survived[name, stage] += 1
 
+    def told(self) -> list[tuple[str, str, int, int]]:
+        """Fault, stage, runs and survived, as one process tells them to another."""
+        return [(*key, runs, self.survived[key]) for key, runs in self.runs.items()]
+
+    def hear(self, told: list[tuple[str, str, int, int]]) -> None:
+        """Add what another process tells."""
+        for name, stage, runs, survived in told:
+            self.runs[name, stage] += runs
+            self.survived[name, stage] += survived
+
     def table(self) -> pd.DataFrame:
         """One row for each fault and stage, and the sum."""
-        rows = [(*key, runs, self.survived[key]) for key, runs in self.runs.items()]
-        rows.append(("sum", "", self.runs.total(), self.survived.total()))
+        rows = [*self.told(), ("sum", "", self.runs.total(), self.survived.total())]
         return pd.DataFrame(rows, columns=["fault", "stage", "runs", "survived"])
 
     def write(self, folder: Path) -> Path:

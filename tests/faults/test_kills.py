@@ -87,7 +87,8 @@ def _stopped(pile: Bench, under: tuple[str, ...], seen: Seen, after: str) -> Dri
 
 
 KILL, TERM, INT = signal.SIGKILL, signal.SIGTERM, signal.SIGINT
-HUP, QUIT = signal.SIGHUP, signal.SIGQUIT
+HUP, QUIT, XCPU = signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU
+USR1, USR2 = signal.SIGUSR1, signal.SIGUSR2
 NOHUP = ("nohup",)
 
 
@@ -95,10 +96,8 @@ NOHUP = ("nohup",)
     ("numbers", "under"),
     [
         ([KILL], ()),
-        ([TERM], ()),
         ([INT], ()),
-        ([HUP], ()),
-        ([QUIT], ()),
+        ([TERM, HUP, QUIT, USR1, USR2, XCPU], ()),
         ([TERM, INT, QUIT], NOHUP),
     ],
 )

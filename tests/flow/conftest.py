@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.flow.case import FlowCase
 from orchestrator.runs import assets, case, process
+from tests.conftest import Shared
 
 PILE = FlowCase(
     slope_deg=15.0,
@@ -31,19 +32,19 @@ def allrun(directory: Path, *, limit_s: float = 120.0, **env: str) -> process.En
 
 
 @pytest.fixture(scope="session")
-def solve(tmp_path_factory: pytest.TempPathFactory) -> Solve:
+def solve(shared: Shared) -> Solve:
     """Run a case to its end, once in a session."""
-    cases = tmp_path_factory.mktemp("cases")
 
     def to_its_end(flow: FlowCase) -> Path:
-        if not case.is_done(flow, cases):
-            directory = case.prepare(flow, cases)
-            ended = allrun(directory)
-            flow.collect(directory)
-            case.finish(
-                flow, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=ended.seconds
-            )
-        return cases / flow.name
+        with shared("flows") as cases:
+            if not case.is_done(flow, cases):
+                directory = case.prepare(flow, cases)
+                ended = allrun(directory)
+                flow.collect(directory)
+                case.finish(
+                    flow, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=ended.seconds
+                )
+            return cases / flow.name
 
     return to_its_end
 

@@ -172,7 +172,7 @@ def test_the_template_runs_as_it_lies(template: Path) -> None:
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 300.0
     while not condition():
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -218,8 +218,10 @@ def test_a_killed_script_takes_the_solver_with_it(tmp_path: Path) -> None:
 
 def test_a_time_limit_ends_the_solver(tmp_path: Path) -> None:
     directory = case.prepare(SLOW, tmp_path)
-    ended = allrun(directory, limit_s=2.5)
-    assert ended.timed_out
+    limit_s, log = 2.5, directory / "log.simpleFoam"
+    while not (log.exists() and "Time = 3\n" in log.read_text()):
+        assert allrun(directory, limit_s=limit_s).timed_out
+        limit_s *= 2  # a busy machine is still at the mesh
     pid = solver_pid(directory)
     wait_for(lambda: not is_alive(pid))
     with pytest.raises(SolverError, match="stopped before its end"):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.bench import CELLS, HEAD, PILE, ROOT
+from tests.faults.bench import CELLS, HEAD, ROOT
 
 HOSTILE_RC = """
 text.usetex: True
@@ -37,14 +37,10 @@ def _run(folder: Path, *arguments: str, **variables: str) -> "subprocess.Complet
     )
 
 
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The directory of a finished study: a pile, its flow, two single grains."""
-    folder = tmp_path_factory.mktemp("finished")
-    (folder / "small.toml").write_text(HEAD + CELLS + PILE)
-    ended = _run(folder, "study", "small.toml", "--out", "out")
-    assert ended.returncode == 0, ended.stderr
-    return folder / "out"
+@pytest.fixture(scope="module")
+def finished(finished_pile: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the finished study, to be drawn again."""
+    return Path(shutil.copytree(finished_pile, tmp_path_factory.mktemp("finished") / "out"))
 
 
 def _drawn(out: Path) -> dict[str, bytes]:
@@ -55,13 +51,10 @@ def _drawn(out: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     "variables",
     [
-        {"MATPLOTLIBRC": "rc"},
-        {"MPLCONFIGDIR": "rc"},
+        {"MATPLOTLIBRC": "rc", "MPLBACKEND": "nonsense", "SOURCE_DATE_EPOCH": "abc"},
+        {"MPLCONFIGDIR": "rc", "MPLBACKEND": "TkAgg", "DISPLAY": ":99"},
         {"XDG_CONFIG_HOME": "config"},
-        {"MPLBACKEND": "nonsense"},
-        {"MPLBACKEND": "TkAgg", "DISPLAY": ":99"},
         {"MPLCONFIGDIR": "/dev/null/nowhere"},
-        {"SOURCE_DATE_EPOCH": "abc"},
     ],
     ids=str,
 )

@@ -105,6 +105,14 @@ def test_the_profile_is_the_integral_of_its_shear(reynolds: float, ratio: float)
     np.testing.assert_allclose(found, _integral(base, base + reynolds, float(moved)), rtol=1e-10)
 
 
+@pytest.mark.parametrize("reynolds", [1e9, 1e10, 1e20])
+def test_the_profile_goes_on_above_its_table(reynolds: float) -> None:
+    base, moved = np.array(reynolds / 30), shift(np.array(reynolds))
+    found = layer(base, base + reynolds, moved)
+    exact = _integral(float(base), float(base + reynolds), float(moved))
+    np.testing.assert_allclose(found, exact, rtol=1e-9)
+
+
 def test_the_shift_of_a_smooth_wall_is_none_and_it_sets_in_continuously() -> None:
     assert not np.any(shift(np.linspace(0, 4.5, 50)))
     assert 0 < float(shift(np.array(4.54))) < 0.01
