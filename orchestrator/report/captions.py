@@ -271,6 +271,17 @@ def flow(piles: list[Pile]) -> str:
     )
 
 
+def wear() -> str:
+    """Of the figure of beds that change."""
+    return (
+        "The threshold at which n grains have moved, the mean stress on them. Dashed: the flow of "
+        "the whole pile acts until the end, as in the paper. Solid: after each part of the grains "
+        "that protocol.update says the bed line is drawn anew through those that are there, and "
+        "the flow is solved over it. Dot: where the two are first more than 5 % apart "
+        "(holds_until); by DEM one load step is twice its increment in θ."
+    )
+
+
 def mesh(pile: Pile) -> str:
     """Of the picture of the mesh."""
     flow, z0 = pile.flow, pile.bed.roughness

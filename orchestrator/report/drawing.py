@@ -19,6 +19,7 @@ from orchestrator.report import (
     single,
     stress,
     style,
+    wear,
     where,
 )
 from orchestrator.report.figure import Figure
@@ -31,7 +32,7 @@ Draw = Callable[[Results], Iterable[Figure]]
 SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (5, (single.by_angle,)),
     (2, (piles.extended,)),
-    (3, (piles.fractions,)),
+    (3, (piles.fractions, wear.draw)),
     (9, (stress.draw,)),
     (10, (flow.draw,)),
     (0, (bed.draw,)),

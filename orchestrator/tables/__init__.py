@@ -18,7 +18,7 @@ from orchestrator.plan import Plan
 from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
 from orchestrator.tables import flows as flows_table
-from orchestrator.tables import forms, piles, scenes, single, text
+from orchestrator.tables import forms, piles, scenes, single, text, wear
 from orchestrator.tables.columns import COLUMNS
 from orchestrator.tables.scatter import with_scatter
 from orchestrator.tables.usable import with_usable
@@ -50,6 +50,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "pile_curve": _concat(map(piles.curve, ready)),
         "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
         "size_class": pd.DataFrame(row for one in ready for row in piles.size_class_rows(one)),
+        "bed_change": _concat(wear.tables(ready)),
         "form": pd.DataFrame(row for one in ready for row in forms.rows(one)),
         "check": pd.DataFrame(_checks(study, plan, cases, done)),
     }

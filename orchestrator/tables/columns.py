@@ -31,6 +31,11 @@ COLUMNS: dict[str, str] = {
     "frozen_bed": "how far shields is known to move, relative, where the bed line is drawn anew as"
     " the grains leave (protocol.update): the most in its class in `orchestrator budget`; empty"
     " where it is not known, or the bed changes",
+    "shields_frozen": "shields of the same pile under the flow of the whole pile until the end",
+    "change": "shields over shields_frozen, less 1",
+    "change_ustar0": "the same of ustar0_m_s",
+    "holds_until": "n/N at which shields first differs by more than 5 % from shields_frozen; empty:"
+    " nowhere up to the last fraction",
     "drag_over_weight": "drag over the submerged weight, closed form, at the threshold",
     "s_m": "arc length along the bed line from the windward toe",
     "s_over_h": "the same over h",

@@ -127,7 +127,7 @@ def _of_class(answer: Answer, one: classes.SizeClass, fraction: float) -> Row:
     stresses = (found.tau, found.tau_low, found.tau_high)
     return {
         "ustar0_m_s": found.ustar0,
-        **{n: _shields(scene, tau) / one.size for n, tau in zip(names, stresses, strict=True)},
+        **{n: shields(scene, tau) / one.size for n, tau in zip(names, stresses, strict=True)},
     }
 
 
@@ -148,7 +148,7 @@ def curve(answer: Answer) -> pd.DataFrame:
             "fallen_upstream": motion.fallen_upstream,
             "fraction_moved": curve.fraction,
             "mean_tau_pa": curve.mean_tau,
-            "shields": _shields(scene, curve.mean_tau),
+            "shields": shields(scene, curve.mean_tau),
             "reynolds": _reynolds(scene, curve.mean_tau),
         }
     )
@@ -167,9 +167,9 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "packing": pile.bed.packing,
             "stress": scene.forces.stress,
             "fraction": fraction,
-            "shields": _shields(scene, found.tau),
+            "shields": shields(scene, found.tau),
             **_interval(scene, found, answer.decision.error_estimate or 0.0),
-            **_model_interval(answer.decision.asked, fraction, _shields(scene, found.tau)),
+            **_model_interval(answer.decision.asked, fraction, shields(scene, found.tau)),
             "frozen_bed": limits.frozen_bed(answer.decision.asked, fraction),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
@@ -192,8 +192,8 @@ def _levels(decision: Decision) -> Row:
 def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
     """What the load steps and the count enclose; at least the known error of the levels."""
     return {
-        "shields_low": _shields(scene, min(found.tau_low, found.tau * (1 - error))),
-        "shields_high": _shields(scene, max(found.tau_high, found.tau * (1 + error))),
+        "shields_low": shields(scene, min(found.tau_low, found.tau * (1 - error))),
+        "shields_high": shields(scene, max(found.tau_high, found.tau * (1 + error))),
     }
 
 
@@ -224,10 +224,10 @@ def check_rows(
                 "packing": pile.bed.packing,
                 "fraction": one.cheap.fraction,
                 **_levels(decisions[asked]),
-                "shields": _shields(scene, one.cheap.tau),
-                "shields_dem": _shields(scene, one.dem.tau),
-                "shields_dem_low": _shields(scene, one.dem.tau_low),
-                "shields_dem_high": _shields(scene, one.dem.tau_high),
+                "shields": shields(scene, one.cheap.tau),
+                "shields_dem": shields(scene, one.dem.tau),
+                "shields_dem_low": shields(scene, one.dem.tau_low),
+                "shields_dem_high": shields(scene, one.dem.tau_high),
                 "difference": one.cheap.tau / one.dem.tau - 1,
                 "agree": one.agree,
                 "case": pile.case.name,
@@ -247,7 +247,8 @@ def _lid_speed_ratio(pile: Pile) -> float:
     return pile.model.lid_speed_ratio
 
 
-def _shields(scene: Scene, tau: Any) -> Any:
+def shields(scene: Scene, tau: Any) -> Any:
+    """The Shields number of a stress, Pa."""
     return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from orchestrator import pipeline, plan
+from orchestrator import pipeline, plan, tables
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.grains import wear
@@ -15,6 +15,9 @@ from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.wear import Worn
+from orchestrator.report import wear as wear_figure
+from orchestrator.report.pictures import bed
+from orchestrator.report.results import Results
 from orchestrator.runs.claim import STUDY
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
@@ -38,6 +41,14 @@ def _scene(more: str = "") -> Scene:
     return found
 
 
+BEDS = """
+[[group]]
+[group.axes]
+"protocol.method" = ["peeling", "dem"]
+"protocol.update" = [0.0, 0.25]
+"""
+
+
 class Done(NamedTuple):
     """A pile whose runs are done, and where they lie."""
 
@@ -46,21 +57,25 @@ class Done(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def worn(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Done]:
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """One pile by both methods, on a bed that changes and on a frozen one."""
     space = Workspace(tmp_path_factory.mktemp("wear") / "out")
-    found = {}
+    asked = study.parse(PILE.format(more=BEDS), name="wear", where="test")
+    planned = plan.make(asked)
     with space.held(STUDY, "wear"):
-        for method in ("peeling", "dem"):
-            for update in (0.0, 0.25):
-                more = f'method = "{method}"\nupdate = {update}'
-                asked = study.parse(PILE.format(more=more), name="one", where="test")
-                planned = plan.make(asked)
-                todo = pipeline.missing(planned, space)
-                assert not pipeline.complete(todo, space, workers=2, limit_s=600.0)
-                (pile,) = planned.piles.values()
-                found[method if update else f"{method}, frozen"] = Done(pile, space.cases)
-    return found
+        assert not pipeline.complete(planned.cases, space, workers=2, limit_s=600.0)
+    made = tables.make(asked, planned, space.cases, planned.done(space.cases))
+    return Results(asked, planned, made, space.cases)
+
+
+@pytest.fixture(scope="module")
+def worn(results: Results) -> dict[str, Done]:
+    """The same piles by the method, and whether they are frozen."""
+    return {
+        rules.method + ("" if rules.update else ", frozen"): Done(pile, results.cases)
+        for pile in results.plan.piles.values()
+        for rules in (pile.scene.protocol,)
+    }
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal"])
@@ -141,6 +156,47 @@ def test_the_methods_agree_on_a_bed_that_changes(worn: dict[str, Done]) -> None:
     for fraction in (0.25, 0.5, 0.75):
         flows = [one.flow[np.argmax(one.fraction >= fraction)] for one in (by_peeling, by_dem)]
         assert flows[1] / flows[0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:
+    table = results.tables["bed_change"]
+    assert table["scene_id"].nunique() == 2
+    for scene_id, own in table.groupby("scene_id"):
+        pile = results.plan.piles[str(scene_id)]
+        thresholds = results.tables["pile_threshold"].set_index(["scene_id", "fraction"])
+        at = own[own["moved"] == np.ceil(0.75 * pile.packing.count)].iloc[0]
+        shields = thresholds.loc[(str(scene_id), 0.75), "shields"]
+        assert at["shields"] == pytest.approx(shields)
+        assert at["change"] == pytest.approx(at["shields"] / at["shields_frozen"] - 1)
+        beyond = own.loc[own["change"].abs() > 0.05, "fraction_moved"]
+        assert own["holds_until"].iloc[0] == beyond.min() > 0.25
+        assert np.all(own.loc[own["fraction_moved"] <= 0.25, "change"].abs() < 1e-9)
+
+
+def test_the_figure_has_a_line_for_each_bed(results: Results) -> None:
+    (figure,) = wear_figure.draw(results)
+    assert figure.canvas is not None
+    panels = figure.canvas.axes
+    assert len(panels) == 2
+    assert all(len(ax.lines) == 3 for ax in panels)
+    assert len(figure.cases) == 2
+
+
+@pytest.mark.parametrize("method", ["peeling", "dem"])
+def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str) -> None:
+    pile, cases = worn[method]
+    steps = bed.read(pile, cases)
+    starts = [step for step, _ in steps.lines]
+    assert starts[0] == 0
+    assert len(starts) == 3
+    assert all(steps.moved(step - 1) < steps.moved(step) for step in starts[1:])
+    # who has moved is off the bed before the next line is there
+    left = np.isfinite(wear.grains(pile, pile.flows[2], cases).left)
+    assert np.isnan(steps.places[starts[2] - 1, left, 0]).all() or method == "dem"
+    frames = bed.data(steps, steps.first(0.5))["lines"]
+    assert [step for step, _ in frames] == starts
+    frozen = worn[f"{method}, frozen"]
+    assert "lines" not in bed.data(bed.read(frozen.pile, cases), 0)
 
 
 def test_runs_that_go_on_are_one_motion() -> None:
