@@ -7,7 +7,7 @@ ARGS =
 PARALLEL = -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL = help
-.PHONY: help study test test-faults calibration lint setup lock clean
+.PHONY: help study test test-faults calibration docs lint setup lock clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
@@ -32,6 +32,10 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	cp results/ladder/figures/gains.png docs/gains.png
 	cp results/stability/figures/maps.png docs/stability.png
 
+docs:  ## make the site of the documents, site/README.html, which reads offline
+	@sh tools/setup.sh docs
+	$(PYTHON) -m sphinx -q -W --keep-going -c docs . site
+
 lint:  ## ruff and mypy
 	@sh tools/setup.sh test
 	$(PYTHON) -m ruff check .
@@ -45,5 +49,5 @@ lock:  ## pin anew, from pyproject.toml, what goes into .venv
 	@sh tools/setup.sh lock
 
 clean:  ## remove .venv, caches and built packages; results stay
-	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
+	rm -rf site .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
 	find orchestrator tests -type d -name __pycache__ -prune -exec rm -rf {} +

@@ -1,18 +1,24 @@
 """Documents that must follow the code: the citation, and the links between pages."""
 
-import os
+import copy
 import re
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
+import nbclient
+import nbformat
 import pytest
 
+import orchestrator
 from orchestrator import __version__, plan
 from orchestrator.study import study
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted(ROOT.glob("*/*/README.md")),
+]
 
 
 def test_the_citation_has_the_version_of_the_package() -> None:
@@ -22,8 +28,8 @@ def test_the_citation_has_the_version_of_the_package() -> None:
 
 def test_the_index_names_every_page() -> None:
     index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
-    missing = [page.name for page in PAGES[1:] if f"({page.name})" not in index]
-    assert missing == ["README.md"]
+    pages = sorted((ROOT / "docs").glob("*.md"))
+    assert [one.name for one in pages if f"({one.name})" not in index] == ["README.md"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
@@ -50,15 +56,34 @@ def test_the_first_picture_is_of_the_preset_that_make_study_runs() -> None:
     assert f"α = {shown.scene.bed.slope_deg:g}°, d = 1 mm" in drawn
 
 
-def test_the_example_runs(tmp_path: Path) -> None:
-    script = ROOT / "docs" / "example.py"
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    ended = subprocess.run(
-        [sys.executable, script], cwd=tmp_path, env=env, capture_output=True, text=True
-    )
-    assert ended.returncode == 0, ended.stderr
-    assert "One grain of 0.2 mm on 10°" in ended.stdout
+def test_the_notebook_says_what_a_run_of_it_says(tmp_path: Path) -> None:
+    written = nbformat.read(ROOT / "docs" / "example.ipynb", 4)  # type: ignore[no-untyped-call]
+    again = copy.deepcopy(written)
+    place = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(again, resources=place, kernel_name="python3").execute()
+    assert _said(again) == _said(written)
+    assert "One grain of 0.2 mm on 10°" in " ".join(_said(again))
+    rows = orchestrator.open(tmp_path / "dune").thresholds
+    exact = rows["ustar_closed_form_m_s"]
+    assert ((rows["ustar_low_m_s"] <= exact) & (exact <= rows["ustar_high_m_s"])).all()
     assert "<svg" in (tmp_path / "shields.svg").read_text(encoding="utf-8")
+
+
+def _said(notebook: Any) -> list[str]:
+    """What a notebook prints and what its tables hold, but for paths and progress."""
+    outputs = [one for cell in notebook.cells for one in cell.get("outputs", [])]
+    said = [one["text"] for one in outputs if one.get("name") == "stdout"]
+    tables = [one["data"] for one in outputs if one["output_type"] == "execute_result"]
+    return said + [one["text/plain"] for one in tables if "text/html" in one]
+
+
+def test_every_how_to_names_studies_that_are_accepted(tmp_path: Path) -> None:
+    for page in ("water.md", "mars.md", "first-study.md"):
+        text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+        for number, block in enumerate(re.findall(r"(?s)```toml\n(.*?)```", text)):
+            file = tmp_path / f"{page}-{number}.toml"
+            file.write_text(block, encoding="utf-8")
+            assert plan.make(study.load(str(file))).decisions
 
 
 def slug(title: str) -> str:

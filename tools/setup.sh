@@ -4,7 +4,8 @@
 #   sh tools/setup.sh run      Debian packages, and .venv with what requirements.lock pins
 #   sh tools/setup.sh cluster  the same, and the extra [cluster]: what requirements-cluster.lock pins
 #   sh tools/setup.sh test     the same, a Slurm to test it with, and what requirements-test.lock pins
-#   sh tools/setup.sh lock     resolve pyproject.toml anew into the three lock files
+#   sh tools/setup.sh docs     the same, and the extra [docs]: what requirements-docs.lock pins
+#   sh tools/setup.sh lock     resolve pyproject.toml anew into the four lock files
 set -eu
 unset CDPATH
 cd -- "$(dirname -- "$0")/.."
@@ -159,7 +160,7 @@ with open("pyproject.toml", "rb") as file:
 project = data["project"]
 wanted = {
     "run": project["dependencies"],
-    "cluster": project["optional-dependencies"]["cluster"],
+    **project["optional-dependencies"],
     "test": data["dependency-groups"]["test"],
 }
 print(*wanted[sys.argv[1]], sep="\n")
@@ -177,6 +178,7 @@ lock() {
     lock_part run requirements.lock
     lock_part cluster requirements-cluster.lock
     lock_part test requirements-test.lock
+    lock_part docs requirements-docs.lock
 }
 
 # Pins what a part needs beside the parts before it.
@@ -195,6 +197,7 @@ test)
     slurm="slurmctld slurmd slurm-client munge"
     set_up requirements.lock requirements-cluster.lock requirements-test.lock
     ;;
+docs) set_up requirements.lock requirements-cluster.lock requirements-test.lock requirements-docs.lock ;;
 lock) lock ;;
-*) die "usage: sh tools/setup.sh run|cluster|test|lock" ;;
+*) die "usage: sh tools/setup.sh run|cluster|test|docs|lock" ;;
 esac
