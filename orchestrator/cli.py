@@ -118,7 +118,8 @@ def _add_study(commands: Any) -> None:
         "--tolerance",
         type=float,
         metavar="X",
-        help="relative error that tau_c may have: the cheapest models known to be within it",
+        help="relative error that tau_c may have: the cheapest models known to be within it;"
+        " 0: every scene as the file asks",
     )
     command.add_argument(
         "--cluster",

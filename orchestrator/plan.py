@@ -8,7 +8,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity import checks, limits
-from orchestrator.fidelity.decision import Bound, Decision, decide
+from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
@@ -64,7 +64,8 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
     Parameters
     ----------
     study : Study
-        With a tolerance, each scene is answered on the cheapest levels that are known to meet it.
+        With a tolerance, each scene is answered on the cheapest levels that are known to meet it;
+        with one of 0, as it is asked; without one, `by_default`.
     above : mapping, optional
         By scene id: levels that turned out to be not good enough.
     cases : Path, optional
@@ -79,9 +80,13 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
     limits.check_study(study)
     bounds = above or {}
     decisions = {
-        scene.id: decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
+        scene.id: _decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
     }
     return of(decisions, study.name, study.tolerance, cases)
+
+
+def _decide(scene: Scene, tolerance: float | None, above: Bound | None) -> Decision:
+    return by_default(scene, above) if tolerance is None else decide(scene, tolerance, above)
 
 
 def of(
@@ -123,9 +128,9 @@ def settled(study: Study, directory: Path) -> Plan:
     above: dict[str, Bound] = {}
     while True:
         planned = make(study, above, directory)
-        if study.tolerance is None:
-            return planned
-        more = {**_failed(planned, directory), **_overruled(planned, study.tolerance, directory)}
+        more = _failed(planned, directory)
+        if study.tolerance:
+            more |= _overruled(planned, study.tolerance, directory)
         if not more:
             return planned
         above |= more

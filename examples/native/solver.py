@@ -230,12 +230,20 @@ def passing(scene, case):
 
 
 def pile(scene, case):
-    """Each grain alone: it moves when its own stress reaches the threshold of one grain."""
+    """Each grain alone under the stress that the scene gives it."""
     counted = [g for g in table(case / "grains.csv") if g["kind"] == "counted"]
+    grains = [(float(g["ustar_over_ustar0"]), float(g["slope_deg"])) for g in counted]
+    return alone(scene, grains, table(case / "load_steps.csv"))
+
+
+def alone(scene, grains, load_steps):
+    """A grain moves when its own stress reaches the threshold of one grain.
+
+    `grains` are the counted ones: the u*/u*_0 that each feels, and the slope of its bed in degrees.
+    """
     found = {}  # grains on one slope have one threshold
     order = []
-    for grain in counted:
-        ratio, slope = float(grain["ustar_over_ustar0"]), float(grain["slope_deg"])
+    for ratio, slope in grains:
         # flow that runs back pushes the grain the other way, on a slope of the other sign
         slope = math.copysign(1.0, ratio) * round(slope, 9)
         if slope not in found:
@@ -243,12 +251,12 @@ def pile(scene, case):
         if ratio:
             order.append((found[slope] / abs(ratio), ratio * abs(ratio)))
     order.sort()
-    flow = [float(h["ustar0_m_s"]) for h in table(case / "load_steps.csv")]
-    moved = [sum(alone <= u for alone, _ in order) for u in flow]
+    flow = [float(row["ustar0_m_s"]) for row in load_steps]
+    moved = [sum(own <= u for own, _ in order) for u in flow]
     excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
 
     def first(fraction):
-        need = max(math.ceil(fraction * len(counted) - 1e-9), 1)
+        need = max(math.ceil(fraction * len(grains) - 1e-9), 1)
         level = next((i for i, n in enumerate(moved) if n >= need), len(moved) - 1)
         return level, math.sqrt(flow[level - 1] * flow[level])
 
@@ -259,7 +267,8 @@ def pile(scene, case):
 
     answers = {
         "moved": lambda at: moved[int(at)],
-        "not_moved": lambda at: len(counted) - moved[int(at)],
+        "not_moved": lambda at: len(grains) - moved[int(at)],
+        "count": lambda at: len(grains),
         "carried_off": lambda at: 0,
         "ustar0_m_s": lambda at: first(float(at))[1],
         "shields": lambda at: shields(float(at)),

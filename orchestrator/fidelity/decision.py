@@ -3,13 +3,14 @@
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
-from orchestrator.fidelity import calibration, levels
+from orchestrator.fidelity import calibration, levels, spread
 from orchestrator.fidelity.calibration import UNKNOWN, Known
 from orchestrator.fidelity.levels import FLAT, LEVELS, Levels, Part, changed
+from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -79,6 +80,8 @@ class Bound:
 
 LIFTED = Bound({"grains": "peeling"}, "the lift carries grains off, which DEM alone shows")
 NO_BOUND = Bound({}, "")
+BY_DEFAULT = "chosen by default"
+"""How `why` begins where a study file leaves the levels open."""
 
 
 def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) -> Decision:
@@ -90,7 +93,7 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
         Resolved.
     tolerance : float or None
         Relative error of tau_c at each of the scene's fractions, the uncertainty of the reference
-        included; None: every scene as it is asked.
+        included; None or 0: the scene as it is asked.
     above : Bound, optional
         Levels that turned out to be not good enough.
 
@@ -100,7 +103,7 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
         On the levels with the least known error where none is within the tolerance; as asked where
         nothing is known, or where the way to the answer is a part of what is asked.
     """
-    if tolerance is None:
+    if not tolerance:
         return as_asked(scene)
     if why := _asks_for(scene):
         return as_asked(scene, why)
@@ -117,6 +120,39 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
     )
     why = f"{why}; {bound.because}" if bound.because else why
     return on_levels(scene, dict(named), why) if named else as_asked(scene, why)
+
+
+def by_default(scene: Scene, above: Bound | None = None) -> Decision:
+    """The decision on a scene of a study that says nothing of how to answer.
+
+    A pile whose file sets no field about the answer is answered on the cheapest levels whose known
+    error is below the model's own spread. The bound is one for all kinds of scenes, so that what
+    stands in one figure was found in one way. All else is answered as asked: single grains, poured
+    beds, whose model was not varied, and what is set.
+    """
+    if not leaves_open(scene):
+        return as_asked(scene)
+    floor = spread.lowest_floor()
+    chosen = decide(scene, floor, above)
+    if chosen.is_as_asked or not chosen.levels:
+        return chosen
+    within = chosen.known.total <= floor
+    how = "cheapest" if within else "least known error: none"
+    why = f"{BY_DEFAULT}: {how} within the model's own spread of {floor:.0%}"
+    because = f"; {above.because}" if above else ""
+    return replace(chosen, why=why + because)
+
+
+def leaves_open(scene: Scene) -> bool:
+    """Whether the study file of a pile sets none of the fields that are about the answer."""
+    if not isinstance(scene.bed, PileBed) or scene.is_poured:
+        return False
+    return not any(
+        field in getattr(scene, part).model_fields_set
+        for one in fields.FIELDS
+        if one.info.about == "answer"
+        for part, _, field in (one.name.partition("."),)
+    )
 
 
 def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:

@@ -6,7 +6,7 @@ choice and fraction, how far its alternatives lower and raise a threshold.
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -49,10 +49,13 @@ class Spread:
     dominant: str
 
 
-PACKING = "packing"
-"""The choice whose share says nothing of a bed whose packing is known."""
 FROZEN = "frozen bed"
 """The choice that the flow of the whole pile acts until the last grain has gone."""
+STATED = frozenset(
+    ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
+)
+"""Choices that a study file states: their shares say what its values are worth, not what its model
+is."""
 UNKNOWN = Spread(math.nan, math.nan, "")
 
 
@@ -80,12 +83,21 @@ def _shares(scene: Scene, fraction: float) -> tuple[Share, ...]:
 
 
 def floor(scene: Scene) -> float:
-    """Half the model's interval of a pile whose packing is known, relative; NaN if not measured.
+    """Half the model's interval of a pile whose file's values are sure, relative; NaN if not known.
 
     It is the smallest over the fractions: an error of the numerics below it buys nothing.
     """
-    rows = _measured().get(calibration.model_class(scene), {})
-    known = (_of(tuple(one for one in row if one.choice != PACKING)) for row in rows.values())
+    return _floor(_measured().get(calibration.model_class(scene), {}))
+
+
+@cache
+def lowest_floor() -> float:
+    """The smallest floor of all kinds of scenes that were measured, relative."""
+    return min(map(_floor, _measured().values()))
+
+
+def _floor(rows: Mapping[float, tuple[Share, ...]]) -> float:
+    known = (_of(tuple(one for one in row if one.choice not in STATED)) for row in rows.values())
     return min(((one.low + one.high) / 2 for one in known), default=math.nan)
 
 

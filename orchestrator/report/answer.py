@@ -4,7 +4,9 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from orchestrator.fidelity.decision import BY_DEFAULT
 from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.fidelity.spread import lowest_floor
 from orchestrator.physics.log_law import log_law_speed
 from orchestrator.report import labels
 from orchestrator.report.apart import varying
@@ -25,7 +27,7 @@ def sentences(results: Results) -> list[str]:
     if len(piles):
         found = [_of_pile(row, results) for row in _ends(piles)]
         worth = _worth(piles, results.study.tolerance)
-        return [*found, *_warnings(piles), *_frozen(piles), *worth]
+        return [*found, *_warnings(piles), *_frozen(piles), *_chosen(results), *worth]
     single = results.joined("single_grain")
     return [*map(_of_grain, _grain_ends(single)), *_warnings(single)] if len(single) else []
 
@@ -94,10 +96,23 @@ def _warnings(table: pd.DataFrame) -> Iterator[str]:
         yield f"Usable: {usable} of {len(table)} thresholds."
 
 
+def _chosen(results: Results) -> Iterator[str]:
+    """Which levels answered where the study file says nothing of them."""
+    chosen = [d for d in results.plan.decisions.values() if d.why.startswith(BY_DEFAULT)]
+    if chosen:
+        names = ", ".join(dict.fromkeys(one.levels_text for one in chosen))
+        error = max(one.known.total for one in chosen)
+        yield (
+            f"Answered by default on the levels {names}: at most {error:.0%} off DEM, less than "
+            f"the model's own choices move a threshold ({lowest_floor():.0%}). `--tolerance 0` "
+            "runs DEM."
+        )
+
+
 def _worth(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
     """A tolerance below the model's own interval is answered, and this is said of it."""
     known = piles.dropna(subset=["shields", "shields_model_low"])
-    if tolerance is None or known.empty:
+    if not tolerance or known.empty:
         return
     low = 1 - known["shields_model_low"] / known["shields"]
     high = known["shields_model_high"] / known["shields"] - 1

@@ -38,7 +38,7 @@ the field and the remedy. The [glossary](glossary.md) explains the words.
 | `title` | the file's name | a line for the page |
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
 | `seeds` | none | number of beds that differ in their seed alone; also of a group |
-| `tolerance` | none | relative error that τ_c may have; the cheapest levels within it answer |
+| `tolerance` | none | relative error that τ_c may have: [ladder.md](ladder.md#the-default) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 

@@ -79,7 +79,7 @@ class Study:
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
     tolerance : float or None
-        Relative error that tau_c may have; None: every scene as it is asked for.
+        Relative error that tau_c may have; 0: every scene as it is asked for; None: it is not said.
     cluster : dict
         Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
@@ -201,18 +201,18 @@ def check_time(value: Any, where: str) -> None:
 
 
 def check_tolerance(value: Any, where: str) -> None:
-    """A tolerance is a relative error between 0 and 1.
+    """A tolerance is a relative error below 1.
 
     Raises
     ------
     InputError
         If it is not.
     """
-    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value < 1:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value < 1:
         raise InputError(
-            f"{value!r} is not a relative error between 0 and 1",
+            f"{value!r} is not a relative error from 0 to below 1",
             where=where,
-            remedy="0.05 allows tau_c to be 5 % off",
+            remedy="0.05 allows tau_c to be 5 % off, 0 takes every scene as it is asked",
         )
 
 

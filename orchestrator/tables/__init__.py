@@ -60,7 +60,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
 def _checks(
     study: Study, plan: Plan, cases: Path, done: Container[str]
 ) -> Iterator[dict[str, Any]]:
-    if study.tolerance is not None:
+    if study.tolerance:
         ready = checks.ready(plan.piles, plan.checks, done)
         yield from piles.check_rows(plan.decisions, plan.piles, ready, study.tolerance, cases)
 

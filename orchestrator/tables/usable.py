@@ -60,7 +60,7 @@ def _reasons(rows: pd.DataFrame, tolerance: float | None) -> Iterator[Reason]:
             share > CARRIED_OFF,
             [f"lift carried off {one:.0%} of the moved grains" for one in share],
         )
-        if tolerance is not None:
+        if tolerance:
             yield _inexact(rows["error_estimate"].to_numpy(float), tolerance)
 
 
