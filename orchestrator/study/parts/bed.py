@@ -1,0 +1,232 @@
+"""The bed of a scene: one grain on its neighbours, or grains under a bed line."""
+
+from math import radians, tan
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainSerializer, PlainValidator, field_validator
+
+from orchestrator.study.info import Info
+from orchestrator.study.parts.obstacle import Obstacle
+from orchestrator.study.parts.part import Part, unless
+from orchestrator.study.profile import Profile, a_profile
+from orchestrator.study.ranges import (
+    EntrainmentAngle,
+    Height,
+    LeeSlope,
+    Length,
+    RelativeSize,
+    Roughness,
+    Slope,
+)
+
+Packing = Literal["aligned", "horizontal", "disordered", "poured"]
+Shape = Literal[
+    "triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "step up", "step down", "flat"
+]
+Range = tuple[float, float]
+File = Annotated[
+    Profile, PlainValidator(a_profile), PlainSerializer(lambda profile: profile and profile.digest)
+]
+BEDS = {
+    "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
+    "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
+}
+SLIP_FACE_DEG = 30.0
+"""Lee slope of a dune and of a step down."""
+LEVEL = 4.0
+"""Length of level bed with grains, over the height."""
+
+
+class Bed(Part):
+    """What every bed has. Subclasses say which grains it is made of."""
+
+    slope_deg: Annotated[Slope, Info("slope", "α", "°", "alpha_deg")] = 0.0
+    """slope of the bed; the flow goes up it"""
+    entrainment_angle_deg: Annotated[
+        EntrainmentAngle, Info("entrainment angle", "β", "°", "beta_deg")
+    ] = 60.0
+    """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
+    roughness: Annotated[Roughness, Info("roughness length", "z_0", "m", "z0_m")]
+    """roughness length of the bed; a study file may write a part of the diameter of the bed's
+    grains: "d/30" """
+    relative_size: Annotated[
+        RelativeSize, unless(1.0), Info("relative size", "D/d", scope="single grains")
+    ] = 1.0
+    """diameter of a single grain over that of its two neighbours, which lie as far apart as equal
+    grains do: 2 d cos β"""
+
+
+class GrainBed(Bed):
+    """One grain on its two fixed neighbours, in an undisturbed boundary layer (paper, 3.1)."""
+
+    kind: Annotated[Literal["grain"], Info("bed", column="bed", choices=BEDS)] = "grain"
+    """what the bed is made of"""
+
+
+class PileBed(Bed):
+    """Grains across the flow, under a bed line of any shape (the paper's, 3.2, is a triangle)."""
+
+    kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
+    """what the bed is made of"""
+    height: Annotated[Height, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
+    """height of the forms that the flow goes over; that of a profile follows from it"""
+    shape: Annotated[
+        Shape,
+        unless("triangle"),
+        Info(
+            "shape",
+            column="bed_shape",
+            scope="piles",
+            choices={
+                "triangle": "two straight faces",
+                "dune": "a windward side and a slip face",
+                "cosine": "one wave of a cosine, from trough to trough",
+                "gaussian": "a Gaussian hill",
+                "rushil": "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
+                "trapezoid": "two straight faces and a level top",
+                "step up": "a straight face up to higher ground",
+                "step down": "a straight face down to lower ground",
+                "flat": "level bed",
+            },
+        ),
+    ] = "triangle"
+    """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
+    windward: Annotated[
+        Literal["straight", "curved"],
+        unless("straight"),
+        Info(
+            "windward side",
+            scope="dunes",
+            choices={"straight": "one slope", "curved": "half a wave of a cosine"},
+        ),
+    ] = "straight"
+    """windward side of a dune"""
+    lee_slope_deg: Annotated[
+        LeeSlope | None, unless(None), Info("lee slope", unit="°", scope="piles")
+    ] = None
+    """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
+    dune and a step down"""
+    brink_radius: Annotated[
+        float, Field(ge=0, le=1e3), unless(0.0), Info("brink radius", unit="m", scope="dunes")
+    ] = 0.0
+    """radius with which a dune's brink is rounded; 0 leaves it sharp"""
+    length: Annotated[
+        Length | None, unless(None), Info("length", unit="m", scope="beds with level parts")
+    ] = None
+    """length of level bed with grains: of a trapezoid's top, of a flat bed, before or behind a
+    step; by default 4 h"""
+    forms: Annotated[int, Field(ge=1, le=100), unless(1), Info("forms", scope="piles")] = 1
+    """number of forms in a train"""
+    spacing: Annotated[Length | None, unless(None), Info("spacing", unit="m", scope="piles")] = None
+    """from one form of a train to the next; by default they touch"""
+    profile: Annotated[File | None, unless(None), Info("profile", scope="piles")] = None
+    """file with the bed line, in place of a shape: columns x_m and z_m; a path is relative to the
+    study file"""
+    smoothing: Annotated[
+        float, Field(ge=0, le=1e3), unless(0.0), Info("smoothing", unit="m", scope="profiles")
+    ] = 0.0
+    """length over which a noisy profile is smoothed"""
+    obstacles: Annotated[tuple[Obstacle, ...], unless(()), Info("obstacles", scope="piles")] = ()
+    """fences, blocks and half-cylinders on the bed, which carry no grains: tables with `kind`, `x`,
+    `height` and, of a block, `length`"""
+    counted: Annotated[
+        Literal["windward", "all"] | Range | None,
+        unless(None),
+        Info(
+            "counted grains",
+            scope="piles",
+            choices={"windward": "on sides that rise", "all": "all"},
+        ),
+    ] = None
+    """exposed grains that are counted, or the range of x in which; by default those of windward
+    sides, all of a flat bed, a step down and a profile"""
+    packing: Annotated[
+        Packing,
+        Info(
+            "packing",
+            scope="piles",
+            choices={
+                "aligned": "rows along the slope",
+                "horizontal": "level rows",
+                "disordered": "random gaps",
+                "poured": "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
+            },
+        ),
+    ] = "aligned"
+    """pattern of the pile's grains; random gaps are between grains of rows along the slope"""
+    disorder: Annotated[
+        float, Field(ge=1e-6, le=0.2), Info("disorder", unit="d", scope="disordered piles")
+    ] = 0.02
+    """largest gap between two grains of the row under the four uppermost"""
+    poured_depth: Annotated[
+        float,
+        Field(ge=3, le=100),
+        unless(6.0),
+        Info("depth of the mould", unit="d", scope="poured beds"),
+    ] = 6.0
+    """depth of a poured bed under the bed line, along the vertical, to a row of fixed grains"""
+    seed: Annotated[
+        int,
+        Field(ge=0, le=10**9),
+        Info("seed", scope="random beds and replicas", about="replica"),
+    ] = 0
+    """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
+    replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
+    mobile_layers: Annotated[
+        int, Field(ge=1, le=1000), Info("mobile layers", scope="piles", about="answer")
+    ] = 2
+    """layers of the windward face that may move; below them the grains are fixed"""
+
+    @field_validator("obstacles", "counted", mode="before")
+    @classmethod
+    def _tuple_of_a_list(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+    @property
+    def lee_slope(self) -> float:
+        """Slope of a straight lee side, degrees."""
+        steep = self.shape in ("dune", "step down")
+        return self.lee_slope_deg or (SLIP_FACE_DEG if steep else self.slope_deg)
+
+    @property
+    def level_length(self) -> float:
+        """Length of level bed with grains, m."""
+        return self.length or LEVEL * self.height
+
+    @property
+    def counts(self) -> str | Range:
+        """Which exposed grains are counted."""
+        everywhere = self.profile or self.shape in ("flat", "step down")
+        return self.counted or ("all" if everywhere else "windward")
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the flow finds nothing on it that it has to go over or round."""
+        return self.shape == "flat" and not self.profile and not self.obstacles
+
+    @property
+    def is_triangle(self) -> bool:
+        """Whether it is the paper's bed: one triangle of two equal faces, the windward counted."""
+        equal = self.shape == "triangle" and self.lee_slope == self.slope_deg
+        return self.is_wedge and equal and not self.obstacles
+
+    @property
+    def is_wedge(self) -> bool:
+        """Whether it is one form of two straight faces, of which the windward one is counted."""
+        faces = self.shape == "triangle" or (
+            self.shape == "dune" and self.windward == "straight" and not self.brink_radius
+        )
+        one = faces and self.forms == 1 and not self.profile and self.counts == "windward"
+        return one and not any(
+            o.x + o.reach > 0 and o.x - o.reach < self._base for o in self.obstacles
+        )
+
+    @property
+    def _base(self) -> float:
+        """Length of a form of straight faces, m."""
+        return sum(self.height / tan(radians(slope)) for slope in (self.slope_deg, self.lee_slope))
+
+    @property
+    def is_replica(self) -> bool:
+        """Whether it is a lattice but for shifts that matter to nothing but round-off."""
+        return self.packing in ("aligned", "horizontal") and self.seed > 0
