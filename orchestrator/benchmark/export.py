@@ -149,8 +149,8 @@ class Finished:
         found = {} if thresholds is None else thresholds.set_index("scene_id")["ustar_m_s"]
         yield from map(self._timed, formulas(self.asked, self.planned, levels, dict(found)))
         piles = measured.answered(self.planned.piles.values(), self.tables, self.cases)
-        # a theory's stress is no question at levels 3 and 5
-        solved = [one for one in piles if one.pile.model.cases]
+        # neither a theory's stress nor a channel's is a question at levels 3 and 5
+        solved = [one for one in piles if one.pile.model.cases and not one.pile.scene.flow.depth]
         if 3 in levels:
             of_flow = {one.pile.flow.name: one for one in solved}
             for name, one in of_flow.items():

@@ -138,9 +138,11 @@ SHAPES = frozenset(
     {
         *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
         *("profile", "smoothing", "obstacles", "counted"),
+        *("flow_top", "depth_m"),
     }
 )
-"""What a bed line follows from: packs have the line and the grains themselves."""
+"""What a bed line and the stress on it follow from: packs have the line, the stress and the grains
+themselves, and ask for the flow of boundary layers alone."""
 
 
 def parameters(scene: Scene, kind: str) -> dict[str, Any]:
