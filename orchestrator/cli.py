@@ -6,6 +6,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -141,22 +143,16 @@ def _add_run_options(command: Any) -> None:
 
 
 def _add_experiments(commands: Any) -> None:
-    command = commands.add_parser(
-        "ladder", help="what each model costs and how far it is off: speed against accuracy"
-    )
-    command.add_argument(
-        "source", nargs="?", default="ladder", metavar="FILE|PRESET", help="default: %(default)s"
-    )
-    _add_run_options(command)
-    command.set_defaults(run=_ladder)
-    command = commands.add_parser(
-        "budget", help="what the choices are worth that all models share: a tornado for each scene"
-    )
-    command.add_argument(
-        "source", nargs="?", default="budget", metavar="FILE|PRESET", help="default: %(default)s"
-    )
-    _add_run_options(command)
-    command.set_defaults(run=_budget)
+    for name, text in (
+        ("ladder", "what each model costs and how far it is off: speed against accuracy"),
+        ("budget", "what the choices are worth that all models share: a tornado for each scene"),
+    ):
+        command = commands.add_parser(name, help=text)
+        command.add_argument(
+            "source", nargs="?", default=name, metavar="FILE|PRESET", help="default: %(default)s"
+        )
+        _add_run_options(command)
+        command.set_defaults(run=partial(_experiment, name))
     command = commands.add_parser("stability", help="maps of where each method fails")
     _add_run_options(command)
     command.set_defaults(run=_stability)
@@ -217,25 +213,15 @@ def _plan(asked: "Study", out: Path, workers: int) -> int:
     return 0
 
 
-def _ladder(options: argparse.Namespace) -> int:
+def _experiment(name: str, options: argparse.Namespace) -> int:
+    """Run an experiment on the scenes of a study."""
     from orchestrator import paper
-    from orchestrator.experiments.ladder.run import run
     from orchestrator.study import study
 
+    experiment = import_module(f"orchestrator.experiments.{name}.run")
     asked = study.load(options.source, [paper.PRESETS])
-    out = options.out or Path("results") / "ladder"
-    finished = run(asked, out, workers=options.workers)
-    return _end(finished.page, finished.failures)
-
-
-def _budget(options: argparse.Namespace) -> int:
-    from orchestrator import paper
-    from orchestrator.experiments.budget.run import run
-    from orchestrator.study import study
-
-    asked = study.load(options.source, [paper.PRESETS])
-    out = options.out or Path("results") / "budget"
-    finished = run(asked, out, workers=options.workers)
+    out = options.out or Path("results") / name
+    finished = experiment.run(asked, out, workers=options.workers)
     return _end(finished.page, finished.failures)
 
 

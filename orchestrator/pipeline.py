@@ -16,7 +16,7 @@ from orchestrator.runs.case import Case
 from orchestrator.runs.claim import STUDY, told
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
-from orchestrator.runs.progress import Display
+from orchestrator.runs.progress import Display, Forecast
 from orchestrator.runs.workspace import MARKERS, STATE, Workspace
 from orchestrator.study.study import Study, parse
 
@@ -89,7 +89,12 @@ def run(
             started += len(todo)
             with report.loading():
                 failures |= complete(
-                    todo, space, workers=workers, limit_s=study.time_limit_s, queue=queue
+                    todo,
+                    space,
+                    workers=workers,
+                    limit_s=study.time_limit_s,
+                    queue=queue,
+                    after_s=planned.drawing_s,
                 )
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
@@ -127,8 +132,12 @@ def complete(
     workers: int,
     limit_s: float,
     queue: Queue | None = None,
+    after_s: float = 0.0,
 ) -> dict[str, OrchestratorError]:
-    """Run cases, with a display of how far they are; the failures by the cases' names."""
+    """Run cases, with a display of how far they are; the failures by the cases' names.
+
+    What comes after the runs, tables and figures, is known to take `after_s`, s.
+    """
     if not todo:
         return {}
     opened = (
@@ -136,9 +145,10 @@ def complete(
         if queue
         else engine.local(space.cases, workers=workers, limit_s=limit_s)
     )
-    with opened as pool, Display(list(todo.values()), workers) as display:
+    forecast = Forecast(todo.values(), workers, after_s)
+    with opened as pool, Display(forecast, space.cases) as display:
         engine.check_solvers(todo.values(), pool)
-        return engine.run(todo, pool, display)
+        return engine.run(todo, pool, display, display.watch)
 
 
 def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:

@@ -16,6 +16,9 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
+GRAIN_S = 0.004
+"""What peeling takes for each grain along a bed, s."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -40,6 +43,16 @@ class Plan:
     cells: tuple[SingleGrainCase, ...]
     checks: dict[str, Pile]
     cases: dict[str, Case]
+
+    @property
+    def drawing_s(self) -> float:
+        """Expected time from the last run to the page, s.
+
+        The tables and the figures of a scene, and the grains that move without a run.
+        """
+        piles = (pile for pile in self.piles.values() if not pile.method.cases)
+        lengths = (float(pile.line.arc_lengths[-2] - pile.line.arc_lengths[1]) for pile in piles)
+        return 2.5 + 0.005 * len(self.decisions) + GRAIN_S * sum(lengths)
 
     def runs(self, asked: str) -> tuple[Case, ...]:
         """The cases that the answer to a pile is read from; none for a single grain."""

@@ -46,8 +46,12 @@ def _cases(planned: Plan, missing: Sequence[Case], workers: int) -> Iterator[str
     yield f"{len(planned.cases)} cases, {len(missing)} to run"
     for kind, count in kinds.items():
         yield f"  {kind}: {count}, {todo[kind]} to run"
-    # no case takes less than its own time, however many run beside it
-    costs = [one.cost_s for one in missing]
-    seconds = max(sum(costs) / workers, max(costs, default=0.0))
+    costs = {one.name: one.cost_s for one in missing}
+    # no chain of cases takes less than its own time, however many run beside it
+    chains = (one.cost_s + sum(costs.get(need.name, 0.0) for need in one.needs) for one in missing)
+    runs = max(sum(costs.values()) / workers, max(chains, default=0.0))
     size = sum(BYTES.get(one.kind, OTHERS) for one in missing)
-    yield f"expected: about {human(seconds)} with {workers} workers, {size / 1e6:.0f} MB"
+    yield (
+        f"expected: about {human(runs + planned.drawing_s)} with {workers} workers, "
+        f"{human(planned.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
+    )

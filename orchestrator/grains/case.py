@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import ClassVar
 
+from orchestrator.runs import process
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 
@@ -19,6 +20,14 @@ class GrainCase(Case):
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
         return {liggghts.PROGRAM: liggghts.version()}
+
+    def share(self, directory: Path) -> float:
+        """Load steps that have begun over those that there may be."""
+        step, *_ = process.last_words(directory / "samples.csv").split(",")
+        if not step.isdecimal():
+            return 0.0
+        steps = len((directory / "load_steps.txt").read_text(encoding="ascii").split())
+        return min(int(step) / steps, 1.0)
 
     @staticmethod
     def check(directory: Path) -> None:

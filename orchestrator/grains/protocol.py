@@ -74,9 +74,10 @@ def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
 
 
 def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
-    """Expected wall time of a deck, s: holds of twice the waiting time, 6e7 grain-steps a second.
+    """Expected wall time of a deck, s: holds of twice the waiting time, 4.5e7 grain-steps a second.
 
-    Both figures are of piles of 80 to 770 counted grains on one core; fixed grains cost little.
+    Of piles of 30 to 770 counted grains and of 150 single ones on one core: holds are shorter and
+    steps dearer than that.
     """
     steps = load_steps * 2 * protocol.waiting_time * math.sqrt(stiffness) / protocol.time_step
-    return 0.1 + steps * grains / 6e7
+    return 0.1 + steps * grains / 4.5e7

@@ -66,6 +66,10 @@ class Case(ABC):
     def cost_s(self) -> float:
         """Expected wall time on one core, s: for ordering and for the time left, nothing else."""
 
+    def share(self, directory: Path) -> float:
+        """Share of its work that a running case has done, 0 to 1; 0 where that is not known."""
+        return 0.0
+
     @property
     def needs(self) -> tuple["Case", ...]:
         """The cases whose results this one's inputs are made of."""

@@ -4,7 +4,7 @@ import concurrent.futures
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -49,6 +49,7 @@ class Outcome:
 
 
 Report = Callable[[Outcome], None]
+Watch = Callable[[Collection[Case]], None]
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,9 @@ def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
             raise _loss(error, "the first look at the solvers") from None
 
 
-def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, OrchestratorError]:
+def run(
+    todo: Mapping[str, Case], pool: Pool, report: Report, watch: Watch = lambda _: None
+) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet.
 
     Parameters
@@ -200,6 +203,8 @@ def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, Orche
         Where they run.
     report : callable
         Told of each case as it ends.
+    watch : callable, optional
+        Told of the cases that are running, a few times a second.
 
     Returns
     -------
@@ -221,6 +226,7 @@ def run(todo: Mapping[str, Case], pool: Pool, report: Report) -> dict[str, Orche
         ended, _ = concurrent.futures.wait(
             running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
         )
+        watch(running.values())
         for future in ended:
             outcome = _outcome(running.pop(future), future, pool)
             for each in (outcome, *_after(outcome, agenda)):

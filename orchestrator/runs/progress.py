@@ -1,7 +1,11 @@
 """What a running study shows: the share of the work done, the last case that ended, time left."""
 
+import math
 import sys
+import time
 from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -11,18 +15,29 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from orchestrator.runs.case import Case
 from orchestrator.runs.engine import Outcome
 
+LOOK_S = 1.0
+"""Time between two looks at the cases that are running, s."""
+
 
 class Display:
-    """Shows the cases of a study as they end: a bar on a terminal, a line each elsewhere."""
+    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends.
 
-    def __init__(self, todo: list[Case], workers: int) -> None:
+    Parameters
+    ----------
+    forecast : Forecast
+        Of the cases that are to be run.
+    cases : Path
+        Where they are run.
+    """
+
+    def __init__(self, forecast: "Forecast", cases: Path) -> None:
         self._console = Console(stderr=True, highlight=False, soft_wrap=True)
-        self._forecast = Forecast(todo, workers)
-        self._count, self._ended = len(todo), 0
+        self._forecast, self._cases = forecast, cases
+        self._ended, self._looked = 0, -math.inf
         self._bar = Progress(
             TextColumn("{task.fields[ended]}/{task.fields[count]} cases"),
             BarColumn(),
-            TextColumn("{task.fields[left]}"),
+            TextColumn("{task.percentage:.0f}% of the work, {task.fields[left]}"),
             console=self._console,
             disable=not sys.stderr.isatty(),
         )
@@ -31,7 +46,7 @@ class Display:
     def __enter__(self) -> Self:
         self._bar.start()
         self._task = self._bar.add_task(
-            "", total=1.0, ended=0, count=self._count, left=self._time_left()
+            "", total=1.0, ended=0, count=self._forecast.count, left=self._time_left()
         )
         return self
 
@@ -48,22 +63,29 @@ class Display:
         self._ended += 1
         self._forecast.ended(outcome)
         word = "failed" if outcome.error else "done"
-        left = self._time_left()
         self._console.print(
-            f"[{self._ended}/{self._count}] {word}  {outcome.case.name}  "
-            f"{self._forecast.done:.0%} of the work, {left}",
+            f"[{self._ended}/{self._forecast.count}] {word}  {outcome.case.name}  "
+            f"{self._forecast.done:.0%} of the work, {self._time_left()}",
             markup=False,
         )
         if outcome.error:
             self._console.print(f"  {outcome.error}", markup=False)
+        self._show()
+
+    def watch(self, running: Collection[Case]) -> None:
+        """Look how far the running cases are, once a second, for the bar of a terminal."""
+        if self._bar.disable or time.monotonic() < self._looked + LOOK_S:
+            return
+        self._looked = time.monotonic()
+        self._forecast.going((case, case.share(self._cases / case.name)) for case in running)
+        self._show()
+
+    def _show(self) -> None:
         if self._task is not None:
-            self._bar.update(
-                self._task, completed=self._forecast.done, ended=self._ended, left=left
-            )
+            done, left = self._forecast.done, self._time_left()
+            self._bar.update(self._task, completed=done, ended=self._ended, left=left)
 
     def _time_left(self) -> str:
-        if self._ended == self._count:
-            return "all runs ended"
         return f"about {human(self._forecast.left_s())} left"
 
 
@@ -72,24 +94,33 @@ class Forecast:
 
     Parameters
     ----------
-    todo : list of Case
+    todo : collection of Case
         All that is to be run.
     workers : int
         How many run at a time.
+    after_s : float
+        What is known to follow the last run, s.
     """
 
-    def __init__(self, todo: list[Case], workers: int) -> None:
-        self._workers = workers
+    def __init__(self, todo: Collection[Case], workers: int, after_s: float = 0.0) -> None:
+        self.count = len(todo)
+        self._workers, self._after_s = workers, after_s
         self._left: defaultdict[str, float] = defaultdict(float)
         self._ended: defaultdict[str, float] = defaultdict(float)
         self._took: defaultdict[str, float] = defaultdict(float)
+        self._going: dict[str, tuple[str, float]] = {}
         for case in todo:
             self._left[case.kind] += case.cost_s
-        self._whole = sum(self._left.values())
+        self._whole = sum(self._left.values()) / workers + after_s
+
+    def going(self, running: Iterable[tuple[Case, float]]) -> None:
+        """Take note of how much the running cases have done, each a share of its own work."""
+        self._going = {case.name: (case.kind, part * case.cost_s) for case, part in running}
 
     def ended(self, outcome: Outcome) -> None:
         """Take note of a case that has ended: it is not to come, and shows the pace of its kind."""
         kind, cost = outcome.case.kind, outcome.case.cost_s
+        self._going.pop(outcome.case.name, None)
         self._left[kind] -= cost
         if not outcome.error:
             self._ended[kind] += cost
@@ -97,14 +128,20 @@ class Forecast:
 
     @property
     def done(self) -> float:
-        """Share of the work that has ended, 0 to 1."""
-        left = max(0.0, sum(self._left.values()))
-        return 1 - left / self._whole if left else 1.0
+        """Share of the work that is done, 0 to 1."""
+        if not self._whole:
+            return 1.0
+        return 1 - (self._costs(lambda _: 1.0) + self._after_s) / self._whole
 
     def left_s(self) -> float:
-        """Time until all have ended, s."""
-        costs = (left * self._pace(kind) for kind, left in self._left.items())
-        return max(0.0, sum(costs)) / self._workers
+        """Time until all is done, s."""
+        return self._costs(self._pace) + self._after_s
+
+    def _costs(self, pace: Callable[[str], float]) -> float:
+        """What is left of the runs, s, at a pace for each kind."""
+        left = sum(cost * pace(kind) for kind, cost in self._left.items())
+        gone = sum(cost * pace(kind) for kind, cost in self._going.values())
+        return max(0.0, left - gone) / self._workers
 
     def _pace(self, kind: str) -> float:
         """What a case takes over what it was thought to cost; a new kind goes as the others do."""

@@ -104,3 +104,19 @@ def test_the_time_left_follows_the_pace_of_each_kind() -> None:
     assert forecast.left_s() == pytest.approx(0.5 * 20 / 2)
     forecast.ended(Outcome(steps[1], 10.0))
     assert forecast.left_s() == 0
+
+
+def test_progress_goes_on_within_a_case_and_until_the_figures_are_drawn() -> None:
+    first, second = Step(10.0), Step(30.0)
+    forecast = Forecast([first, second], workers=1, after_s=10.0)
+    found = [forecast.done]
+    forecast.going([(first, 0.5)])
+    found.append(forecast.done)
+    assert forecast.left_s() == pytest.approx(45.0)
+    forecast.ended(Outcome(first, 10.0))
+    found.append(forecast.done)
+    forecast.going([(second, 1.0)])
+    forecast.ended(Outcome(second, 30.0))
+    found.append(forecast.done)
+    assert found == pytest.approx([0.0, 0.1, 0.2, 0.8])
+    assert forecast.left_s() == pytest.approx(10.0)
