@@ -4,8 +4,8 @@
 
 A bed of quartz of 1 mm in water, one plane, 40 d long and periodic, is poured and held under
 rising flows, `HOLD` sqrt(d/g') each. The mass that passes a line across the bed, for each metre of
-width, is the sum of the grains' speeds times their mass, over the length of the bed and the width of
-the plane, d.
+width, is the sum of the grains' speeds times their mass, over the length of the bed and the width
+of the plane, d.
 """
 
 import subprocess
