@@ -1,6 +1,7 @@
 """Piles on a bed that changes beside the same on the frozen one, grain by grain."""
 
 from collections.abc import Iterator, Sequence
+from math import ceil
 
 import numpy as np
 import pandas as pd
@@ -26,7 +27,7 @@ def tables(ready: Sequence[Answer]) -> Iterator[pd.DataFrame]:
 def compared(changing: Answer, frozen: Answer) -> pd.DataFrame:
     """The thresholds of a pile at each n, up to the last fraction, on both beds."""
     scene, count = changing.pile.scene, changing.motion.count
-    moved = np.arange(1, round(max(scene.protocol.fractions) * count) + 1)
+    moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
     own, other = (
         [
             threshold.of_pile(one.motion, one.face.speed, n / count, scene.fluid.density)
