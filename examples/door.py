@@ -37,8 +37,32 @@ class Bed:
         self.grains = sorted(rows, key=lambda row: order.get(row["kind"], 1))
         self.load_steps = table(case / "load_steps.csv")
         self.counted = sum(row["kind"] == "counted" for row in rows)
-        alpha = math.radians(self.scene["alpha_deg"])
-        self.along = math.cos(alpha), math.sin(alpha)
+        self.along = [self._along(row) for row in self.grains[: self.counted]]
+        self.given = self._given(case / "forces.csv")
+
+    def _along(self, row):
+        """The way along the local bed that the flow pushes a grain, over its own diameter in d."""
+        slope = math.radians(float(row.get("slope_deg", self.scene["alpha_deg"])))
+        way = math.copysign(1.0, float(row.get("ustar_over_ustar0", 1.0)))
+        size = float(row["d_m"]) / self.scene["d_m"]
+        return way * math.cos(slope) / size, way * math.sin(slope) / size
+
+    def _given(self, path):
+        """The forces that a scene gives, by load step and id; none of equal grains."""
+        if not path.exists():
+            return None
+        given = {}
+        for row in table(path):
+            force = float(row["fx_n"]), float(row["fz_n"])
+            given[int(row["load_step"]), row["id"]] = force
+        return given
+
+    @property
+    def step(self):
+        """The time step, s: that of the scene for the smallest grain that may move."""
+        sizes = (float(row["d_m"]) for row in self.grains if row["kind"] != "fixed")
+        mass = self.scene["mass_kg"] * (min(sizes) / self.scene["d_m"]) ** 3
+        return self.scene["time_step"] * math.sqrt(mass / self.scene["spring_n_m"])
 
     @property
     def flow(self):
@@ -55,6 +79,8 @@ class Bed:
                 float(self.load_steps[load_step]["fz_n"]),
             )
             return [own if row["kind"] == "counted" else (0.0, 0.0) for row in self.grains]
+        if self.given is not None:
+            return [self.given.get((load_step, row["id"]), (0.0, 0.0)) for row in self.grains]
         return [self._pushed(row, self.flow[load_step]) for row in self.grains]
 
     def _pushed(self, row, ustar0):
@@ -67,13 +93,16 @@ class Bed:
         return drag * x - lift * z, drag * z + lift * x
 
     @property
-    def ceiling(self):
-        """A point on the ridge of the roof above which a grain in flight is gone, m."""
-        d = self.scene["d_m"]
+    def roof(self):
+        """Slope (radians) and ridge (m) of the roof above which a grain in flight is gone."""
+        d, slope = self.scene["d_m"], math.radians(self.scene["alpha_deg"])
         top = max(self.grains[: self.counted], key=lambda row: float(row["z_m"]))
         if self.is_pivot:
-            return float(top["x_m"]), float(top["z_m"]) + 1e3 * d
-        return float(top["x_m"]), float(top["z_m"]) + MARGIN * d / self.along[0]
+            return slope, float(top["x_m"]), float(top["z_m"]) + 1e3 * d
+        if "roof_slope_deg" in self.scene:
+            slope = math.radians(self.scene["roof_slope_deg"])
+            return slope, self.scene["roof_x_m"], self.scene["roof_z_m"]
+        return slope, float(top["x_m"]), float(top["z_m"]) + MARGIN * d / math.cos(slope)
 
     def answer(self, moved_in, carried):
         """Write nothing; give the answer to a question, from what each counted grain did.

@@ -34,7 +34,6 @@ CHECKS = {
 
 def parameters(scene):
     """The variables of every deck."""
-    step = scene["time_step"] * math.sqrt(scene["mass_kg"] / scene["spring_n_m"])
     return {
         "diameter": scene["d_m"],
         "density": scene["rho_sol_kg_m3"],
@@ -43,7 +42,7 @@ def parameters(scene):
         "spring": scene["spring_n_m"],
         "damping": scene["damping"],
         "friction": math.tan(math.radians(scene["phi_deg"])),
-        "dt": step,
+        "dt": scene["time_step"] * math.sqrt(scene["mass_kg"] / scene["spring_n_m"]),
     }
 
 
@@ -51,7 +50,7 @@ def bed_parameters(bed, step):
     """The variables of the deck for beds."""
     unit = bed.scene["time_unit_s"]
     sample = int(door.SAMPLING_INTERVAL * unit / step + 0.5)
-    x, z = bed.ceiling
+    slope, x, z = bed.roof
     return {
         "counted": bed.counted,
         "sampling_steps": sample,
@@ -59,8 +58,8 @@ def bed_parameters(bed, step):
         "waiting_samples": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),
         "load_steps": len(bed.load_steps) - 1,
         "displacement_criterion": bed.scene["displacement_criterion"],
-        "along_x": bed.along[0],
-        "along_z": bed.along[1],
+        "roof_x": math.sin(slope),
+        "roof_z": math.cos(slope),
         "ceiling_x": x,
         "ceiling_z": z,
     }
@@ -83,8 +82,11 @@ def write_bed(bed, folder):
         lines.append(f"{min(values) - margin!r} {max(values) + margin!r} {axis}lo {axis}hi")
     lines += [f"{-margin!r} {margin!r} ylo yhi", "", "Atoms  # sphere", ""]
     for number, (row, (x, z)) in enumerate(zip(bed.grains, places, strict=True), 1):
-        lines.append(f"{number} {kinds[row['kind']]} {d!r} {rho!r} {x!r} 0.0 {z!r}")
+        lines.append(f"{number} {kinds[row['kind']]} {row['d_m']} {rho!r} {x!r} 0.0 {z!r}")
     (folder / "grains.data").write_text("\n".join(lines) + "\n")
+    for place, axis in enumerate("xz"):
+        rows = (f"{number} {way[place]!r}\n" for number, way in enumerate(bed.along, 1))
+        (folder / f"along.{axis}.txt").write_text(f"{bed.counted}\n{''.join(rows)}")
     with (folder / "force.x.txt").open("w") as fx, (folder / "force.z.txt").open("w") as fz:
         # LAMMPS reads one set more than it uses
         for load_step in (*range(len(bed.load_steps)), len(bed.load_steps) - 1):
@@ -105,13 +107,16 @@ def moved_in(bed, folder):
     for load_step, frame in zip(samples, found[1:], strict=True):
         for number in range(1, bed.counted + 1):
             now = frame.get(number)
-            if first[number - 1] == 0 and (now is None or _far(start[number], now, bed) >= marker):
+            along = bed.along[number - 1]
+            if first[number - 1] == 0 and (
+                now is None or _far(start[number], now, along) >= marker
+            ):
                 first[number - 1], gone[number - 1] = load_step, now is None
     return first, gone
 
 
-def _far(start, now, bed):
-    return sum(a * (b - c) for a, b, c in zip(bed.along, now, start, strict=True))
+def _far(start, now, along):
+    return sum(a * (b - c) for a, b, c in zip(along, now, start, strict=True))
 
 
 def run(deck, *variables):
@@ -148,13 +153,15 @@ def main(case, out):
     folder = Path("lammps")
     shutil.copytree(HERE, folder, dirs_exist_ok=True)
     values = parameters(scene)
+    bed = None if kind in CHECKS else door.Bed(case)
+    if bed:
+        values["dt"] = bed.step
     write_variables(folder / "parameters.lammps", values)
     os.chdir(folder)
-    if kind in CHECKS:
+    if bed is None:
         answer, took = check(kind, scene), None
     else:
-        bed = door.Bed(case)
-        write_variables(Path("bed.lammps"), bed_parameters(bed, values["dt"]))
+        write_variables(Path("bed.lammps"), bed_parameters(bed, bed.step))
         write_bed(bed, Path())
         run("in.bed")
         answer, took = bed.answer(*moved_in(bed, Path())), steps(Path())

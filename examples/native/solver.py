@@ -15,6 +15,7 @@ from pathlib import Path
 
 KARMAN = 2.5
 INERTIA = 0.4  # of a sphere, over m r^2
+TOUCH = 1.001  # two grains closer than this touch, of the sum of their radii
 STEP = 0.05  # of the integration, in sqrt(m/K)
 
 
@@ -230,10 +231,54 @@ def passing(scene, case):
 
 
 def pile(scene, case):
-    """Each grain alone under the stress that the scene gives it."""
+    """Each grain alone under the stress, or of a poured bed the force, that the scene gives it."""
     counted = [g for g in table(case / "grains.csv") if g["kind"] == "counted"]
     grains = [(float(g["ustar_over_ustar0"]), float(g["slope_deg"])) for g in counted]
-    return alone(scene, grains, table(case / "load_steps.csv"))
+    load_steps = table(case / "load_steps.csv")
+    if scene["packing"] != "poured":
+        return alone(scene, grains, load_steps)
+    steps = zip(poured_pivots(scene, case, counted), grains, strict=True)
+    order = [(float(load_steps[n]["ustar0_m_s"]), r * abs(r)) for n, (r, _) in steps if n]
+    return counts(scene, sorted(order), len(grains), load_steps)
+
+
+def poured_pivots(scene, case, counted):
+    """The load step in which the force on each grain turns it over its own foremost contact."""
+    discs = [
+        (float(g["x_m"]), float(g["z_m"]), float(g["d_m"]) / 2) for g in table(case / "grains.csv")
+    ]
+    forces = {}
+    for row in table(case / "forces.csv"):
+        forces.setdefault(row["id"], []).append((float(row["fx_n"]), float(row["fz_n"])))
+    for grain in counted:
+        side = math.copysign(1.0, float(grain["ustar_over_ustar0"]))
+        here, weight = discs[int(grain["id"]) - 1], grain_weight(scene, grain)
+        lean = foremost(here, discs, side)
+        yield first_of(
+            lean is None or fx * side * math.cos(lean) + (fz - weight) * math.sin(lean) >= 0
+            for fx, fz in forces[grain["id"]]
+        )
+
+
+def foremost(here, discs, side):
+    """Angle of the contact farthest round towards where the flow goes, from straight below."""
+    x, z, radius = here
+    near = [
+        math.atan2(side * (a - x), z - b)
+        for a, b, r in discs
+        if 0 < math.hypot(a - x, b - z) < TOUCH * (radius + r)
+    ]
+    return max(near, default=None)
+
+
+def grain_weight(scene, grain):
+    """Submerged weight of a grain of any size, N."""
+    return scene["weight_n"] * (float(grain["d_m"]) / scene["d_m"]) ** 3
+
+
+def first_of(goes):
+    """The first load step in which a grain goes; none for never. In the settling none does."""
+    return next((step for step, does in enumerate(goes) if step and does), None)
 
 
 def alone(scene, grains, load_steps):
@@ -250,13 +295,17 @@ def alone(scene, grains, load_steps):
             found[slope] = threshold(scene, slope)
         if ratio:
             order.append((found[slope] / abs(ratio), ratio * abs(ratio)))
-    order.sort()
+    return counts(scene, sorted(order), len(grains), load_steps)
+
+
+def counts(scene, order, total, load_steps):
+    """The answers for a number of grains, of which those that go have a flow and a stress each."""
     flow = [float(row["ustar0_m_s"]) for row in load_steps]
     moved = [sum(own <= u for own, _ in order) for u in flow]
     excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
 
     def first(fraction):
-        need = max(math.ceil(fraction * len(grains) - 1e-9), 1)
+        need = max(math.ceil(fraction * total - 1e-9), 1)
         level = next((i for i, n in enumerate(moved) if n >= need), len(moved) - 1)
         return level, math.sqrt(flow[level - 1] * flow[level])
 
@@ -267,8 +316,8 @@ def alone(scene, grains, load_steps):
 
     answers = {
         "moved": lambda at: moved[int(at)],
-        "not_moved": lambda at: len(grains) - moved[int(at)],
-        "count": lambda at: len(grains),
+        "not_moved": lambda at: total - moved[int(at)],
+        "count": lambda at: total,
         "carried_off": lambda at: 0,
         "ustar0_m_s": lambda at: first(float(at))[1],
         "shields": lambda at: shields(float(at)),

@@ -40,11 +40,8 @@ def set_up(scene, gravity):
     # springs and dashpots of two materials act in series, a b/(a + b); with a fixed grain the
     # dashpot is sqrt(2) times that between two mobile ones
     fixed = between * 2 * math.sqrt(2) / (2 - math.sqrt(2))
-    friction = math.radians(scene["phi_deg"])
     for label, dashpot in (("mobile", 2 * between), ("fixed", fixed)):
-        law = {"kn": 2 * spring, "ks": 2 * spring, "cn": dashpot, "cs": dashpot}
-        density = scene["rho_sol_kg_m3"]
-        O.materials.append(ViscElMat(label=label, frictionAngle=friction, density=density, **law))
+        material(scene, label, dashpot)
     O.engines = [
         ForceResetter(),
         InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Wall_Aabb()]),
@@ -58,12 +55,24 @@ def set_up(scene, gravity):
     O.dt = scene["time_step"] * math.sqrt(mass / spring)
 
 
-def add(x, z, scene, kind="mobile"):
-    """Add a sphere and return its id."""
-    fixed = kind == "fixed"
-    body = utils.sphere(
-        (x, 0, z), scene["d_m"] / 2, material="fixed" if fixed else "mobile", fixed=fixed
+def material(scene, label, dashpot):
+    """Add a material with half of a contact's springs in series, and a dashpot, N s/m."""
+    spring = 2 * scene["spring_n_m"]
+    law = {"kn": spring, "ks": spring, "cn": dashpot, "cs": dashpot}
+    friction, density = math.radians(scene["phi_deg"]), scene["rho_sol_kg_m3"]
+    return O.materials.append(
+        ViscElMat(label=label, frictionAngle=friction, density=density, **law)
     )
+
+
+def add(x, z, scene, kind="mobile", diameter=None):
+    """Add a sphere and return its id."""
+    fixed, size = kind == "fixed", (diameter or scene["d_m"]) / scene["d_m"]
+    made = "fixed" if fixed else "mobile"
+    if size != 1 and not fixed:
+        # in series, dashpots in proportion to the masses give one in proportion to m1 m2/(m1 + m2)
+        made = material(scene, "", O.materials["mobile"].cn * size**3)
+    body = utils.sphere((x, 0, z), size * scene["d_m"] / 2, material=made, fixed=fixed)
     if not fixed:
         body.state.blockedDOFs = IN_PLANE
     return O.bodies.append(body)
@@ -144,7 +153,11 @@ def bed(scene, case):
     global protocol
     asked = door.Bed(case)
     set_up(scene, Vector3(0, 0, -scene["reduced_gravity_m_s2"]))
-    ids = [add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"]) for row in asked.grains]
+    O.dt = asked.step
+    ids = [
+        add(float(row["x_m"]), float(row["z_m"]), scene, row["kind"], float(row["d_m"]))
+        for row in asked.grains
+    ]
     protocol = Protocol(asked, ids)
     period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
     # one run with samples inside: between two runs YADE waits a twentieth of a second
@@ -165,7 +178,7 @@ class Protocol:
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
         self.marker = scene["displacement_criterion"] * scene["d_m"]
         self.waiting_samples = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
-        self.ceiling = asked.ceiling
+        self.roof = asked.roof
         places = [(float(row["x_m"]), float(row["z_m"])) for row in grains]
         margin = (door.MARGIN + 1) * scene["d_m"]
         self.low = [min(values) - margin for values in zip(*places, strict=True)]
@@ -201,24 +214,22 @@ class Protocol:
     def _note(self):
         before = self.moved_in.count(0)
         for place, (number, start) in enumerate(zip(self.counted, self.start, strict=True)):
-            if self.moved_in[place] == 0 and self._passed(number, start):
+            if self.moved_in[place] == 0 and self._passed(number, start, self.asked.along[place]):
                 self.moved_in[place] = self.load_step
                 self.carried[place] = O.bodies[number] is None
         return self.moved_in.count(0) < before
 
-    def _passed(self, number, start):
+    def _passed(self, number, start, along):
         body = O.bodies[number]
         if body is None:
             return True
         x, _, z = body.state.pos
-        along = self.asked.along
         return (x - start[0]) * along[0] + (z - start[2]) * along[1] >= self.marker
 
     def _gone(self, number):
         x, _, z = O.bodies[number].state.pos
-        ridge_x, ridge_z = self.ceiling
-        rise = self.asked.along[1] / self.asked.along[0]
-        over = z > ridge_z - abs(x - ridge_x) * rise
+        slope, ridge_x, ridge_z = self.roof
+        over = z > ridge_z - abs(x - ridge_x) * math.tan(slope)
         inside = self.low[0] < x < self.high[0] and self.low[1] < z < self.high[1]
         if over or not inside:
             O.bodies.erase(number)

@@ -155,6 +155,8 @@ class BedLine:
         x, away = points[:, 0], np.abs(points[:, 1] - self.height(points[:, 0])).max()
         low = max(int(np.searchsorted(self.x, x.min() - away)) - 1, 0)
         high = int(np.searchsorted(self.x, x.max() + away, side="right")) + 1
+        # points beyond an end are nearest to the segment there
+        low, high = min(low, len(self.lengths) - 1), max(high, 2)
         corners, tangents = self.corners[low : high - 1][: len(self.lengths) - low], self.tangents
         tangents, lengths = tangents[low : high - 1], self.lengths[low : high - 1]
         along = np.einsum("mnk,nk->mn", points[:, None] - corners, tangents)

@@ -54,12 +54,6 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
             where=str(source),
             remedy="run the study without a tolerance into another directory",
         )
-    if any(scene.is_poured for scene in asked.scenes):
-        raise InputError(
-            "it has poured beds, and the grains of a pack have one size",
-            where=str(source),
-            remedy="export a study without them",
-        )
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))
     return pack.write(
@@ -136,7 +130,8 @@ class Finished:
         self.seconds: dict[str, float] = dict(zip(times["case"], times["solver_s"], strict=True))
 
     def _check_cases(self, told: set[str], root: Path) -> None:
-        if told != set(self.planned.cases):
+        poured = {run.name for pile in self.planned.piles.values() for run in pile.pouring}
+        if told | poured != set(self.planned.cases):
             raise InputError(
                 "the study was run by another version of the program: its cases are others",
                 where=str(root),

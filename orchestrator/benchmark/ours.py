@@ -68,7 +68,7 @@ class Ours:
         self.study = study.parse(text, name="benchmark", where=str(pack.root / STUDY))
         self.scenes = {scene.id: scene for scene in self.study.scenes}
         piles = plan.make(self.study).piles.values()
-        self.flows: dict[str, Took] = {}
+        self.shared: dict[str, Took] = {}
         self.of_flow = {case.id[:12]: pile.scene for pile in piles for case in pile.model.cases}
 
     def answer(self, name: str) -> Given:
@@ -88,7 +88,7 @@ class Ours:
         scene = self._scene(name.partition("-")[2], kind)
         group = Group("benchmark", (scene,), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
-        planned = plan.make(asked)
+        planned = plan.make(asked, cases=self.root)
         if kind == "closed-form":
             return _given(exact.closed_form(scene)), NOTHING
         if kind == "pivot":
@@ -124,10 +124,11 @@ class Ours:
     def _bed(self, kind: str, asked: study.Study, planned: Plan) -> Given:
         pile = next(iter(planned.piles.values()))
         flow_took = NOTHING
+        for run in (*pile.model.cases, *pile.pouring):
+            if run.name not in self.shared:  # by several scenes
+                self.shared[run.name] = self._run(run)
         for flow in pile.model.cases:
-            if flow.name not in self.flows:  # scenes share them
-                self.flows[flow.name] = self._run(flow)
-            flow_took = self.flows[flow.name]
+            flow_took = self.shared[flow.name]
         cases = {pile.flow.name} if kind == "flow" else set(planned.cases)
         pile_took = NOTHING if kind == "flow" else self._run(pile.case)
         made = tables.make(asked, planned, self.root, cases)

@@ -136,13 +136,14 @@ MEANINGLESS: Mapping[str, frozenset[str]] = {
 
 SHAPES = frozenset(
     {
+        *("sizes", "poured_depth", "exposure"),
         *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
         *("profile", "smoothing", "obstacles", "counted"),
         *("flow_top", "depth_m"),
     }
 )
-"""What a bed line and the stress on it follow from: packs have the line, the stress and the grains
-themselves, and ask for the flow of boundary layers alone."""
+"""What the bed, its line, the stress on it and the forces follow from: packs have these themselves,
+and ask for the flow of boundary layers alone."""
 
 
 def parameters(scene: Scene, kind: str) -> dict[str, Any]:

@@ -31,6 +31,8 @@ BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
 LEAST_DEPTH = 3.0
 """Of a channel, heights of the forms: the rows of its mesh are level at half of it."""
+MOST_POURED_STIFFNESS = 1e5
+"""K d/W of a deck on a poured bed, ten times that of the pouring: contacts give back 0.05 W d."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
@@ -68,6 +70,8 @@ class Scene(Part):
         if self.grain.sizes is not None and not self.is_poured:
             what = "a lattice has equal grains: a mixture needs a poured bed"
             raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
+        if self.is_poured and self.protocol.method == "dem":
+            check_poured_stiffness(self.grain.stiffness)
         if self.forces.exposure == "protrusion":
             check_protrusion(self.forces.law, is_poured=self.is_poured)
         if isinstance(self.bed, PileBed):
@@ -190,6 +194,17 @@ def check_method(law: str, method: str) -> None:
             "forces.law",
             f"{law} turns the grain about its centre, which the method {method} leaves out",
             'choose the method "pivot", or a force law without torque',
+        )
+
+
+def check_poured_stiffness(stiffness: float) -> None:
+    """Grains that are poured lie in one another as far as their stiffness then lets them."""
+    if stiffness > MOST_POURED_STIFFNESS:
+        raise UnfitError(
+            "grain.stiffness",
+            f"poured grains lie in one another by some 1e-3 d: springs of {stiffness:.3g} W/d throw"
+            " them apart",
+            f"at most {MOST_POURED_STIFFNESS:g}",
         )
 
 

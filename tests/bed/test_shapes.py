@@ -83,6 +83,14 @@ def test_a_dune_has_a_slip_face_and_its_brink_may_be_rounded() -> None:
     assert rounded.slopes_deg.min() == pytest.approx(-30.0)
 
 
+def test_beyond_its_ends_the_end_of_a_line_is_nearest() -> None:
+    line = of_bed(bed())
+    far = 10 * line.x[-1]
+    segment, s = line.nearest(np.array([[-far, 0.0], [far, 0.0]]))
+    assert segment.tolist() == [0, len(line.lengths) - 1]
+    assert s.tolist() == [line.arc_lengths[0], line.arc_lengths[-1]]
+
+
 def test_forms_of_a_train_are_alike() -> None:
     line, one = of_bed(bed(**SHAPES["apart"])), of_bed(bed())
     for place in range(3):

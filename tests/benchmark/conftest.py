@@ -80,9 +80,40 @@ bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", {b
 """A pile under the stress of a theory, which needs no OpenFOAM."""
 
 
+POURED = """
+[fluid]
+density = 1000.0
+viscosity = 1e-6
+[grain]
+diameter = 1e-3
+density = 2650.0
+sizes = { sigma_g = 1.3 }
+stiffness = 1e3
+[bed]
+kind = "pile"
+shape = "gaussian"
+slope_deg = 15.0
+height = 0.005
+poured_depth = 4.0
+packing = "poured"
+[flow]
+model = "hill"
+[protocol]
+load_increment = 0.05
+waiting_time = 6.0
+final_fraction = 0.4
+fractions = [0.1, 0.3]
+"""
+"""A poured hump of grains of many sizes."""
+
+
 def _theory(folder: Path, **fields: object) -> Path:
     """A pack of level 4."""
-    asked = study.parse(THEORY.format(**fields), name="theory", where="theory")
+    return _packed(folder, THEORY.format(**fields))
+
+
+def _packed(folder: Path, text: str) -> Path:
+    asked = study.parse(text, name="theory", where="theory")
     assert not pipeline.run(asked, folder / "study", workers=1).failures
     return _exported(folder / "pack", folder / "study", (4,))
 
@@ -92,6 +123,13 @@ def lift_off(shared: Shared) -> Path:
     """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
     with shared("lift-off") as folder:
         return _theory(folder, law="low", diameter=5e-4, bed="mobile_layers = 1")
+
+
+@pytest.fixture(scope="session")
+def poured(shared: Shared) -> Path:
+    """A pack of one poured bed; the study lies beside it."""
+    with shared("poured") as folder:
+        return _packed(folder, POURED)
 
 
 @pytest.fixture(scope="session")

@@ -48,6 +48,19 @@ def test_a_foreign_solver_agrees_on_lift_off(lift_off: Path, tmp_path: Path, pro
 
 
 @pytest.mark.parametrize("program", COMMANDS)
+def test_a_foreign_solver_agrees_on_a_poured_mixture(
+    poured: Path, tmp_path: Path, program: str
+) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed")
+    choice = Choice(patterns=("4-*",))
+    found = runner.run(
+        poured, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=300.0)
+    )
+    assert found.failures == []
+
+
+@pytest.mark.parametrize("program", COMMANDS)
 def test_a_foreign_solver_declines_what_it_is_not_for(
     formulas: Path, tmp_path: Path, program: str
 ) -> None:

@@ -11,11 +11,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from orchestrator import pipeline
 from orchestrator.benchmark import pack, runner
 from orchestrator.benchmark.report import Found
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError
 from orchestrator.runs.confined import Limits
+from orchestrator.runs.workspace import Workspace
 from tests.benchmark.conftest import NATIVE
 from tests.benchmark.programs import AFTER, TAIL, program
 from tests.conftest import Command
@@ -322,6 +324,47 @@ def test_the_example_passes(all_levels: Path, tmp_path: Path) -> None:
     assert numbers.loc[numbers["scene"].str.startswith("2-incline"), "ours"].notna().all()
 
 
+NATIVES = {"python": f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])}", "c++": ""}
+
+
+@pytest.mark.parametrize("language", NATIVES)
+def test_the_native_examples_know_the_pivots_of_a_poured_bed(
+    poured: Path, tmp_path: Path, language: str
+) -> None:
+    command = NATIVES[language] or f"{_compiled(tmp_path)}"
+    choice = Choice(patterns=("4-*",))
+    command = f"{command} {{case}} {{out}}"
+    runner.run(poured, command, tmp_path / "results", choice, Limits(seconds=60.0))
+    _, planned = pipeline.reopen(Workspace(poured.parent / "study"))
+    (pile,) = planned.piles.values()
+    assert pile.cases is not None
+    grains = pd.read_csv(next(poured.glob("scenes/4-*/grains.csv")))
+    assert grains["d_m"].nunique() > 10
+    flows = pd.read_csv(next(poured.glob("scenes/4-*/load_steps.csv")))["ustar0_m_s"].to_numpy()
+    alone = pile.alone(pile.face(pile.cases).speed)
+    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
+    moved = numbers[numbers["quantity"] == "moved"]
+    assert moved["found"].max() > 3
+    for step, count in zip(moved["at"].astype(int), moved["found"], strict=True):
+        assert count == (alone <= flows[step]).sum()
+
+
+def test_ours_answers_a_poured_bed_as_exported(poured: Path, tmp_path: Path) -> None:
+    _run(poured, tmp_path, "sys.exit(2)", "4-*")
+    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
+    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
+
+
+def _compiled(folder: Path) -> Path:
+    compiler = shutil.which("g++")
+    if compiler is None:
+        pytest.skip("there is no g++")
+    program = folder / "solver"
+    source = NATIVE / "solver.cpp"
+    subprocess.run([compiler, "-std=c++17", "-Wall", "-Werror", "-o", program, source], check=True)
+    return program
+
+
 def test_ours_answers_as_exported(all_levels: Path, tmp_path: Path) -> None:
     # a solver that knows no kind: only our own runs answer
     _run(all_levels, tmp_path, "sys.exit(2)", "[345]-*")
@@ -376,15 +419,9 @@ def test_no_shell_reads_the_command(formulas: Path, tmp_path: Path) -> None:
 
 
 def test_the_start_in_c(formulas: Path, tmp_path: Path) -> None:
-    compiler = shutil.which("g++")
-    if compiler is None:
-        pytest.skip("there is no g++")
-    program = tmp_path / "solver"
-    source = NATIVE / "solver.cpp"
-    subprocess.run([compiler, "-std=c++17", "-Wall", "-Werror", "-o", program, source], check=True)
     found = runner.run(
         formulas,
-        f"{program} {{case}} {{out}}",
+        f"{_compiled(tmp_path)} {{case}} {{out}}",
         tmp_path / "results",
         Choice(levels=(1,), patterns=("1-[01]*",)),
         Limits(seconds=60.0),

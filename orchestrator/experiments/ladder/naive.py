@@ -29,7 +29,7 @@ WHOLE = level("grains", "full pile, fast")
 
 
 def small(study: Study) -> Scene:
-    """The lowest pile of a study, in grains, that is answered by DEM; a lattice if it has one.
+    """The lowest pile of a study, in grains, that is answered by DEM; a lattice.
 
     Raises
     ------
@@ -39,11 +39,12 @@ def small(study: Study) -> Scene:
     piles = (
         scene
         for scene in study.scenes
-        if isinstance(scene.bed, PileBed) and scene.protocol.method == "dem"
+        if isinstance(scene.bed, PileBed) and scene.protocol.method == "dem" and not scene.is_poured
     )
-    found = min(piles, key=lambda one: (one.is_poured, _height(one)), default=None)
+    found = min(piles, key=_height, default=None)
     if found is None:
-        raise InputError("it has no pile that is answered by DEM", where=study.name)
+        what = "it has no pile that is answered by DEM and is not poured"
+        raise InputError(what, where=study.name, remedy="add one: the naive route is run on it")
     return found
 
 

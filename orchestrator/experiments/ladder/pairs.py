@@ -89,7 +89,7 @@ def _affordable(part: Part, bed: PileBed, scene: Scene) -> Iterator[Level]:
     line = of_bed(bed)
     exposed = line.lengths[counted_segments(line, bed.counts)].sum() / scene.grain.diameter
     for one in LEVELS[part]:
-        if one.on_lattices and bed.packing == "disordered":
+        if bed.packing in one.not_on:
             continue
         if one.most_grains is None or exposed <= one.most_grains * (1 + 1e-9):
             yield one
