@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
+from scipy.ndimage import grey_closing, grey_opening
 
 from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
@@ -20,6 +21,8 @@ from orchestrator.report.theory import Branch, drag_law_limit
 
 FloatArray = NDArray[np.float64]
 
+SPIKE = 33
+"""Points of the water band, 80 a decade, over which an edge must last."""
 AIR_STYLES = ("-.", "--", (0, (1, 1)))
 RESULT = ("closed form", "points", "points, law does not hold")
 """Marks of the artists that the limits of the axes must hold."""
@@ -133,8 +136,18 @@ def draw_water(ax: Axes) -> list[Artist]:
         ax.plot(*curve.points(), color=style.WATER, lw=0.4, zorder=1, gid=WATER)
     band = reference.water_band(np.geomspace(0.01, 1000, 400))
     look: style.Look = {"color": style.WATER, "alpha": 0.45, "lw": 0}
-    ax.fill_between(band.reynolds, band.low, band.high, zorder=1, gid="water band", **look)
+    # a curve that begins far from the others is a line alone until it comes near them
+    low = grey_closing(_filled(band.low), size=(SPIKE,))
+    high = grey_opening(_filled(band.high), size=(SPIKE,))
+    known = np.isfinite(band.low).tolist()
+    ax.fill_between(band.reynolds, low, high, where=known, zorder=1, gid="water band", **look)
     return [Patch(label="water: spread of published curves", **look)]
+
+
+def _filled(edge: FloatArray) -> FloatArray:
+    """With the nearest values where an edge has none."""
+    known = np.flatnonzero(np.isfinite(edge))
+    return np.interp(np.arange(len(edge)), known, edge[known])
 
 
 def draw_measured(ax: Axes) -> list[Artist]:

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, stress, style
@@ -22,6 +23,8 @@ FloatArray = NDArray[np.float64]
 BEFORE, BEHIND, ABOVE = 2.0, 8.0, 3.0
 """Flow shown before the windward toe, behind the lee toe, and above the flat bed, h."""
 COLUMNS = 1000
+SMOOTHED = 6.0
+"""Standard deviation of the smoothing of streamlines along x, columns."""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -103,7 +106,8 @@ def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
     forward = np.linspace(0, above_bed[-1, 0], 12)[1:]
     back = np.nanmin(above_bed) * np.array([0.9, 0.6, 0.3])
     for psi, levels in ((from_above, forward), (above_bed, back[back < 0])):
-        inside = np.where(np.isnan(u), np.nan, psi)
+        # the grid meets the bed in steps, which the integral from there carries upwards
+        inside = np.where(np.isnan(u), np.nan, gaussian_filter1d(psi, SMOOTHED, axis=1))
         ax.contour(x, z, inside, levels, colors="white", linewidths=0.45, linestyles="solid")
 
 
