@@ -238,7 +238,8 @@ def check_pile(bed: PileBed, diameter: float) -> None:
         raise UnfitError(
             "bed.height",
             f"{bed.height:g} m is less than five grains of {diameter:g} m",
-            "a pile needs some rows: raise bed.height or lower grain.diameter",
+            "a pile needs some rows, and lengths on a flat bed are parts of it: raise bed.height or"
+            " lower grain.diameter",
         )
 
 

@@ -95,6 +95,16 @@ def test_one_key_asks_for_several_seeds() -> None:
             study.parse(f"seeds = {wrong}\n{BED % 'd/30'}\n{grain}", name="m", where="m")
 
 
+def test_springs_that_throw_poured_grains_apart_are_refused_in_dem() -> None:
+    text = f"grain = {{ diameter = 1e-3, stiffness = 2e5 }}\n{BED % 'd/30'}\n"
+    with pytest.raises(InputError, match=r"springs of 2e\+05 W/d throw them apart"):
+        study.parse(text, name="one", where="test")
+    for other in ("peeling", "pivot"):
+        study.parse(f'{text}protocol = {{ method = "{other}" }}', name="one", where="test")
+    lattice = text.replace('packing = "poured", ', "")
+    study.parse(lattice, name="one", where="test")
+
+
 @pytest.mark.parametrize("name", ["poured", "mixture"])
 def test_presets_of_poured_beds_can_be_planned(name: str) -> None:
     asked = study.load(name)
