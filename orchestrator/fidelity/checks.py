@@ -99,7 +99,7 @@ def ready(
     return {
         asked: check
         for asked, check in checks.items()
-        if all(run.name in done for run in (*check.runs, *piles[asked].runs))
+        if check.is_run(done) and piles[asked].is_run(done)
     }
 
 

@@ -1,5 +1,6 @@
 """A pile of grains and its answer: the bed under its flow, with the scene's threshold method."""
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +26,10 @@ class Pile(LoadedBed):
     def runs(self) -> tuple[Case, ...]:
         """The cases that its answer is read from, those of the flow first."""
         return (*self.model.cases, *self.pouring, *self.method.cases)
+
+    def is_run(self, done: Container[str]) -> bool:
+        """Whether all of its runs are among those that are done, by name."""
+        return all(run.name in done for run in self.runs)
 
     @property
     def by_dem(self) -> bool:

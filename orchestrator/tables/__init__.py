@@ -35,7 +35,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     ready = [
         piles.Answer.read(plan.decisions[scene_id], pile, cases)
         for scene_id, pile in plan.piles.items()
-        if all(one.name in done for one in pile.runs)
+        if pile.is_run(done)
     ]
     cells = [one for one in plan.cells if one.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))

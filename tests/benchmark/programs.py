@@ -4,8 +4,17 @@ import shlex
 import sys
 from pathlib import Path
 
+import pandas as pd
+
+from orchestrator.benchmark import runner
+from orchestrator.benchmark.report import Found
+from orchestrator.benchmark.runner import Choice
+from orchestrator.runs.confined import Limits
 from tests.benchmark.conftest import NATIVE
 
+MIB = 2**20
+SMALL = Limits(seconds=30.0, memory=400 * MIB, disk=32 * MIB, printed=4 * MIB, processes=40)
+TWO = Choice(patterns=("2-incline-5", "2-incline-20"))
 HEAD = """
 import math, os, sys, time
 from pathlib import Path
@@ -23,3 +32,13 @@ def program(folder: Path, body: str) -> str:
     path = folder / "my solver.py"
     path.write_text(HEAD.format(native=str(NATIVE)) + body)
     return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
+
+
+def run(pack: Path, folder: Path, body: str, choice: Choice = TWO, limits: Limits = SMALL) -> Found:
+    """Run a solver of such a body on a pack, into `results` of a folder."""
+    return runner.run(pack, program(folder, body), folder / "results", choice, limits)
+
+
+def verdicts_in(folder: Path) -> pd.DataFrame:
+    """The verdicts of that run, by scene."""
+    return pd.read_csv(folder / "results" / "verdicts.csv").set_index("scene")

@@ -9,60 +9,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
-from orchestrator.benchmark import answer, runner, variants
-from orchestrator.benchmark.answer import AnswerError
-from orchestrator.benchmark.report import Found
+from orchestrator import cli
+from orchestrator.benchmark import runner, variants
 from orchestrator.benchmark.runner import Choice
-from orchestrator.benchmark.solver import Solved, Solver, split
+from orchestrator.benchmark.solver import split
 from orchestrator.errors import InputError
 from orchestrator.runs import confined
-from orchestrator.runs.confined import Limits
 from tests.benchmark.conftest import NATIVE, ROOT
-from tests.benchmark.programs import TAIL, program
+from tests.benchmark.programs import SMALL, TAIL, TWO, program, run, verdicts_in
 from tests.conftest import Command
 
-MIB = 2**20
-SMALL = Limits(seconds=30.0, memory=400 * MIB, disk=32 * MIB, printed=4 * MIB, processes=40)
-TWO = Choice(patterns=("2-incline-5", "2-incline-20"))
 OPEN = pytest.mark.usefixtures("without_walls")
-
-
-@pytest.fixture
-def without_walls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the system has no namespaces for users."""
-    monkeypatch.setattr(confined, "hides", lambda: False)
-
-
-@pytest.fixture
-def walls() -> None:
-    if not confined.hides():
-        pytest.skip("this system has no namespaces for users")
-
-
-@pytest.fixture(autouse=True)
-def nothing_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """All that a run makes for a moment is gone after it."""
-    folder = tmp_path / "tmp"
-    folder.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(folder))
-    yield
-    assert not [path for path in folder.iterdir() if path.name != "moved"]
-
-
-def _run(
-    pack: Path, folder: Path, body: str, choice: Choice = TWO, limits: Limits = SMALL
-) -> Found:
-    return runner.run(pack, program(folder, body), folder / "results", choice, limits)
-
-
-def _verdicts(folder: Path) -> pd.DataFrame:
-    return pd.read_csv(folder / "results" / "verdicts.csv").set_index("scene")
+pytestmark = pytest.mark.usefixtures("nothing_left")
 
 
 CHEAT = """
@@ -104,8 +66,8 @@ def test_a_cheat_finds_no_expected_answers(formulas: Path, tmp_path: Path) -> No
     pack = tmp_path / "pack"
     shutil.copytree(formulas, pack)
     places = f"{BY_COMMAND}\nPLACES += [{str(pack)!r}, *glob.glob({str(tmp_path) + '/*'!r})]"
-    found = _run(pack, tmp_path, _cheat(places))
-    assert not _verdicts(tmp_path)["passed"].any()
+    found = run(pack, tmp_path, _cheat(places))
+    assert not verdicts_in(tmp_path)["passed"].any()
     assert "nothing found" in found.failures[0]
     assert "without sight of the pack" in found.page.read_text()
 
@@ -125,8 +87,8 @@ def test_a_cheat_from_the_shell_finds_no_expected_answers(
 @OPEN
 def test_a_cheat_that_sees_the_pack_fails_other_numbers(formulas: Path, tmp_path: Path) -> None:
     choice = Choice(levels=(1,), patterns=("1-0*",))
-    found = _run(formulas, tmp_path, _cheat(f"PLACES = [{str(formulas)!r}]"), choice)
-    verdicts = _verdicts(tmp_path)
+    found = run(formulas, tmp_path, _cheat(f"PLACES = [{str(formulas)!r}]"), choice)
+    verdicts = verdicts_in(tmp_path)
     caught = verdicts["message"].str.contains("it fails the same scene with d_m = ", na=False)
     assert caught.sum() == min(variants.EACH, len(verdicts))
     assert not verdicts.loc[caught, "passed"].any()
@@ -140,13 +102,13 @@ def test_earlier_answers_and_studies_are_hidden(
     shutil.copytree(finished, tmp_path / "study")
     shutil.copytree(all_levels, tmp_path / "pack")
     choice = Choice(patterns=("2-incline-5",))
-    _run(tmp_path / "pack", tmp_path, TAIL, choice)
+    run(tmp_path / "pack", tmp_path, TAIL, choice)
     (tmp_path / "results").rename(tmp_path / "another")
     body = (
         f"seen = [path for name in ('pack', 'study', 'another', 'results') for path in"
         f" Path({str(tmp_path)!r}, name).rglob('*')]\nprint(seen)\nsys.exit(len(seen) + 3)"
     )
-    found = _run(tmp_path / "pack", tmp_path, body, choice)
+    found = run(tmp_path / "pack", tmp_path, body, choice)
     assert "it ended with 3: []" in found.failures[0]
 
 
@@ -164,7 +126,7 @@ def test_a_daemon_does_not_reach_the_answer(
 ) -> None:
     if not walled:
         monkeypatch.setattr(confined, "hides", lambda: False)
-    found = _run(formulas, tmp_path, LATE + TAIL)
+    found = run(formulas, tmp_path, LATE + TAIL)
     assert [line for line in found.failures if "quantity,at,value" not in line] == []
     texts = [path.read_text() for path in (tmp_path / "results").glob("*/answer.csv")]
     time.sleep(0.3)
@@ -183,124 +145,13 @@ def _commands() -> str:
     return "\n".join(found)
 
 
-ANSWERS = {
-    "a huge file": ("out.open('wb').truncate(30 * 2**20)", "answer.csv has 30 MiB, more than 4"),
-    "a huge line": (
-        "out.write_text('quantity,at,value\\n' + 'a' * 3 * 2**20 + '\\n')",
-        "field larger than field limit",
-    ),
-    "many lines": (
-        "out.write_text('quantity,at,value\\n' + 'a,,1\\n' * 500_000)",
-        "answers a twice",
-    ),
-    "zeros": ("out.write_bytes(b'quantity,at,value\\n' + bytes(99))", "is no table|of 3 fields"),
-    "a link": ("out.symlink_to('/etc/passwd')", "it is a link"),
-    "a link to nothing": ("out.symlink_to('nowhere')", "it is a link"),
-    "a device": ("out.symlink_to('/dev/zero')", "it is a link"),
-    "a pipe": ("os.mkfifo(out)", "answer.csv is no file"),
-    "a directory": ("out.mkdir()", "answer.csv is no file"),
-    "a closed file": ("out.write_text(''); out.chmod(0)", "answer.csv is empty|cannot be read"),
-    "its directory gone": (
-        "import shutil; shutil.rmtree(out.parent)",
-        "it changed the files of its case",
-    ),
-    "its case a link": (
-        "solver.main(case, out)\nimport shutil; shutil.rmtree(case); case.symlink_to('/')",
-        "it changed the files of its case",
-    ),
-    "a huge case": (
-        "os.truncate(case / 'scene.json', 30 * 2**20)",
-        "it changed the files of its case",
-    ),
-    "a closed directory": ("(case / 'more').mkdir(); (case / 'more').chmod(0)", "its case"),
-    "a pipe in its case": ("os.mkfifo(case / 'more')", "its case"),
-    "deep": (
-        "for _ in range(900): os.mkdir('a'); os.chdir('a')",
-        "it wrote no answer.csv",
-    ),
-    "a core": ("os.abort()", "it ended with -6"),
-    "a signal to all": ("os.kill(-1, 9)", "it ended with 1: ProcessLookupError"),
-    "no stdout": ("os.close(1); os.close(2); sys.exit(9)", "it ended with 9"),
-    "prints": ("while True: print('y' * 4096)", "printed more than 4 MiB"),
-    "memory": ("b = bytes([1]) * 10**9", "more than 400 MiB of memory|MemoryError"),
-    "disk": (
-        "for i in range(9): open(str(i), 'w').write('x' * 9 * 2**20)\ntime.sleep(9)",
-        "its files took more than 32 MiB",
-    ),
-    "files of memory": (
-        "for i in range(40):\n    os.write(os.memfd_create(str(i)), bytes(2**20))\ntime.sleep(9)",
-        "its files took more than 32 MiB",
-    ),
-    "files without a name": (
-        "for i in range(40):\n    os.write(os.open('f', 66), bytes(2**20)); os.unlink('f')\n"
-        "time.sleep(9)",
-        "its files took more than 32 MiB",
-    ),
-    "threads": (
-        "import threading\nfor _ in range(700):\n"
-        "    threading.Thread(target=time.sleep, args=(9,), daemon=True).start()\ntime.sleep(9)",
-        "more than 640 threads",
-    ),
-    "forks": (
-        "for _ in range(99): os.fork() or time.sleep(9)\ntime.sleep(9)",
-        "more than 40 processes",
-    ),
-    "sleeps": ("signal = __import__('signal'); signal.signal(15, signal.SIG_IGN); time.sleep(99)",
-               "did not end within 2 s"),
-}  # fmt: skip
-
-
-def _solved(pack: Path, folder: Path, body: str, limits: Limits = SMALL) -> Solved:
-    """What comes of a scene for a solver that means harm."""
-    one = Solver(split(program(folder, body)), limits, [pack.resolve()])
-    return one.solve(pack / "scenes" / "2-incline-5", folder / "log")
-
-
-@pytest.mark.parametrize("name", ANSWERS)
-@pytest.mark.parametrize("walled", [True, False])
-def test_harm_is_named(
-    formulas: Path, tmp_path: Path, name: str, walled: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if not walled:
-        monkeypatch.setattr(confined, "hides", lambda: False)
-        if name == "a signal to all":
-            pytest.skip("without walls it would end every process of its user")
-    body, message = ANSWERS[name]
-    solved = _solved(formulas, tmp_path, body, SMALL if name != "sleeps" else Limits(seconds=2.0))
-    assert re.search(message, solved.error or _wrong(solved.answer)), solved
-
-
-def _wrong(given: bytes | None) -> str:
-    with pytest.raises(AnswerError) as caught:
-        answer.parsed(given or b"")
-    return str(caught.value)
-
-
-def test_a_run_goes_on_after_harm(
-    formulas: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    harms = {
-        "2-incline-5": "print(chr(27) + '[2J'); sys.exit(1)",
-        "2-incline-45": "import shutil; shutil.rmtree(out.parent)",
-        "2-incline-60": "out.mkdir()",
-        "2-incline-70": "out.symlink_to('/dev/zero')",
-        "2-incline-75": "out.write_bytes(bytes(99))",
-    }
-    body = f"harm = {harms!r}.get(solver.json.loads((case / 'scene.json').read_text())['scene'])"
-    body += "\nif harm:\n    exec(harm)\nelse:\n    solver.main(case, out)\n"
-    found = _run(formulas, tmp_path, body, Choice(patterns=("2-incline-*",)))
-    assert set(_verdicts(tmp_path).query("passed").index) == {"2-incline-20"}
-    assert "\x1b" not in "".join(found.failures)
-    assert "\x1b" not in found.page.read_text()
-
-
 @OPEN
 def test_a_solver_that_changes_the_pack_stops_the_run(formulas: Path, tmp_path: Path) -> None:
     root = tmp_path / "pack"
     shutil.copytree(formulas, root)
     body = f"Path({str(root / 'expected.csv')!r}).open('a').write('x')" + TAIL
     with pytest.raises(InputError, match=r"changed expected.csv of the pack.*not used further"):
-        _run(root, tmp_path, body)
+        run(root, tmp_path, body)
     with pytest.raises(InputError, match=r"expected.csv is not what was exported"):
         runner.compare(root, [tmp_path / "results"], None, Choice())
 
@@ -310,7 +161,7 @@ def test_a_solver_cannot_change_the_pack(formulas: Path, tmp_path: Path) -> None
     root = tmp_path / "pack"
     shutil.copytree(formulas, root)
     body = f"Path({str(root / 'expected.csv')!r}).open('a').write('x')" + TAIL
-    found = _run(root, tmp_path, body)
+    found = run(root, tmp_path, body)
     assert "expected.csv" in found.failures[0]
     assert (root / "expected.csv").read_bytes() == (formulas / "expected.csv").read_bytes()
 
@@ -342,8 +193,8 @@ def test_an_answer_is_put_back(formulas: Path, tmp_path: Path) -> None:
     body += "harm = harms.get(solver.json.loads((case / 'scene.json').read_text())['scene'])\n"
     body += "if harm:\n    assert not other.is_symlink()\n"
     body += f"    assert other.read_text().startswith({whole!r})\n    exec(harm)\n"
-    _run(formulas, tmp_path, body + TAIL, Choice(patterns=(first, *harms)))
-    verdicts = _verdicts(tmp_path)
+    run(formulas, tmp_path, body + TAIL, Choice(patterns=(first, *harms)))
+    verdicts = verdicts_in(tmp_path)
     assert verdicts["passed"].to_dict() == {first: True, **dict.fromkeys(harms, False)}
     said = set(verdicts.loc[[*harms], "message"])
     assert said == {f"it changed the answer of {first}, which was put back"}
@@ -361,7 +212,7 @@ def test_a_scene_that_became_a_link_is_not_written_through(formulas: Path, tmp_p
     body += "if '2-incline-20' in (case / 'scene.json').read_text():\n"
     body += f"    shutil.rmtree(folder); folder.symlink_to({str(foreign)!r})\n"
     with pytest.raises(InputError, match="2-incline-5: it is a link to"):
-        _run(formulas, tmp_path, body + TAIL)
+        run(formulas, tmp_path, body + TAIL)
     assert {p.name: p.read_text() for p in foreign.iterdir()} == {"answer.csv": "mine\n"}
 
 
@@ -398,13 +249,13 @@ def test_a_program_that_may_not_be_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize("limit", ["nan", "-1", "0", "inf", "soon"])
 @pytest.mark.parametrize("option", ["--limit", "--memory"])
 def test_limits_that_are_none(
-    formulas: Path, orchestrator: Command, option: str, limit: str
+    formulas: Path, capsys: pytest.CaptureFixture[str], option: str, limit: str
 ) -> None:
-    ended = orchestrator(
-        "benchmark", "run", str(formulas), "--solver", "true {case} {out}", option, limit
-    )
-    assert ended.returncode == 2
-    assert option in ended.stderr
+    words = ["benchmark", "run", str(formulas), "--solver", "true {case} {out}", option, limit]
+    with pytest.raises(SystemExit) as ended:
+        cli.main(words)
+    assert ended.value.code == 2
+    assert option in capsys.readouterr().err
 
 
 def test_a_killed_run_leaves_nothing_at_work(formulas: Path, tmp_path: Path) -> None:
@@ -432,7 +283,7 @@ def test_a_killed_run_leaves_nothing_at_work(formulas: Path, tmp_path: Path) -> 
 
 
 def test_what_a_run_says_of_its_walls(formulas: Path, tmp_path: Path) -> None:
-    _run(formulas, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     told = json.loads((tmp_path / "results" / "benchmark.json").read_text())
     assert told["hidden"] is confined.hides()
     assert shlex.split(told["name"])[0] == sys.executable

@@ -13,8 +13,7 @@ from orchestrator.benchmark.answer import AnswerError
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import claim
-from tests.benchmark.programs import TAIL, program
-from tests.benchmark.test_adversary import SMALL, TWO, _run
+from tests.benchmark.programs import SMALL, TAIL, TWO, program, run
 
 
 def _refused(formulas: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:
@@ -49,40 +48,40 @@ def test_results_go_nowhere_else(formulas: Path, finished: Path, tmp_path: Path)
 def test_results_of_another_solver_or_pack_stay(
     formulas: Path, all_levels: Path, tmp_path: Path
 ) -> None:
-    _run(formulas, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     results = tmp_path / "results"
     _refused(formulas, results, "holds the benchmark of the solver .*, not")
     with pytest.raises(InputError, match="answers to another pack"):
-        _run(all_levels, tmp_path, TAIL)
-    _run(formulas, tmp_path, TAIL)
+        run(all_levels, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     (results / ".lock").unlink()
     with claim.claimed(results, claim.RESULTS, program(tmp_path, TAIL)):
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
-            _run(formulas, tmp_path, TAIL)
+            run(formulas, tmp_path, TAIL)
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
             runner.compare(formulas, [results], None, TWO)
 
 
 @pytest.mark.filterwarnings("ignore:.*is not what this program wrote")
 def test_files_of_the_user_survive_in_results(formulas: Path, tmp_path: Path) -> None:
-    _run(formulas, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     results = tmp_path / "results"
     (results / "2-incline-5" / "notes.txt").write_text("mine\n")
     (results / "figures" / "mine.png").write_text("mine\n")
     (results / "comparison.csv").unlink()
     (results / "comparison.csv").write_text("mine\n")
-    _run(formulas, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     kept = {p.name for p in results.rglob("*") if p.is_file() and p.read_bytes() == b"mine\n"}
     assert kept == {"notes.txt", "mine.png", "comparison.csv"}
     (results / "figures").rename(tmp_path / "away")
     (results / "figures").symlink_to(tmp_path / "away")
     with pytest.raises(InputError, match="figures: it is a link"):
-        _run(formulas, tmp_path, TAIL)
+        run(formulas, tmp_path, TAIL)
 
 
 def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) -> None:
     given = tmp_path / "given"
-    _run(formulas, tmp_path, TAIL)
+    run(formulas, tmp_path, TAIL)
     shutil.copytree(tmp_path / "results" / "2-incline-5", given / "2-incline-5")
     before = sorted(given.rglob("*"))
     found = runner.compare(formulas, [given], tmp_path / "page", Choice(patterns=("2-incline-5",)))
@@ -95,7 +94,7 @@ def test_answers_of_others_are_not_written_to(formulas: Path, tmp_path: Path) ->
 def one_answer(formulas: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of a solver that passes, of one scene."""
     folder = tmp_path_factory.mktemp("one")
-    assert not _run(formulas, folder, TAIL, Choice(patterns=("2-incline-5",))).failures
+    assert not run(formulas, folder, TAIL, Choice(patterns=("2-incline-5",))).failures
     return folder / "results"
 
 

@@ -96,9 +96,8 @@ NOHUP = ("nohup",)
     ("numbers", "under"),
     [
         ([KILL], ()),
-        ([INT], ()),
-        ([TERM, HUP, QUIT, USR1, USR2, XCPU], ()),
-        ([TERM, INT, QUIT], NOHUP),
+        ([INT, TERM, HUP, QUIT, USR1, USR2], ()),
+        ([TERM, INT, XCPU], NOHUP),
     ],
 )
 def test_a_driver_that_is_ended_at_each_stage_in_turn(

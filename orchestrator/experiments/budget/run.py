@@ -48,11 +48,7 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         todo = pipeline.missing(planned, space)
         failures = pipeline.complete(todo, space, workers=workers, limit_s=study.time_limit_s)
         done = planned.done(space.cases)
-        ready = {
-            key: pile
-            for key, pile in planned.piles.items()
-            if all(one.name in done for one in pile.runs)
-        }
+        ready = {key: pile for key, pile in planned.piles.items() if pile.is_run(done)}
         moved = shares.changes(study, ready, space.cases)
         if moved.empty:
             raise OrchestratorError(
