@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 
 from orchestrator import plan, tables
-from orchestrator.benchmark import export
-from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
 from orchestrator.plan import Plan
 from orchestrator.report import mixture
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
-from orchestrator.runs.claim import STUDY as STUDY_KIND
-from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
 STUDY = """
@@ -99,14 +95,6 @@ def test_no_error_is_promised_on_poured_beds() -> None:
         decision = decide(scene, 0.05)
         assert decision.is_as_asked
         assert decision.error_estimate is None
-
-
-def test_a_pack_takes_no_poured_beds(tmp_path: Path) -> None:
-    space = Workspace(tmp_path)
-    with space.held(STUDY_KIND, "poured"):
-        space.describe(STUDY_KIND, "poured", [], study=STUDY, tolerance=None)
-    with pytest.raises(InputError, match="poured beds"):
-        export.export(tmp_path / "pack", tmp_path, ())
 
 
 def test_the_page_shows_where_grains_go_their_pockets_and_sizes(
