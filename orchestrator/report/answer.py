@@ -130,10 +130,10 @@ def _frozen(piles: pd.DataFrame) -> Iterator[str]:
     if beyond.any():
         least, most = piles.loc[beyond, "fraction"].min(), piles["frozen_bed"].max()
         yield (
-            "The flow of the whole pile acts until the last grain has gone. On a bed that changes "
-            f"(protocol.update = 0.1) {int(beyond.sum())} of {len(piles)} thresholds are known to "
-            f"move by more than {FROZEN_BED:.0%}, up to {most:.0%}, from n/N = {least:.0%} on "
-            "(column frozen_bed)."
+            "The flow of the whole pile acts until the last grain has gone. With "
+            f"`protocol.update = 0.1` the flow follows the bed: {int(beyond.sum())} of "
+            f"{len(piles)} thresholds then move by more than {FROZEN_BED:.0%} (up to {most:.0%}, "
+            f"from n/N = {least:.0%} on; column frozen_bed)."
         )
 
 

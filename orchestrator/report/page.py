@@ -101,8 +101,9 @@ def _template(name: str, folder: Path) -> Template:
 
 
 def typeset(text: str) -> Markup:
-    """HTML of a text in which ``V_f`` has an index; for the package's own texts."""
-    return Markup(re.sub(r"(?<=\w)_([A-Za-z]+)", r"<sub>\1</sub>", str(escape(text))))
+    """HTML of a text in which ``V_f`` has an index; words such as ``frozen_bed`` are kept."""
+    index = r"\b([^\W\d_]{1,3})_([A-Za-z]+)\b(?!_)"
+    return Markup(re.sub(index, r"\1<sub>\2</sub>", str(escape(text))))
 
 
 def _json(data: Any) -> Markup:

@@ -207,3 +207,9 @@ def contrast(one: str, other: str) -> float:
 def luminance(colour: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
     linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_symbols_have_an_index_and_names_of_columns_none() -> None:
+    typeset = page_module.typeset
+    assert typeset("τ_c of ρ_sol") == "τ<sub>c</sub> of ρ<sub>sol</sub>"
+    assert typeset("column frozen_bed") == "column frozen_bed"
