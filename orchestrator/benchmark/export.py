@@ -42,7 +42,8 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     Raises
     ------
     InputError
-        If a level needs a study, or the study is not finished or not answered as it asks.
+        If a level needs a study, or the study is not finished, not answered as it asks, or asks for
+        beds that change.
     """
     if source is None:
         return _formulas(root, levels or FORMULAS)
@@ -53,6 +54,12 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
             f"its scenes were answered within a tolerance of {asked.tolerance:g}, not as they ask",
             where=str(source),
             remedy="run the study without a tolerance into another directory",
+        )
+    if any(scene.protocol.update for scene in asked.scenes):
+        raise InputError(
+            "a pack holds one flow over each bed, and this bed changes under it",
+            where=f"{source}: protocol.update",
+            remedy="run the study without it into another directory",
         )
     finished = Finished(asked, planned, space)
     problems = list(finished.problems(levels or LEVELS))

@@ -34,7 +34,7 @@ def test_a_looser_tolerance_is_never_dearer(pile: MakePile, one: float, other: f
     [
         (0.05, "aligned"),
         (0.1, "disordered"),
-        (0.1, "horizontal"),
+        (0.15, "horizontal"),
         (0.2, "aligned"),
         (0.2, "horizontal"),
         (0.2, "disordered"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator import pipeline, plan, tables
+from orchestrator.benchmark import export
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.grains import wear
@@ -253,3 +254,12 @@ def test_a_single_grain_has_no_bed_that_changes() -> None:
     text = "grain = { diameter = 1e-3 }\nprotocol = { update = 0.1 }"
     with pytest.raises(InputError, match=r"protocol\.update"):
         study.parse(text, name="one", where="test")
+
+
+def test_a_pack_takes_no_bed_that_changes(tmp_path: Path) -> None:
+    text = PILE.format(more="update = 0.25")
+    space = Workspace(tmp_path / "study")
+    with space.held(STUDY, "one"):
+        space.describe(STUDY, "one", [], study=text, tolerance=None)
+    with pytest.raises(InputError, match="changes under it"):
+        export.export(tmp_path / "pack", space.root, ())
