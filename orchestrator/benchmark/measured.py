@@ -21,7 +21,7 @@ from orchestrator.flow.case import SPEED_HEIGHT, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile_case import MARGIN
-from orchestrator.grains.threshold import PileThreshold, of_pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.tables import Tables
 
 STRESS, MEAN_STRESS = 0.10, 0.05
@@ -261,8 +261,8 @@ def _pile_rows(one: Answered, threshold: float) -> Iterator[Row]:
         steps = ustar0[max(load_step - 2, 0)], ustar0[min(load_step + 1, len(ustar0) - 1)]
         stresses = row["shields_low"], row["shields_high"]
         if not one.pile.bed.is_triangle or one.pile.pouring:
-            fewer, more = _beside(one, row["fraction"], margins.count)
-            unit = shields / _of_pile_at(one, row["fraction"]).tau
+            fewer, same, more = _around(one, row["fraction"], margins.count)
+            unit = shields / same.tau
             stresses = (
                 min(stresses[0], fewer.tau_low * unit),
                 max(stresses[1], more.tau_high * unit),
@@ -272,21 +272,15 @@ def _pile_rows(one: Answered, threshold: float) -> Iterator[Row]:
         yield expected("ustar0_m_s", at, flow, steps, tolerance, flow)
 
 
-def _beside(one: Answered, fraction: float, margin: float) -> tuple[PileThreshold, PileThreshold]:
-    """The thresholds of our run at so much less and so much more of N, as far as it went.
+def _around(one: Answered, fraction: float, margin: float) -> list[PileThreshold]:
+    """The thresholds of our run at a fraction, before it at so much less of N, after it at more.
 
     Grains of a poured bed go by chance, and those of a train by turns: n/N stands still for some
     load steps and leaps in the next one, so that a grain more or less is far off in the flow.
     """
     most = float(one.curve["moved"].iloc[-1] / one.curve["count"].iloc[-1])
-    fewer = _of_pile_at(one, max(fraction - margin, 1e-9))
-    return fewer, _of_pile_at(one, min(fraction + margin, most))
-
-
-def _of_pile_at(one: Answered, fraction: float) -> PileThreshold:
-    """The threshold of our run at a fraction."""
-    motion, speed = one.pile.motion(one.cases), one.pile.face(one.cases).speed
-    return of_pile(motion, speed, fraction, one.pile.scene.fluid.density)
+    places = max(fraction - margin, 1e-9), fraction, min(fraction + margin, most)
+    return one.pile.thresholds(one.cases, places)
 
 
 def _count_rows(curve: pd.DataFrame, margins: Margins) -> Iterator[Row]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.fidelity.decision import Bound, Decision, decide
-from orchestrator.fidelity.levels import changed
+from orchestrator.fidelity.levels import changed, solved_model
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import PileThreshold, of_pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
@@ -62,9 +62,7 @@ def _needs_check(answer: Decision) -> bool:
 
 
 def _by_dem(scene: Scene, tolerance: float) -> Decision:
-    assert isinstance(scene.bed, PileBed)
-    flow = "flat" if scene.bed.is_level else "solve"
-    asked = changed(scene, {"protocol.method": "dem", "flow.model": flow})
+    asked = changed(scene, {"protocol.method": "dem", "flow.model": solved_model(scene)})
     return decide(asked, tolerance, CHEAP)
 
 
@@ -83,10 +81,9 @@ def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator
     They agree where the one without DEM lies in the interval of DEM, widened by the tolerance, or
     where neither reaches the fraction.
     """
-    density = cheap.scene.fluid.density
-    answers = [(pile.motion(cases), pile.face(cases).speed) for pile in (cheap, check)]
-    for fraction in cheap.scene.protocol.fractions:
-        own, dem = (of_pile(motion, speed, fraction, density) for motion, speed in answers)
+    fractions = cheap.scene.protocol.fractions
+    answers = (pile.thresholds(cases, fractions) for pile in (cheap, check))
+    for own, dem in zip(*answers, strict=True):
         within = dem.tau_low * (1 - tolerance) <= own.tau <= dem.tau_high * (1 + tolerance)
         neither = math.isnan(own.tau) and math.isnan(dem.tau)
         yield Comparison(own, dem, within or neither)

@@ -185,8 +185,7 @@ def _asks_for(scene: Scene) -> str:
     """
     if scene.protocol.method != "dem":
         return f"the study asks for the method {scene.protocol.method}"
-    level = isinstance(scene.bed, PileBed) and scene.bed.is_level
-    if scene.flow.model != ("flat" if level else "solve"):
+    if scene.flow.model != levels.solved_model(scene):
         return f"the study asks for the flow model {scene.flow.model}"
     if scene.protocol.update:
         return "the study asks for a bed that changes, for which no error is known"

@@ -86,6 +86,11 @@ def changed(scene: Scene, fields: Fields) -> Scene:
     return make_scene(parts, "fields that are changed")
 
 
+def solved_model(scene: Scene) -> str:
+    """The flow model that the levels approximate: over a level bed there is nothing to solve."""
+    return FLAT if isinstance(scene.bed, PileBed) and scene.bed.is_level else "solve"
+
+
 def level(part: Part, name: str) -> Level:
     """A level by its name."""
     return next(one for one in LEVELS[part] if one.name == name)
@@ -115,8 +120,11 @@ def _dem(name: str, layers: int, rules: Fields, **options: Any) -> Level:
     which = "every grain mobile" if layers == FULL else f"{layers} mobile layers"
     which = which.removesuffix("s") if layers == 1 else which
     meaning = f"DEM, {which}, load steps {100 * rules['protocol.load_increment']:g} % apart"
-    sets = {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
-    return Level(name, **{"meaning": meaning, "sets": sets, **options})
+    return Level(name, **{"meaning": meaning, "sets": _mobile(layers, rules), **options})
+
+
+def _mobile(layers: int, rules: Fields) -> Fields:
+    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
 
 
 def _solve(cells: int, growth: float) -> Fields:
@@ -142,19 +150,16 @@ def _own_speed(scene: Scene) -> Fields:
 
 
 def _paper_stiffness(scene: Scene) -> Fields:
-    one_layer = {"bed.mobile_layers": 1, "protocol.method": "dem"}
-    return {**one_layer, **FAST, "grain.stiffness": paper_stiffness(scene)}
+    return {**_mobile(1, FAST), "grain.stiffness": paper_stiffness(scene)}
 
 
 def _reference(scene: Scene) -> Fields:
     """On a poured bed each further layer that may move lets grains go earlier, up to the sixth."""
-    layers, rules = (6, SLOW) if scene.is_poured else (3, SLOWEST)
-    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
+    return _mobile(6, SLOW) if scene.is_poured else _mobile(3, SLOWEST)
 
 
 def _soft_reference(scene: Scene) -> Fields:
-    layers, rules = (FULL, SOFT) if scene.is_poured else (4, SOFTEST)
-    return {"bed.mobile_layers": layers, "protocol.method": "dem", **rules}
+    return _mobile(FULL, SOFT) if scene.is_poured else _mobile(4, SOFTEST)
 
 
 def _rules(

@@ -1,6 +1,6 @@
 """A pile of grains and its answer: the bed under its flow, with the scene's threshold method."""
 
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,6 +9,7 @@ from orchestrator.grains.loaded_bed import Face, LoadedBed
 from orchestrator.grains.method import METHODS, Dem, Method
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile_case import PileCase
+from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.grains.wear import Flow, WornFlow
 from orchestrator.runs.case import Case
 
@@ -58,3 +59,8 @@ class Pile(LoadedBed):
     def motion(self, cases: Path) -> Motion:
         """What the windward grains do; `cases` holds the finished runs."""
         return self.method.motion(cases)
+
+    def thresholds(self, cases: Path, fractions: Iterable[float]) -> list[PileThreshold]:
+        """Its thresholds at some n/N; `cases` holds the finished runs."""
+        motion, speed = self.motion(cases), self.face(cases).speed
+        return [of_pile(motion, speed, one, self.scene.fluid.density) for one in fractions]

@@ -30,9 +30,10 @@ def by_angle(results: Results) -> Iterator[Figure]:
 
 def by_slope(results: Results) -> Iterator[Figure]:
     """Figs. 7 and 8: single grains on slopes, a figure for each entrainment angle."""
+    dem = _dem(results)
     for (beta,), scenes in split(_held(results), "beta_deg"):
         if (scenes["alpha_deg"] > 0).any():
-            yield from _pair(results, scenes, _dem(results), "alpha_deg", f"slope, β = {beta:g}°")
+            yield from _pair(results, scenes, dem, "alpha_deg", f"slope, β = {beta:g}°")
 
 
 def _held(results: Results) -> pd.DataFrame:

@@ -27,9 +27,11 @@ def draw(results: Results) -> Iterator[Figure]:
         some = panels[start : start + MOST]
         named = pd.concat(some)["scene_id"].unique()
         cases = tuple(results.plan.piles[one].runs[-1].name for one in named)
-        number = f"-{start // MOST + 1}" if start else ""
-        title = "Frozen bed and bed that changes" + (f" ({number[1:]})" if number else "")
-        yield Figure(f"wear{number}", title, captions.wear(), cases, _canvas(some, colours))
+        name, title = "wear", "Frozen bed and bed that changes"
+        if start:
+            number = start // MOST + 1
+            name, title = f"{name}-{number}", f"{title} ({number})"
+        yield Figure(name, title, captions.wear(), cases, _canvas(some, colours))
 
 
 def _canvas(panels: list[pd.DataFrame], colours: dict[float, str]) -> Canvas:

@@ -28,6 +28,8 @@ Length = Annotated[float, Field(ge=1e-12, le=1e4)]
 """Of a mesh's cells, which resolve what the lengths above allow."""
 OverHeight = Annotated[float, Field(ge=1e-4, le=100)]
 """A length over a pile's height: from far below a cell of any mesh to several piles."""
+FormHeights = Annotated[float, Field(ge=3, le=1000)]
+"""A length of the flow's domain over the height of the forms."""
 RelativeSize = Annotated[float, Field(ge=0.1, le=10)]
 """A smaller grain falls through the pores of a bed, a larger one lies on many grains."""
 FrictionAngle = Annotated[float, Field(ge=1, le=89)]

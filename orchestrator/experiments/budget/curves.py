@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from orchestrator.experiments.budget.choices import label
 from orchestrator.grains import wear
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
+from orchestrator.tables.piles import shields
 
 MOST = 4
 """Piles that are drawn; the table has all."""
@@ -42,13 +42,11 @@ def draw(piles: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
 
 
 def _curve(ax: Axes, pile: Pile, cases: Path, colour: str, dashes: str) -> None:
-    motion, speed = pile.motion(cases), pile.face(cases).speed
-    count = round(max(pile.scene.protocol.fractions) * motion.count)
-    fractions = np.arange(1, count + 1) / motion.count
-    scene = pile.scene
-    tau = [of_pile(motion, speed, float(one), scene.fluid.density).tau for one in fractions]
-    shields = np.array(tau) * np.pi / 6 * scene.grain.diameter**2 / scene.weight
-    ax.plot(fractions, shields, color=colour, ls=dashes)
+    whole = pile.packing.count
+    count = round(max(pile.scene.protocol.fractions) * whole)
+    fractions = np.arange(1, count + 1) / whole
+    tau = np.array([one.tau for one in pile.thresholds(cases, fractions.tolist())])
+    ax.plot(fractions, shields(pile.scene, tau), color=colour, ls=dashes)
 
 
 def _lines(ax: Axes, pile: Pile, cases: Path) -> None:

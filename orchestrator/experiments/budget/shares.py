@@ -13,7 +13,7 @@ from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import Levels
 from orchestrator.fidelity.spread import FROZEN
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import PileThreshold, of_pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
@@ -62,7 +62,11 @@ def changes(study: Study, piles: Mapping[str, Pile], cases: Path) -> pd.DataFram
     cases : Path
         Where the runs lie.
     """
-    thresholds = cache(lambda key: list(_thresholds(piles[key], cases)))
+
+    @cache
+    def thresholds(key: str) -> list[PileThreshold]:
+        return piles[key].thresholds(cases, piles[key].scene.protocol.fractions)
+
     return pd.DataFrame(
         _row(scene, choice.name, name.partition(": ")[2], before, after)
         for scene in study.scenes
@@ -75,12 +79,6 @@ def changes(study: Study, piles: Mapping[str, Pile], cases: Path) -> pd.DataFram
         if base in piles and key in piles
         for before, after in zip(thresholds(base), thresholds(key), strict=True)
     )
-
-
-def _thresholds(pile: Pile, cases: Path) -> Iterator[PileThreshold]:
-    motion, speed, scene = pile.motion(cases), pile.face(cases).speed, pile.scene
-    for fraction in scene.protocol.fractions:
-        yield of_pile(motion, speed, fraction, scene.fluid.density)
 
 
 def _row(

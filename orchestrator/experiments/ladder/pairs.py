@@ -117,7 +117,7 @@ def points(
     return pd.DataFrame(
         _point(decision, piles[key], cases, cpu_s)
         for key, decision in asked.items()
-        if all(run.name in cpu_s for run in piles[key].runs)
+        if piles[key].is_run(cpu_s)
     )
 
 

@@ -55,11 +55,8 @@ class Answers:
     def pile(self, scene: Scene) -> dict[float, PileThreshold]:
         """The thresholds of a pile, by fraction."""
         pile: Pile = self.planned.piles[scene.id]
-        motion, speed = pile.motion(self.cases), pile.face(self.cases).speed
-        return {
-            fraction: threshold.of_pile(motion, speed, fraction, scene.fluid.density)
-            for fraction in scene.protocol.fractions
-        }
+        found = pile.thresholds(self.cases, scene.protocol.fractions)
+        return {one.fraction: one for one in found}
 
     def grain(self, scene: Scene) -> float:
         """Threshold stress of one grain over that of the closed form."""

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from orchestrator.study.info import Info
 from orchestrator.study.parts.part import Part, unless
-from orchestrator.study.ranges import Length, Roughness, Speed, Viscosity
+from orchestrator.study.ranges import FormHeights, Length, Roughness, Speed, Viscosity
 
 Model = Literal["solve", "waves", "hill", "flat"]
 Top = Literal["open water", "closed channel", "boundary layer"]
@@ -120,23 +120,20 @@ class Flow(Part):
     ] = None
     """depth of open water or of a closed channel over the flat bed"""
     lid: Annotated[
-        float,
-        Field(ge=3, le=1000),
+        FormHeights,
         unless(100.0),
         Info("lid", unit="h", scope="solved flows", about="answer"),
     ] = 100.0
     """height of a boundary layer's lid above the flat bed; the flow there is that of the
     undisturbed log layer"""
     upstream: Annotated[
-        float,
-        Field(ge=3, le=1000),
+        FormHeights,
         unless(80.0),
         Info("flat bed upstream", unit="h", scope="solved flows", about="answer"),
     ] = 80.0
     """flat bed from the inlet to the forms"""
     downstream: Annotated[
-        float,
-        Field(ge=3, le=1000),
+        FormHeights,
         unless(100.0),
         Info("flat bed downstream", unit="h", scope="solved flows", about="answer"),
     ] = 100.0
