@@ -8,7 +8,6 @@ turbulence models and Eq. 10 end with 2. FINER divides all lengths of cells but 
 first ones, which is a part of the model.
 """
 
-import csv
 import itertools
 import json
 import math
@@ -19,7 +18,7 @@ import numpy as np
 from rans import solve
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "native"))
-from solver import alone, table
+from solver import alone, table, write
 
 SHORTEST = 1 / 30
 """Length of the cells at sharp corners of the bed, over h."""
@@ -141,13 +140,7 @@ def main(case, out, finer=1.0):
     if refused(scene):
         print(f"this solver does not know {refused(scene)}", file=sys.stderr)
         return 2
-    answer = {"flow": flow, "line": line}[scene["kind"]](scene, case, finer)
-    with out.open("w", newline="") as stream:
-        writer = csv.writer(stream)
-        writer.writerow(["quantity", "at", "value"])
-        for asked in table(case / "ask.csv"):
-            quantity, at = asked["quantity"], asked["at"]
-            writer.writerow([quantity, at, repr(float(answer(quantity, at)))])
+    write(case, out, {"flow": flow, "line": line}[scene["kind"]](scene, case, finer))
     return 0
 
 

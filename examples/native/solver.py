@@ -342,19 +342,23 @@ def table(path):
         return list(csv.DictReader(stream))
 
 
-def main(case, out):
-    """Answer one scene."""
-    scene = json.loads((case / "scene.json").read_text())
-    if scene["kind"] not in KINDS:
-        print(f"this solver does not know the kind {scene['kind']}", file=sys.stderr)
-        return 2
-    answer = KINDS[scene["kind"]](scene, case)
+def write(case, out, answer):
+    """Write the answer to each question of a scene."""
     with out.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(["quantity", "at", "value"])
         for asked in table(case / "ask.csv"):
             quantity, at = asked["quantity"], asked["at"]
             writer.writerow([quantity, at, repr(float(answer(quantity, at)))])
+
+
+def main(case, out):
+    """Answer one scene."""
+    scene = json.loads((case / "scene.json").read_text())
+    if scene["kind"] not in KINDS:
+        print(f"this solver does not know the kind {scene['kind']}", file=sys.stderr)
+        return 2
+    write(case, out, KINDS[scene["kind"]](scene, case))
     return 0
 
 
