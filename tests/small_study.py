@@ -35,15 +35,15 @@ grain = {{ diameter = 1e-3 }}
 """
 
 
-def run(out: Path) -> Results:
-    """Run what is missing of it in a directory."""
+def run(out: Path, text: str = TEXT) -> Results:
+    """Run what is missing of it, or of another study, in a directory."""
     cases = out / "cases"
     cases.mkdir(parents=True, exist_ok=True)
-    asked = study.parse(TEXT, name="small", where="test")
+    asked = study.parse(text, name="small", where="test")
     planned = plan.make(asked)
     done = planned.done(cases)
     todo = {name: one for name, one in planned.cases.items() if name not in done}
-    with engine.local(cases, workers=2, limit_s=120.0) as pool:
+    with engine.local(cases, workers=2, limit_s=300.0) as pool:
         assert not engine.run(todo, pool, lambda outcome: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, cases)

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.benchmark import runner
+from orchestrator.benchmark.report import Found
 from orchestrator.benchmark.runner import Choice
 from orchestrator.runs.confined import Limits
 from tests.benchmark.conftest import ROOT
@@ -22,54 +23,44 @@ COMMANDS = {
 CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2", "2-passing-2")
 
 
-@pytest.mark.parametrize("program", COMMANDS)
-def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, program: str) -> None:
+@pytest.fixture(params=COMMANDS)
+def command(request: pytest.FixtureRequest) -> str:
+    """The command of each program that is installed."""
+    program: str = request.param
     if shutil.which(program) is None:
         pytest.skip(f"{program} is not installed")
+    return COMMANDS[program]
+
+
+def _run(pack: Path, folder: Path, command: str, *scenes: str) -> Found:
+    choice, limits = Choice(patterns=scenes), Limits(seconds=300.0)
+    return runner.run(pack, command, folder / "results", choice, limits)
+
+
+def test_a_foreign_solver_agrees(all_levels: Path, tmp_path: Path, command: str) -> None:
     pivots = "2-[0-9a-f]" + 11 * "[0-9a-f]"
-    choice = Choice(patterns=(*CHECKS, pivots, "4-*"))
-    found = runner.run(
-        all_levels, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=300.0)
-    )
+    found = _run(all_levels, tmp_path, command, *CHECKS, pivots, "4-*")
     assert found.failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
     assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "passing", "pivot", "pile"}
     assert (verdicts.loc[verdicts["kind"] == "incline", "worst"] < 1e-3).all()
 
 
-@pytest.mark.parametrize("program", COMMANDS)
-def test_a_foreign_solver_agrees_on_lift_off(lift_off: Path, tmp_path: Path, program: str) -> None:
-    if shutil.which(program) is None:
-        pytest.skip(f"{program} is not installed")
-    found = runner.run(
-        lift_off, COMMANDS[program], tmp_path / "results", Choice(), Limits(seconds=300.0)
-    )
-    assert found.failures == []
+def test_a_foreign_solver_agrees_on_lift_off(lift_off: Path, tmp_path: Path, command: str) -> None:
+    assert _run(lift_off, tmp_path, command).failures == []
 
 
-@pytest.mark.parametrize("program", COMMANDS)
 def test_a_foreign_solver_agrees_on_a_poured_mixture(
-    poured: Path, tmp_path: Path, program: str
+    poured: Path, tmp_path: Path, command: str
 ) -> None:
-    if shutil.which(program) is None:
-        pytest.skip(f"{program} is not installed")
-    choice = Choice(patterns=("4-*",))
-    found = runner.run(
-        poured, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=300.0)
-    )
-    assert found.failures == []
+    assert _run(poured, tmp_path, command, "4-*").failures == []
 
 
-@pytest.mark.parametrize("program", COMMANDS)
 def test_a_foreign_solver_declines_what_it_is_not_for(
-    formulas: Path, tmp_path: Path, program: str
+    formulas: Path, tmp_path: Path, command: str
 ) -> None:
-    if shutil.which(program) is None:
-        pytest.skip(f"{program} is not installed")
-    choice = Choice(patterns=(min(path.name for path in (formulas / "scenes").glob("1-*")),))
-    found = runner.run(
-        formulas, COMMANDS[program], tmp_path / "results", choice, Limits(seconds=60.0)
-    )
+    first = min(path.name for path in (formulas / "scenes").glob("1-*"))
+    found = _run(formulas, tmp_path, command, first)
     assert all("it ended with 2" in line for line in found.failures)
     assert found.failures
 

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from orchestrator import plan, tables
 from orchestrator.physics.hills import measured
 from orchestrator.report import hills
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
-from orchestrator.study import study
+from tests import small_study
 
 STEEP = """
 title = "A hill"
@@ -29,14 +27,7 @@ cells_per_face = 12
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    cases = tmp_path_factory.mktemp("hills") / "cases"
-    cases.mkdir()
-    asked = study.parse(STEEP, name="hill", where="test")
-    planned = plan.make(asked)
-    with engine.local(cases, workers=1, limit_s=300.0) as pool:
-        assert not engine.run(planned.cases, pool, lambda outcome: None)
-    made = tables.make(asked, planned, cases, planned.done(cases))
-    return Results(asked, planned, made, cases)
+    return small_study.run(tmp_path_factory.mktemp("hills"), STEEP)
 
 
 def test_a_steep_hill_separates_where_it_was_measured_to(results: Results) -> None:

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from orchestrator import plan, tables
 from orchestrator.report import where
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
-from orchestrator.study import study
+from tests import small_study
 
 TRAIN = """
 title = "Two ripples"
@@ -27,14 +25,7 @@ obstacles = [{ kind = "fence", x = -0.03, height = 0.004 }]
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    cases = tmp_path_factory.mktemp("where") / "cases"
-    cases.mkdir()
-    asked = study.parse(TRAIN, name="train", where="test")
-    planned = plan.make(asked)
-    with engine.local(cases, workers=1, limit_s=120.0) as pool:
-        assert not engine.run(planned.cases, pool, lambda outcome: None)
-    made = tables.make(asked, planned, cases, planned.done(cases))
-    return Results(asked, planned, made, cases)
+    return small_study.run(tmp_path_factory.mktemp("where"), TRAIN)
 
 
 def test_each_form_of_a_train_has_its_thresholds(results: Results) -> None:
