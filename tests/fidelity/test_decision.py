@@ -53,7 +53,8 @@ def test_the_choice_is_known_to_be_within_the_tolerance(
     for flow in LEVELS["flow"]:
         for grains in LEVELS["grains"]:
             pair = on_levels(scene, {"flow": flow.name, "grains": grains.name}, "")
-            if flow.same_model and pair.known.cost_core_s < chosen.known.cost_core_s:
+            same_model = flow.same_model and grains.same_model
+            if same_model and pair.known.cost_core_s < chosen.known.cost_core_s:
                 assert max(_errors(scene, pair.levels)) > tolerance
 
 
@@ -97,6 +98,16 @@ def test_the_least_error_is_taken_where_none_is_within_the_tolerance(pile: MakeP
     without = decide(pile(), 1e-9, Bound({"flow": "fine"}, "test"))
     assert without.levels["flow"] == "finest"
     assert without.why == "least known error: none is within the tolerance; test"
+
+
+@pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
+@pytest.mark.parametrize("slope_deg", [15.0, 30.0])
+def test_small_grains_are_answered_at_any_tolerance(
+    packing: str, slope_deg: float, pile: MakePile
+) -> None:
+    small = changed(pile(packing=packing, slope_deg=slope_deg), {"grain.diameter": 1e-4})
+    for tolerance in (0.01, 0.02, 0.05, 0.1, 0.2):
+        assert decide(small, tolerance).levels["grains"] != "paper's K, fast"
 
 
 def test_what_is_not_known_is_answered_as_asked(pile: MakePile) -> None:
