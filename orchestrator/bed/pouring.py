@@ -19,8 +19,11 @@ HEAP = 2.0
 """Height of the grains over the line that are cut away, d."""
 FILLED = 0.83
 """Part of the area that grains fill when they have settled; it only says how many are poured."""
-PITCH = 1.05
-"""Distance of the grains in the air, in diameters of the largest."""
+LOOSE = 0.3
+"""Room of a grain in the air, beside it and over it, in its own diameters: as little as leaves no
+order among equal grains, so that they fall no further than need be."""
+COLUMNS = 20
+"""Columns in a diameter by which the room is found that is still free."""
 
 
 @dataclass(frozen=True)
@@ -65,32 +68,67 @@ class Mould:
         raised = z[:-1] + self.surface / tangents[:, 0]
         return np.column_stack([x[:-1], x[1:], raised, tangents[:, 1] / tangents[:, 0]])
 
-    def rain(self, mean_area: float, largest: float, seed: int) -> FloatArray:
+    def count(self, mean_area: float) -> int:
+        """How many grains of a mean square of the diameters (d2) fill it, with the heap."""
+        start, end = self.ends
+        fill = (self.depth + self.surface + HEAP) * (end - start) * FILLED
+        return int(np.ceil(fill / (np.pi / 4 * mean_area)))
+
+    def rain(self, sizes: FloatArray, seed: int) -> FloatArray:
         """Places in the air of the grains that fill the mould, none touching another.
+
+        They lie row upon row, each over what is already there, at a place of its room that the
+        seed decides.
 
         Parameters
         ----------
-        mean_area : float
-            Mean square of their diameters, d2.
-        largest : float
-            Diameter of the largest, d.
+        sizes : ndarray, shape (n,)
+            Their diameters, d.
         seed : int
-            Of the shifts that keep equal grains from falling into a perfect lattice.
+            Of the places, and of where each row begins.
 
         Returns
         -------
         ndarray, shape (n, 2)
         """
-        pitch = PITCH * largest
-        start, end = self.ends
-        columns = np.arange(start + pitch / 2, end - pitch / 2, pitch)
-        fill = (self.depth + self.surface + HEAP) * (end - start) * FILLED
-        rows = int(np.ceil(fill / (np.pi / 4 * mean_area) / len(columns)))
-        column, row = np.meshgrid(columns, np.arange(1, rows + 1))
-        z = self.line.height(column) - self.depth + 0.5 + pitch * row
-        shift = (PITCH - 1) / 2 * largest
-        jitter = np.random.default_rng(seed).uniform(-shift, shift, column.shape)
-        return np.column_stack([(column + jitter).ravel(), z.ravel()])
+        (start, end), room = self.ends, (1 + LOOSE) * sizes
+        chance = np.random.default_rng(seed).uniform(size=(len(sizes), 2))
+        tops = _Tops(start, end, float(sizes.max()))
+        for x, z in self.floor:
+            tops.put(x - 0.5, x + 0.5, z + 0.5)
+        places = np.empty((len(sizes), 2))
+        x = start + room[0] * chance[0, 0]
+        for number, (size, wide) in enumerate(zip(sizes.tolist(), room.tolist(), strict=True)):
+            beside, over = LOOSE * size * chance[number]
+            if x + wide > end:
+                x = start + wide * chance[number, 0]
+            place = x + beside + size / 2
+            height = tops.over(place - size / 2, place + size / 2) + over + size / 2
+            places[number] = place, height
+            tops.put(place - size / 2, place + size / 2, height + size / 2)
+            x += wide
+        return places
+
+
+class _Tops:
+    """Height of the highest grain so far over each of many columns."""
+
+    def __init__(self, start: float, end: float, margin: float) -> None:
+        self.start = start - margin
+        self.height = np.full(int((end - start + 2 * margin) * COLUMNS) + 2, -np.inf)
+
+    def over(self, first: float, last: float) -> float:
+        """The highest of a stretch along x."""
+        return float(self.height[self._columns(first, last)].max())
+
+    def put(self, first: float, last: float, height: float) -> None:
+        """Put a grain whose top is at a height over a stretch."""
+        columns = self._columns(first, last)
+        self.height[columns] = np.maximum(self.height[columns], height)
+
+    def _columns(self, first: float, last: float) -> slice:
+        low, high = ((place - self.start) * COLUMNS for place in (first, last))
+        return slice(int(low), int(high) + 1)
 
 
 def rows_of(segments: FloatArray) -> Iterator[tuple[str, list[float]]]:

@@ -133,13 +133,28 @@ def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:
     assert poured.unshadowed(along, height, radii / 2).tolist() == [True, True, True]
 
 
+@pytest.mark.parametrize("sizes", [None, MIXED, LogNormal(sigma_g=1.6)])
+def test_grains_in_the_air_touch_nothing(sizes: Sizes | None) -> None:
+    # a step that is nearly upright, and a slope: their fixed grains stand beside those in the air
+    line = BedLine((-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0)
+    bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3)
+    centres, diameters = bed._grains
+    fixed, (start, end) = len(bed.mould.floor), bed.mould.ends
+    touching = poured.contacts(centres, diameters, 0.0)
+    assert not (touching.max(axis=1) >= fixed).any()
+    falling = centres[fixed:, 0]
+    assert (falling - diameters[fixed:] / 2 > start).all()
+    assert (falling + diameters[fixed:] / 2 < end).all()
+
+
 def test_a_mould_that_holds_nothing_says_so(tmp_path: Path) -> None:
     directory = tmp_path / "case"
     directory.mkdir()
-    (directory / "settling.csv").write_text("stage,step,grains,ke\n1,5,3,0.0\n2,9,0,0.0\n")
+    table = "stage,step,grains,ke\n1,5,3,0.0\n2,9,3,0.0\n3,12,{}\n"
+    (directory / "settling.csv").write_text(table.format("0,0.0"))
     with pytest.raises(SolverError, match="no grain of the poured bed is left"):
         _bed()._check_rest(directory)
-    (directory / "settling.csv").write_text("stage,step,grains,ke\n1,5,3,0.0\n2,9,3,1.0\n")
+    (directory / "settling.csv").write_text(table.format("3,1.0"))
     with pytest.raises(SolverError, match="does not come to rest"):
         _bed()._check_rest(directory)
 
