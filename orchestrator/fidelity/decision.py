@@ -80,6 +80,10 @@ class Bound:
 
 LIFTED = Bound({"grains": "peeling"}, "the lift carries grains off, which DEM alone shows")
 NO_BOUND = Bound({}, "")
+DEAREST_THEORY = "waves"
+"""Level of the flow above which it is solved."""
+NONE = "cheapest that errs less than the reference is uncertain: none is"
+"""How the reason begins where no levels are within a tolerance."""
 BY_DEFAULT = "chosen by default"
 """How `why` begins where a study file leaves the levels open."""
 
@@ -100,8 +104,9 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
     Returns
     -------
     Decision
-        On the levels with the least known error where none is within the tolerance; as asked where
-        nothing is known, or where the way to the answer is a part of what is asked.
+        Where none is within the tolerance, on the cheapest levels that err less than their
+        reference is uncertain; as asked where nothing is known, or where the way to the answer is
+        a part of what is asked.
     """
     if not tolerance:
         return as_asked(scene)
@@ -111,7 +116,7 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
         exact = changed(scene, {"protocol.method": "pivot"})
         why = "the closed form is exact for a single grain in a held flow"
         return Decision(scene, exact, {}, UNKNOWN, why)
-    bound = above or (LIFTED if lifts_off(scene) else NO_BOUND)
+    bound = above or _own_bound(scene)
     named, why = _cheapest(
         tuple((part, calibration.scene_class(part, scene)) for part in LEVELS),
         scene.protocol.fractions,
@@ -126,21 +131,20 @@ def by_default(scene: Scene, above: Bound | None = None) -> Decision:
     """The decision on a scene of a study that says nothing of how to answer.
 
     A pile whose file sets no field about the answer is answered on the cheapest levels whose known
-    error is below the model's own spread. The bound is one for all kinds of scenes, so that what
-    stands in one figure was found in one way. All else is answered as asked: single grains, poured
-    beds, whose model was not varied, and what is set.
+    error is below the model's own spread. The flow is solved: whoever wants a theory of it names a
+    tolerance. The bound is one for all kinds of scenes, so that what stands in one figure was found
+    in one way. All else is answered as asked: single grains, poured beds, and what is set.
     """
     if not leaves_open(scene):
         return as_asked(scene)
     floor = spread.lowest_floor()
-    chosen = decide(scene, floor, above)
+    bound = above or _own_bound(scene)
+    chosen = decide(scene, floor, Bound({"flow": DEAREST_THEORY, **bound.levels}, bound.because))
     if chosen.is_as_asked or not chosen.levels:
         return chosen
-    within = chosen.known.total <= floor
-    how = "cheapest" if within else "least known error: none"
-    why = f"{BY_DEFAULT}: {how} within the model's own spread of {floor:.0%}"
-    because = f"; {above.because}" if above else ""
-    return replace(chosen, why=why + because)
+    which = "cheapest" if chosen.known.total <= floor else NONE
+    why = f"{BY_DEFAULT}: {which} within the model's own spread of {floor:.0%}"
+    return replace(chosen, why=f"{why}; {bound.because}" if bound.because else why)
 
 
 def leaves_open(scene: Scene) -> bool:
@@ -185,13 +189,17 @@ def _asks_for(scene: Scene) -> str:
     """
     if scene.protocol.method != "dem":
         return f"the study asks for the method {scene.protocol.method}"
-    if scene.flow.model != levels.solved_model(scene):
+    if scene.flow.model not in ("solve", levels.solved_model(scene)):
         return f"the study asks for the flow model {scene.flow.model}"
     if scene.protocol.update:
         return "the study asks for a bed that changes, for which no error is known"
     if scene.protocol.waiting_time < QUIET_ENOUGH:
         return "the study asks for a ramp of the flow"
     return ""
+
+
+def _own_bound(scene: Scene) -> Bound:
+    return LIFTED if lifts_off(scene) else NO_BOUND
 
 
 def lifts_off(scene: Scene) -> bool:
@@ -208,20 +216,22 @@ def _cheapest(
     classes: Named, fractions: tuple[float, ...], above: Named, tolerance: float
 ) -> tuple[Named, str]:
     """A level for each part, and why; no levels where nothing is known."""
-    pairs = sorted(_pairs(classes, fractions, dict(above)), key=lambda pair: pair.cost_core_s)
-    within = next((pair for pair in pairs if pair.error <= tolerance), None)
+    offered = _pairs(classes, fractions, dict(above))
+    pairs = sorted(offered, key=lambda pair: pair.known.cost_core_s)
+    within = next((pair for pair in pairs if pair.known.total <= tolerance), None)
     if within:
         return within.levels, "cheapest within the tolerance"
-    best = min(pairs, key=lambda pair: pair.error, default=None)
-    if best is None or math.isinf(best.error):
+    best = min(pairs, key=lambda pair: pair.known.total, default=None)
+    if best is None or math.isinf(best.known.total):
         return (), "no error is known: as the study asks"
-    return best.levels, "least known error: none is within the tolerance"
+    # against a reference that is no better known, a dearer pair is not known to be nearer
+    enough = next(pair for pair in pairs if pair.known.error <= best.known.total)
+    return enough.levels, f"{NONE} within the tolerance"
 
 
 class _Pair(NamedTuple):
     levels: Named
-    error: float
-    cost_core_s: float
+    known: Known
 
 
 def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Iterator[_Pair]:
@@ -230,7 +240,7 @@ def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Itera
     for names in itertools.product(*offered):
         named = tuple(zip(parts, names, strict=True))
         found = calibration.known(dict(named), dict(classes), fractions)
-        yield _Pair(named, max(one.total for one in found), found[0].cost_core_s)
+        yield _Pair(named, max(found, key=lambda one: one.total))
 
 
 def _above(part: Part, scene_class: str, name: str | None) -> list[str]:

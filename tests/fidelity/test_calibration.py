@@ -36,13 +36,13 @@ def test_between_known_fractions_the_worst_one_counts(monkeypatch: pytest.Monkey
     assert math.isinf(calibration.known_at("grains", "pivot", "aligned", 0.2).error)
 
 
-def test_errors_uncertainties_and_costs_of_the_parts_add_up() -> None:
+def test_errors_and_uncertainties_of_the_parts_add_up_by_their_squares_costs_as_they_are() -> None:
     flow = calibration.known_at("flow", "coarse", "wall", 0.5)
     grains = calibration.known_at("grains", "peeling", "aligned", 0.5)
     (both,) = calibration.known(
         {"flow": "coarse", "grains": "peeling"}, {"flow": "wall", "grains": "aligned"}, [0.5]
     )
-    assert both.error == flow.error + grains.error > 0
-    assert both.uncertainty == flow.uncertainty + grains.uncertainty > 0
+    assert both.error == math.hypot(flow.error, grains.error) > 0
+    assert both.uncertainty == math.hypot(flow.uncertainty, grains.uncertainty) > 0
     assert both.cost_core_s == flow.cost_core_s + grains.cost_core_s > 0
-    assert both.total == both.error + both.uncertainty
+    assert both.total == math.hypot(both.error, both.uncertainty)

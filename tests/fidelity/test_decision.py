@@ -67,7 +67,7 @@ def test_a_decision_is_carried_out_by_its_levels(pile: MakePile) -> None:
     assert chosen.scene == answered != chosen.asked
     assert not chosen.is_as_asked
     assert chosen.levels_text == f"{chosen.levels['flow']} | {chosen.levels['grains']}"
-    assert chosen.error_estimate == chosen.known.error + chosen.known.uncertainty
+    assert chosen.error_estimate == math.hypot(chosen.known.error, chosen.known.uncertainty)
 
 
 def test_without_a_tolerance_what_is_known_of_the_levels_that_a_scene_is_on_is_said(
@@ -90,14 +90,21 @@ def test_level_rows_are_never_left_to_the_pivot_of_each_grain(pile: MakePile) ->
     assert calibration.known_at("grains", "pivot", "horizontal", 0.5).error > 0.3
 
 
-def test_the_least_error_is_taken_where_none_is_within_the_tolerance(pile: MakePile) -> None:
-    chosen = decide(pile(packing="horizontal"), 1e-9, Bound({"grains": "peeling"}, "test"))
-    assert chosen.levels == {"flow": "fine", "grains": "reference"}
-    # the reference is uncertain, too
-    assert chosen.why == "least known error: none is within the tolerance; test"
-    without = decide(pile(), 1e-9, Bound({"flow": "fine"}, "test"))
-    assert without.levels["flow"] == "finest"
-    assert without.why == "least known error: none is within the tolerance; test"
+@pytest.mark.parametrize("packing", ["aligned", "horizontal"])
+def test_where_none_is_within_the_tolerance_no_more_is_paid_than_the_reference_is_worth(
+    packing: str, pile: MakePile
+) -> None:
+    scene = pile(packing=packing)
+    chosen = decide(scene, 1e-9)
+    assert "none is within the tolerance" in chosen.why
+    reference = on_levels(scene, {"flow": "fine", "grains": "reference"}, "")
+    assert chosen.known.error <= reference.known.total
+    assert chosen.known.cost_core_s < reference.known.cost_core_s
+    assert chosen.error_estimate is not None
+    # beyond the reference itself there is no other
+    last = decide(scene, 1e-9, Bound({"flow": "fine", "grains": "soft reference"}, "test"))
+    assert last.levels == {"flow": "finest", "grains": "reference"}
+    assert last.why.endswith("; test")
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
@@ -135,8 +142,9 @@ def test_a_way_to_the_answer_that_is_asked_for_is_kept(
     assert word in decision.why
 
 
+@pytest.mark.parametrize("model", ["flat", "solve"])
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
-    pile: MakePile, monkeypatch: pytest.MonkeyPatch
+    model: str, pile: MakePile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     errors = {"peeling": 0.8, "1 layer, fast": 0.4, "4 layers, fast": 0.1, "reference": 0.0}
     costs = dict(zip(errors, (0.1, 1.0, 3.0, 60.0), strict=True))
@@ -148,11 +156,11 @@ def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
     monkeypatch.setattr(calibration, "measured", lambda: table)
     monkeypatch.setattr("orchestrator.fidelity.decision._cheapest", _cheapest.__wrapped__)
     level_bed = {"packing": "poured", "shape": "flat", "slope_deg": 0.0}
-    asked = changed(pile(**level_bed), {"flow.model": "flat"})
+    asked = changed(pile(**level_bed), {"flow.model": model})
     for tolerance, grains in ((0.9, "peeling"), (0.2, "4 layers, fast"), (0.1, "reference")):
         chosen = decide(asked, tolerance)
         assert chosen.levels == {"flow": "flat", "grains": grains}
-        assert chosen.error_estimate == errors[grains] + 0.05
+        assert chosen.error_estimate == math.hypot(errors[grains], 0.05)
         assert chosen.scene.flow.model == "flat"
     overruled = decide(asked, 0.9, Bound({"flow": "flat", "grains": "peeling"}, "overruled"))
     assert overruled.levels == {"flow": "flat", "grains": "1 layer, fast"}

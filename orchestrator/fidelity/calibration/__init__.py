@@ -45,16 +45,21 @@ class Known:
     cost_core_s: float
 
     def __add__(self, other: "Known") -> "Known":
+        """What is known of both parts together.
+
+        Each number is the largest over the scenes of a class, and each has a cause of its own. So
+        they add up as the shares of the model do: by their squares.
+        """
         return Known(
-            self.error + other.error,
-            self.uncertainty + other.uncertainty,
+            math.hypot(self.error, other.error),
+            math.hypot(self.uncertainty, other.uncertainty),
             self.cost_core_s + other.cost_core_s,
         )
 
     @property
     def total(self) -> float:
-        """Error and uncertainty together."""
-        return self.error + self.uncertainty
+        """Error and uncertainty together, by their squares."""
+        return math.hypot(self.error, self.uncertainty)
 
 
 UNKNOWN = Known(math.inf, 0.0, math.inf)
@@ -98,7 +103,7 @@ def _shape(bed: PileBed) -> str:
 
 
 def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:
-    """What is known of a level for each part at each fraction; errors of the parts add up.
+    """What is known of a level for each part, together, at each fraction.
 
     Parameters
     ----------
