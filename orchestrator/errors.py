@@ -147,8 +147,21 @@ def of_fault(error: Exception, where: str) -> OrchestratorError:
     )
 
 
-def unknown_key(key: str, known: Sequence[str], where: str) -> InputError:
-    """The message of a key that nothing knows; of the known ones, the nearest is the remedy."""
-    close = difflib.get_close_matches(key, known, n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(sorted(known))}"
+def unknown_key(
+    key: str, known: Sequence[str], where: str, elsewhere: Sequence[tuple[str, str]] = ()
+) -> InputError:
+    """The message of a key that nothing knows, with the key that was meant as the remedy.
+
+    Keys of other places come with how they are written there: one of the same name is meant, else
+    the nearest here, else the nearest there.
+    """
+    close = [written for name, written in elsewhere if name == key]
+    close = close or difflib.get_close_matches(key, known, n=1)
+    near = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
+    close = close or [written for name, written in elsewhere if name in near]
+    hint = (
+        f"did you mean {' or '.join(close)}?"
+        if close
+        else f"known keys: {', '.join(sorted(known))}"
+    )
     return InputError("unknown key", where=where, remedy=hint)

@@ -38,6 +38,8 @@ class Decision:
         the two together are largest; infinite where it is not known.
     why : str
         The reason, for people.
+    by_default : bool
+        Whether the study file left the levels open.
     """
 
     asked: Scene
@@ -45,6 +47,7 @@ class Decision:
     levels: Levels
     known: Known
     why: str
+    by_default: bool = False
 
     @property
     def is_as_asked(self) -> bool:
@@ -84,8 +87,6 @@ DEAREST_THEORY = "waves"
 """Level of the flow above which it is solved."""
 NONE = "cheapest that errs less than the reference is uncertain: none is"
 """How the reason begins where no levels are within a tolerance."""
-BY_DEFAULT = "chosen by default"
-"""How `why` begins where a study file leaves the levels open."""
 
 
 def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) -> Decision:
@@ -143,8 +144,9 @@ def by_default(scene: Scene, above: Bound | None = None) -> Decision:
     if chosen.is_as_asked or not chosen.levels:
         return chosen
     which = "cheapest" if chosen.known.total <= floor else NONE
-    why = f"{BY_DEFAULT}: {which} within the model's own spread of {floor:.0%}"
-    return replace(chosen, why=f"{why}; {bound.because}" if bound.because else why)
+    why = f"chosen by default: {which} within the model's own spread of {floor:.0%}"
+    because = f"; {bound.because}" if bound.because else ""
+    return replace(chosen, why=why + because, by_default=True)
 
 
 def leaves_open(scene: Scene) -> bool:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from orchestrator.fidelity.decision import BY_DEFAULT
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.fidelity.spread import lowest_floor
 from orchestrator.physics.log_law import log_law_speed
@@ -98,7 +97,7 @@ def _warnings(table: pd.DataFrame) -> Iterator[str]:
 
 def _chosen(results: Results) -> Iterator[str]:
     """Which levels answered where the study file says nothing of them."""
-    chosen = [d for d in results.plan.decisions.values() if d.why.startswith(BY_DEFAULT)]
+    chosen = [d for d in results.plan.decisions.values() if d.by_default]
     if chosen:
         names = ", ".join(dict.fromkeys(one.levels_text for one in chosen))
         error = max(one.known.total for one in chosen)

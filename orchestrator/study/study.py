@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
 from orchestrator.runs.files import opened
-from orchestrator.study import sizes
+from orchestrator.study import fields, sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.profiles import Profiles
@@ -169,7 +169,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError("tables or lists are nested too deeply", where=where) from None
     except ValueError as error:
         raise InputError(f"not TOML: {error}", where=where) from None
-    _known(data, TOP_KEYS, where, "")
+    _known(data, TOP_KEYS, where)
     limit = data.get("time_limit", TIME_LIMIT_S)
     check_time(limit, f"{where}: time_limit")
     title = data.get("title", name)
@@ -224,7 +224,7 @@ def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator
         )
     for number, item in enumerate(listed, 1):
         place = f"{where}: group {number}" if "group" in data else where
-        _known(item, GROUP_KEYS, place, "")
+        _known(item, GROUP_KEYS, place)
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
         if seeds := _seeds(item.get("seeds", data.get("seeds", 0)), f"{place}: seeds"):
             merged["axes"] = {**merged["axes"], "bed.seed": seeds}
@@ -367,6 +367,7 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if isinstance(cause, UnfitError):
         return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
     path = [str(step) for step in first["loc"]]
+    is_grain = path[:2] == ["bed", "grain"]
     if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):
         del path[1]  # the branch of the union, not a key of the file
     field = ".".join(path)
@@ -374,8 +375,12 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if first["type"] == "extra_forbidden" and field in RENAMED:
         new = RENAMED[field]
         return InputError("a former name", where=f"{where}: {field}", remedy=f"write {new}")
+    if first["type"] == "extra_forbidden" and is_grain and path[1] in PileBed.model_fields:
+        what, remedy = "unknown key of a bed of one grain", 'a pile has it: write kind = "pile"'
+        return InputError(what, where=f"{where}: {field}", remedy=remedy)
     if first["type"] == "extra_forbidden":
-        return unknown_key(path[-1], _fields_beside(path), f"{where}: {field}")
+        known = list(fields.PARTS[path[0]].model_fields) if path[1:] else list(PARTS)
+        return unknown_key(path[-1], known, f"{where}: {field}", _elsewhere(path[0]))
     if first["type"] == "missing":
         return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
     return InputError(
@@ -385,16 +390,15 @@ def _explained(error: ValidationError, where: str) -> InputError:
     )
 
 
-def _fields_beside(path: list[str]) -> list[str]:
-    if len(path) < 2:
-        return list(PARTS)
-    if path[0] == "bed":
-        return list(PileBed.model_fields)
-    annotation = Scene.model_fields[path[0]].annotation
-    return list(getattr(annotation, "model_fields", {}))
+def _elsewhere(here: str) -> list[tuple[str, str]]:
+    """The keys of all tables but one, with how a message writes them."""
+    others = ((part, one.model_fields) for part, one in fields.PARTS.items() if part != here)
+    found = [(name, f"{part}.{name}") for part, names in others for name in names]
+    alone = (key for key in TOP_KEYS if key not in PARTS)
+    return [*found, *((key, f"{key}, above the first table") for key in alone)]
 
 
-def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str, prefix: str) -> None:
+def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in table:
         if key not in known:
-            raise unknown_key(key, known, f"{where}: {prefix}{key}")
+            raise unknown_key(key, known, f"{where}: {key}", _elsewhere(""))

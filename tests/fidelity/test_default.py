@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator import plan
-from orchestrator.fidelity.decision import BY_DEFAULT, Bound, by_default
+from orchestrator.fidelity.decision import Bound, by_default
 from orchestrator.fidelity.spread import floor, lowest_floor
 from orchestrator.study import study
 
@@ -30,7 +30,7 @@ def _asked(top: str = "", bed: str = "", protocol: str = "", diameter: float = 1
 def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: float) -> None:
     (scene,) = _asked(bed=f'packing = "{packing}"', diameter=diameter).scenes
     chosen = by_default(scene)
-    assert chosen.why.startswith(BY_DEFAULT)
+    assert chosen.by_default
     assert chosen.scene.protocol.method != "dem"
     assert chosen.scene.flow.model == "solve"
     assert chosen.known.total <= lowest_floor() <= floor(scene)
@@ -49,13 +49,14 @@ def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: f
 def test_what_is_said_stays(top: str, bed: str, protocol: str) -> None:
     (decision,) = plan.make(_asked(top, bed, protocol)).decisions.values()
     assert decision.is_as_asked
+    assert not decision.by_default
     assert decision.scene.protocol.method == "dem"
 
 
 def test_what_is_asked_of_nature_does_not_count_as_said() -> None:
     asked = _asked(bed="height = 0.01", protocol="fractions = [0.3]")
     (decision,) = plan.make(asked).decisions.values()
-    assert decision.why.startswith(BY_DEFAULT)
+    assert decision.by_default
 
 
 def test_a_failed_run_goes_to_dearer_levels() -> None:
