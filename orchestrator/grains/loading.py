@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +81,7 @@ class ForceTable:
         # a law without lift has none anywhere
         logs = np.log(np.where(self._forces > 0, self._forces, 1e-300))
         pieces = CubicSpline(self._log_ustar, logs, axis=1).c
-        self._pieces: list[Any] = pieces.transpose(1, 2, 0).tolist()
+        self._pieces = pieces.transpose(1, 2, 0).copy()
 
     def reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
         """The local friction velocity at which drag and lift times their arms reach a goal, m/s.
@@ -96,7 +95,7 @@ class ForceTable:
         if above == 0:
             return 0.0
         start, end = self._log_ustar[above - 1 : above + 1].tolist()
-        (a, b, c, d), (e, f, g, h) = self._pieces[above - 1]
+        (a, b, c, d), (e, f, g, h) = self._pieces[above - 1].tolist()
 
         def excess(log_ustar: float) -> float:
             x = log_ustar - start

@@ -67,7 +67,8 @@ def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
     fluid_density : float
         kg/m3.
     """
-    mean = np.array([_mean_stress(motion, speed, level) for level in range(len(motion.flow))])
+    stress = _signed(speed)
+    mean = np.array([_mean(motion, stress, level) for level in range(len(motion.flow))])
     return Curve(motion.flow, motion.fraction, fluid_density * motion.flow**2 * mean)
 
 
@@ -108,9 +109,10 @@ def of_pile(
     # where half a grain more was not reached, the interval is open: it ends at the last load step
     above = first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.low[level] * motion.flow[level])
+    signed = _signed(speed)
 
     def stress(at: int, ustar0: float) -> float:
-        return fluid_density * float(ustar0) ** 2 * _mean_stress(motion, speed, at)
+        return fluid_density * float(ustar0) ** 2 * _mean(motion, signed, at)
 
     return PileThreshold(
         fraction=fraction,
@@ -129,7 +131,12 @@ def first_level(motion: Motion, fraction: float) -> int | None:
     return int(reached[0]) if len(reached) else None
 
 
-def _mean_stress(motion: Motion, speed: FloatArray, level: int) -> float:
-    """Mean signed stress over the moved grains, in units of the undisturbed stress."""
-    moved = motion.moved_by(level)
-    return float(np.mean((np.sign(speed) * speed**2)[moved])) if moved.any() else math.nan
+def _signed(speed: FloatArray) -> FloatArray:
+    """The stress on each grain in units of the undisturbed one, positive downstream."""
+    return np.asarray(np.sign(speed) * speed**2)
+
+
+def _mean(motion: Motion, stress: FloatArray, level: int) -> float:
+    """Of the moved grains; NaN before any has."""
+    own = stress[motion.moved_by(level)]
+    return float(own.mean()) if len(own) else math.nan

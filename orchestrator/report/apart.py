@@ -77,6 +77,7 @@ def _variant(table: pd.DataFrame, looks: Sequence[str]) -> "pd.Series[int]":
 
 
 def _entry(rows: pd.DataFrame, looks: Sequence[str]) -> Sample:
-    label = labels.panel(rows.iloc[0], looks)
+    # the fields of DEM have no effect on a pile that was answered without it
+    label = labels.panel(rows.iloc[0], looks) or labels.methods(rows)
     markers = dict.fromkeys(rows.sort_values("force_law", ascending=False)[SHAPE])
     return tuple(Line2D([], [], ls="", marker=m, color="0.2", label=label) for m in markers)

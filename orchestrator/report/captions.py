@@ -232,6 +232,7 @@ def fractions(rows: pd.DataFrame) -> str:
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
         "had moved at a flow (a marker), against τ of the mean signed wall stress over the grains "
         "that had moved, as in the paper: the mean falls where the next grains to move feel less. "
+        "Above n/N = 90 % a curve may leave the frame. "
         f"Forces: {force_laws(rows)}. {hold_protocol(rows)} {_hollow(rows)}{low_regime(rows)}"
     )
 

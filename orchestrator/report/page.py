@@ -101,9 +101,10 @@ def _template(name: str, folder: Path) -> Template:
 
 
 def typeset(text: str) -> Markup:
-    """HTML of a text in which ``V_f`` has an index; words such as ``frozen_bed`` are kept."""
+    """HTML of a text: ``V_f`` has an index, ``frozen_bed`` none; what backticks hold is code."""
     index = r"\b([^\W\d_]{1,3})_([A-Za-z]+)\b(?!_)"
-    return Markup(re.sub(index, r"\1<sub>\2</sub>", str(escape(text))))
+    html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
 
 
 def _json(data: Any) -> Markup:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator.report import captions, labels, laws, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, split, valid
+from orchestrator.report.results import Results, split
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
@@ -18,17 +18,24 @@ SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 
 MOST = 6
 """Panels of a figure."""
+SHOWN_UP_TO = 0.9
+"""n/N up to which the axis of the stress holds every curve."""
 MARKERS = 30
 """Most of a curve: peeling gives one for each grain."""
 
 
 def fractions(results: Results) -> Iterator[Figure]:
     """Fig. 14: n/N against tau, figures of each slope."""
-    curve = results.joined("pile_curve")
-    moved = curve[curve["moved"] > 0] if len(curve) else curve
+    curve = results.tables.get("pile_curve", pd.DataFrame())
+    curves = (
+        {str(one): own for (one,), own in split(curve[curve["moved"] > 0], "scene_id")}
+        if len(curve)
+        else {}
+    )
+    scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
-    for (alpha,), rows in split(moved, "alpha_deg"):
+    for (alpha,), rows in split(scenes, "alpha_deg"):
         choices, rows, variants = parted(rows, *SHOWN)
         keys = ["z0_over_d", *choices]
         for number, panels in enumerate(_sixes(rows, keys)):
@@ -38,8 +45,8 @@ def fractions(results: Results) -> Iterator[Figure]:
                 f"Fraction of moving grains, α = {alpha:g}°" + _part(number),
                 captions.fractions(some),
                 tuple(sorted(set(some["case"].dropna()))),
-                _fractions(panels, keys, colours, variants),
-                fold=number > 0 or alpha != moved["alpha_deg"].min(),
+                _fractions(panels, keys, curves, colours, variants),
+                fold=number > 0 or alpha != scenes["alpha_deg"].min(),
             )
 
 
@@ -80,39 +87,51 @@ def _sixes(rows: pd.DataFrame, keys: list[str]) -> Iterator[list[pd.DataFrame]]:
 def _fractions(
     panels: list[pd.DataFrame],
     keys: list[str],
+    curves: Mapping[str, pd.DataFrame],
     colours: dict[float, str],
     variants: list[style.Sample],
 ) -> Canvas:
     """n/N against tau of the grains that had moved, a panel for each z0/d and variant."""
     figure, axes = style.grid(len(panels), 2.3)
     for ax, part in zip(axes, panels, strict=True):
-        for _, curve in split(part, "scene_id"):
-            _curve(ax, curve, "shields", colours[float(curve["d_m"].iloc[0])])
+        for _, pile in part.iterrows():
+            _curve(ax, pile, curves[pile["scene_id"]], colours[float(pile["d_m"])])
         ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-        ax.set(ylim=(0, 1))
         if (place := ax.get_subplotspec()) is None or place.is_first_col():
             ax.set_ylabel("$n/N$")
-    shields.label_lowest(axes, labels.TAU_AXIS)
     rows = pd.concat(panels)
+    axes[0].set(xscale="log", xlim=_reach([curves[one] for one in rows["scene_id"]]), ylim=(0, 1))
+    for ax in axes:
+        style.plain_ticks(ax.xaxis)
+    shields.label_lowest(axes, labels.TAU_AXIS)
     used = set(rows["d_m"])
     entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
     style.legends(figure, entries, [*shields.point_entries(rows), *variants])
     return figure
 
 
-def _curve(ax: Axes, curve: pd.DataFrame, column: str, colour: str) -> None:
-    face = colour if valid(curve).all() else "white"
+def _reach(curves: list[pd.DataFrame]) -> tuple[float, float]:
+    """The stresses that are shown: the last grains of a pile may wait for a hundred times those."""
+    rows = pd.concat(curves)
+    rows = rows[rows["shields"] > 0]
+    shown = rows[rows["fraction_moved"] <= SHOWN_UP_TO]["shields"]
+    shown = shown if len(shown) else rows["shields"]
+    return float(shown.min()) / 1.2, 1.2 * float(shown.max())
+
+
+def _curve(ax: Axes, pile: pd.Series, curve: pd.DataFrame, colour: str) -> None:
+    face = colour if pile["law_holds"] else "white"
     ax.plot(
-        curve[column],
+        curve["shields"],
         curve["fraction_moved"],
         color=colour,
         lw=0.8,
         ms=3,
-        marker=str(curve[SHAPE].iloc[0]),
+        marker=str(pile[SHAPE]),
         markevery=-(-len(curve) // MARKERS),
         mfc=face,
         mew=0.7,
-        gid=str(curve["scene_id"].iloc[0]),
+        gid=str(pile["scene_id"]),
     )
 
 

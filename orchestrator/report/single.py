@@ -13,6 +13,7 @@ from orchestrator.report import captions, labels, laws, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, by_dem, held, split, valid
+from orchestrator.study import fields
 
 CROSS = "beyond the paper"
 SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "force_law")
@@ -72,6 +73,8 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
     choices, scenes, variants = parted(scenes, *SHOWN, "z0_over_d")
     if len(points):
         points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id", validate="one_to_one")
+    else:  # the closed form depends on nothing that is about its answer
+        choices = [one for one in choices if fields.COLUMNS[one].info.about == "question"]
     keys = ["z0_over_d", *choices]
     panels = [part for _, part in split(scenes, *keys)][::-1]
     figure, axes = style.grid(len(panels), 2.4)

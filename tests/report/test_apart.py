@@ -47,6 +47,18 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     assert names == ["mobile layers = 1", "mobile layers = 2"]
 
 
+def test_a_pile_without_dem_is_named_by_its_method(table: pd.DataFrame) -> None:
+    rows = table.assign(
+        answered_method=["dem", "peeling", "dem", "dem"],
+        mobile_layers=[1, np.nan, 1, 1],
+        stiffness=[1e3, np.nan, 1e3, 1e3],
+    )
+    _, _, entries = apart.parted(rows, *SHOWN)
+    names = [str(one[0].get_label()) for one in entries if isinstance(one, tuple)]
+    assert len(names) == 2
+    assert "peeling" in names[1]
+
+
 def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
     many = pd.concat([table.iloc[[0]]] * 20).assign(
         stiffness=np.repeat([1e3, 1e4, 1e5, 1e6], 5), mobile_layers=[1, 2, 3, 4, 5] * 4

@@ -228,6 +228,26 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert list(pile_figures(empty)) == list(stress.draw(empty)) == []
 
 
+def test_the_closed_form_has_no_panels_of_what_answers(results: Results) -> None:
+    stiff = results.tables["scenes"].copy()
+    stiff["stiffness"] = np.where(np.arange(len(stiff)) % 2, 1e4, 1e6)
+    none = {name: pd.DataFrame() for name in results.tables}
+    found = drawn(single_figures(replace(results, tables={**none, "scenes": stiff})))
+    assert len(found["closed-form-horizontal"]) == 2
+
+
+def test_grains_that_hardly_ever_go_do_not_set_the_scale(results: Results) -> None:
+    curve = results.tables["pile_curve"]
+    last = curve[curve["moved"] > 0].tail(1).assign(fraction_moved=0.97, shields=120.0)
+    changed = {**results.tables, "pile_curve": pd.concat([curve, last])}
+    (ax,) = drawn(piles.fractions(replace(results, tables=changed)))["fractions-alpha15"]
+    assert ax.get_xscale() == "log"
+    low, high = ax.get_xlim()
+    early = curve[(curve["moved"] > 0) & (curve["fraction_moved"] <= piles.SHOWN_UP_TO)]
+    shown = early["shields"]
+    assert low < shown.min() <= shown.max() < high < 1
+
+
 def test_ramps_are_no_points_of_the_diagrams(results: Results) -> None:
     ramps = {**results.tables, "scenes": results.tables["scenes"].assign(waiting_time=1.0)}
     assert list(single_figures(replace(results, tables=ramps))) == []

@@ -213,3 +213,4 @@ def test_symbols_have_an_index_and_names_of_columns_none() -> None:
     typeset = page_module.typeset
     assert typeset("τ_c of ρ_sol") == "τ<sub>c</sub> of ρ<sub>sol</sub>"
     assert typeset("column frozen_bed") == "column frozen_bed"
+    assert typeset("`--tolerance 0` runs") == "<code>--tolerance 0</code> runs"
