@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.bed.disorder import rows as disorder_rows
 from orchestrator.bed.line import BedLine
+from orchestrator.bed.places import Places
 from orchestrator.study.parts import Packing as Pattern
 
 FloatArray = NDArray[np.float64]
@@ -51,6 +52,10 @@ class Packing:
         Exposed and counted, by default on windward sides; exposed elsewhere.
     arc_length : ndarray, shape (n,)
         Position along the bed line; it means something for exposed grains.
+    across : ndarray, shape (n,), or 0
+        y of each centre; 0 in one plane.
+    width : float
+        Of a strip with periodic sides; 0 in one plane.
     """
 
     centres: FloatArray
@@ -59,6 +64,13 @@ class Packing:
     windward: BoolArray
     lee: BoolArray
     arc_length: FloatArray
+    across: FloatArray | float = 0.0
+    width: float = 0.0
+
+    @property
+    def places(self) -> Places:
+        """The centres in space."""
+        return Places.of(self.centres, self.across, self.width)
 
     @property
     def count(self) -> int:

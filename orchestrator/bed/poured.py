@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from orchestrator.bed.cover import counted_segments, within
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import TIE, Packing
+from orchestrator.bed.places import Places, across
 from orchestrator.bed.poured_case import BED
 from orchestrator.study.parts import Range
 
@@ -26,7 +26,13 @@ LOCAL = 5.0
 
 
 def read(
-    directory: Path, line: BedLine, counts: str | Range, *, surface: float, mobile_layers: int
+    directory: Path,
+    line: BedLine,
+    counts: str | Range,
+    *,
+    surface: float,
+    mobile_layers: int,
+    width: float = 0.0,
 ) -> Packing:
     """The packing of a finished case.
 
@@ -42,19 +48,23 @@ def read(
         Height over the line, normal to it, of the highest centres.
     mobile_layers : int
         Layers of the forms that may move.
+    width : float
+        Of a strip with periodic sides; 0 in one plane.
     """
     rows = pd.read_csv(directory / BED)
     centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
     segment, along = line.nearest(centres)
     height = np.einsum("nk,nk->n", centres - line.corners[segment], line.normals[segment])
-    free = unshadowed(along, height, sizes / 2) & (rows["fixed"] == 0).to_numpy()
+    places = Places.of(centres, rows["y_over_d"].to_numpy(float), width)
+    y = places.xyz[:, 1]
+    free = unshadowed(along, height, sizes / 2, y, width) & (rows["fixed"] == 0).to_numpy()
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
     in_layers = surface - height < (mobile_layers - 0.5) * LAYER
     mobile = (in_layers | free) & on_form & (rows["fixed"] == 0).to_numpy()
     counted = free & counted_segments(line, counts)[segment] & within(centres[:, 0], counts)
     # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
     order = np.lexsort((along, ~mobile))
-    kept = order[(mobile | _near(centres, sizes, mobile))[order]]
+    kept = order[(mobile | _near(places, sizes, mobile))[order]]
     return Packing(
         centres=centres[kept],
         sizes=sizes[kept],
@@ -62,10 +72,18 @@ def read(
         windward=counted[kept],
         lee=(free & on_form & ~counted)[kept],
         arc_length=along[kept],
+        across=y[kept],
+        width=width,
     )
 
 
-def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> BoolArray:
+def unshadowed(
+    along: FloatArray,
+    height: FloatArray,
+    radii: FloatArray,
+    sideways: FloatArray | float = 0.0,
+    width: float = 0.0,
+) -> BoolArray:
     """Which grains are exposed.
 
     A grain is exposed when the line through its centre, normal to the bed, meets no other grain
@@ -75,9 +93,12 @@ def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> Bool
     ----------
     along, height, radii : ndarray, shape (n,)
         Place along the bed, height over it, radius, in one unit of length.
+    sideways, width
+        Place across the flow, and the width of a strip; 0 in one plane.
     """
     order = np.argsort(along, kind="stable")
     x, z, r = along[order], height[order], radii[order]
+    y = np.broadcast_to(sideways, along.shape)[order]
     free = np.ones(len(x), bool)
     most = float(r.max()) + TIE
     for apart in range(1, len(x)):
@@ -86,8 +107,9 @@ def unshadowed(along: FloatArray, height: FloatArray, radii: FloatArray) -> Bool
         if not len(near):
             break
         first, second = near, near + apart
-        free[first] &= (gap[near] > r[second] + TIE) | (z[second] <= z[first] + TIE)
-        free[second] &= (gap[near] > r[first] + TIE) | (z[first] <= z[second] + TIE)
+        away = np.hypot(gap[near], across(y[second] - y[first], width))
+        free[first] &= (away > r[second] + TIE) | (z[second] <= z[first] + TIE)
+        free[second] &= (away > r[first] + TIE) | (z[first] <= z[second] + TIE)
     found = np.empty_like(free)
     found[order] = free
     return found
@@ -111,23 +133,24 @@ def standing(packing: Packing, line: BedLine) -> FloatArray:
     return np.asarray(np.where(shown, height - packing.sizes / 2 - (level - 0.5), 0.0))
 
 
-def contacts(centres: FloatArray, sizes: FloatArray, touch: float = 1e-3) -> IntArray:
+def contacts(places: Places, sizes: FloatArray, touch: float = 1e-3) -> IntArray:
     """Pairs of grains that touch, by their numbers, shape (k, 2).
 
     Two grains touch whose surfaces are nearer than a part of the mean of their diameters.
     """
-    pairs = cKDTree(centres).query_pairs((1 + touch) * float(sizes.max()), output_type="ndarray")
-    apart = np.hypot(*(centres[pairs[:, 0]] - centres[pairs[:, 1]]).T)
-    reach = (sizes[pairs[:, 0]] + sizes[pairs[:, 1]]) / 2
-    return np.asarray(pairs[apart < (1 + touch) * reach])
+    reach = (1 + touch) * float(sizes.max())
+    pairs = places.tree().query_pairs(reach, output_type="ndarray")
+    apart = np.linalg.norm(places.apart(*pairs.T), axis=1)
+    return np.asarray(pairs[apart < (1 + touch) * sizes[pairs].mean(axis=1)])
 
 
-def _near(centres: FloatArray, sizes: FloatArray, chosen: BoolArray) -> BoolArray:
+def _near(places: Places, sizes: FloatArray, chosen: BoolArray) -> BoolArray:
     """Which grains lie near one of the chosen ones."""
     reach = float(sizes.max()) + NEAR
-    numbers, tree = np.flatnonzero(chosen), cKDTree(centres[chosen])
-    found = np.zeros(len(centres), bool)
-    for number, others in enumerate(tree.query_ball_point(centres, reach)):
-        apart = np.hypot(*(centres[numbers[others]] - centres[number]).T)
-        found[number] = bool(np.any(apart < (sizes[numbers[others]] + sizes[number]) / 2 + NEAR))
+    numbers, tree = np.flatnonzero(chosen), places.tree(chosen)
+    found = np.zeros(len(sizes), bool)
+    for number, near in enumerate(tree.query_ball_point(places.xyz, reach)):
+        others = numbers[near]
+        apart = np.linalg.norm(places.apart(np.full_like(others, number), others), axis=1)
+        found[number] = bool(np.any(apart < (sizes[others] + sizes[number]) / 2 + NEAR))
     return found

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.pouring import HEAP, Mould, rows_of
+from orchestrator.bed.pouring import Mould, rows_of
 from orchestrator.errors import InputError, Noisy, SolverError
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
@@ -57,6 +57,8 @@ class PouredBed(Case):
         Of the grains.
     seed : int
         Which of the many.
+    width : float
+        Of a strip with periodic sides; 0 of a bed in one plane.
     """
 
     line: BedLine
@@ -66,6 +68,7 @@ class PouredBed(Case):
     diameter: float
     friction_angle_deg: float
     seed: int
+    width: float = 0.0
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
@@ -87,18 +90,18 @@ class PouredBed(Case):
             "diameter": self.diameter,
             "friction_angle_deg": self.friction_angle_deg,
             "seed": self.seed,
+            "width": self.width,
         }
 
     @cached_property
     def mould(self) -> Mould:
         """What the grains rain into."""
-        return Mould(self.line, self.depth, self.surface)
+        return Mould(self.line, self.depth, self.surface, self.width)
 
     @property
     def cost_s(self) -> float:
         """Expected wall time, s: 15,000 steps at 6e6 grain-steps a second."""
-        start, end = self.mould.ends
-        return 1 + (end - start) * (self.depth + HEAP) * 15_000 / 6e6
+        return 1 + self.mould.count(self._mean) * 15_000 / 6e6
 
     def check_size(self) -> None:
         """See that the mould does not take more grains than a machine bears.
@@ -108,18 +111,19 @@ class PouredBed(Case):
         InputError
             If it does; with the field of a study file.
         """
-        count = self.mould.count(self._mean_area)
+        count = self.mould.count(self._mean)
         if count > MOST_GRAINS:
             raise InputError(
                 f"about {count:.2g} grains would be poured, more than {MOST_GRAINS:g}",
                 where="bed.packing",
-                remedy="a shorter bed, larger grains, or less of bed.poured_depth",
+                remedy="a shorter bed, larger grains, or less of bed.poured_depth or bed.width",
             )
 
     @property
-    def _mean_area(self) -> float:
-        """Mean square of the grains' diameters, d2."""
-        return float(np.mean(drawn(self.sizes, self.diameter, 1000, 0) ** 2))
+    def _mean(self) -> float:
+        """Mean area of the grains' discs, d2; in a strip mean volume, d3."""
+        sizes = drawn(self.sizes, self.diameter, 1000, 0)
+        return float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
@@ -128,7 +132,7 @@ class PouredBed(Case):
     @cached_property
     def _grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
-        count, floor = self.mould.count(self._mean_area), self.mould.floor
+        count, floor = self.mould.count(self._mean), self.mould.floor
         mixed = drawn(self.sizes, self.diameter, count, self.seed)
         places = self.mould.rain(mixed, self.seed)
         return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), mixed])
@@ -147,6 +151,7 @@ class PouredBed(Case):
             "upstream": start * DIAMETER,
             "downstream": end * DIAMETER,
             "most_looks": MOST_LOOKS,
+            "width": self.width,
         }
         lines = [
             f"variable        {name} equal {value!r}  # {MEANING[name]}\n"
@@ -167,18 +172,19 @@ class PouredBed(Case):
         centres, sizes = self._grains
         margin = float(sizes.max()) + 1
         low, high = (centres.min(axis=0) - margin).tolist(), (centres.max(axis=0) + margin).tolist()
-        box = [(low[0], high[0]), (-margin, margin), (low[1], high[1])]
+        if self.width:
+            low[1], high[1] = 0.0, self.width
         bounds = "".join(
             f"{a * DIAMETER!r} {b * DIAMETER!r} {axis}lo {axis}hi\n"
-            for (a, b), axis in zip(box, "xyz", strict=True)
+            for a, b, axis in zip(low, high, "xyz", strict=True)
         )
         kinds = np.where(np.arange(len(centres)) < len(self.mould.floor), 1, 2).tolist()
         columns = zip(
             kinds, (sizes * DIAMETER).tolist(), (centres * DIAMETER).tolist(), strict=True
         )
         rows = "".join(
-            f"{number} {kind} {size!r} {DENSITY!r} {x!r} 0.0 {z!r}\n"
-            for number, (kind, size, (x, z)) in enumerate(columns, 1)
+            f"{number} {kind} {size!r} {DENSITY!r} {x!r} {y!r} {z!r}\n"
+            for number, (kind, size, (x, y, z)) in enumerate(columns, 1)
         )
         head = f"grains: id type diameter density x y z\n\n{len(kinds)} atoms\n4 atom types\n\n"
         return f"{head}{bounds}\nAtoms\n\n{rows}"
@@ -187,8 +193,8 @@ class PouredBed(Case):
         """See that the bed came to rest, and write its grains to ``bed.csv``."""
         liggghts.check_log(directory)
         self._check_rest(directory)
-        text = (directory / DUMP).read_text().partition("ITEM: ATOMS id x z \n")[2]
-        rows = pd.read_csv(StringIO(text), sep=r"\s+", names=["id", "x", "z"], header=None)
+        text = (directory / DUMP).read_text().partition("ITEM: ATOMS id x y z \n")[2]
+        rows = pd.read_csv(StringIO(text), sep=r"\s+", names=["id", "x", "y", "z"], header=None)
         if rows.empty or rows.isna().any(axis=None):
             raise SolverError(
                 "it holds no grains", where=str(directory / DUMP), remedy="run the case again"
@@ -198,6 +204,7 @@ class PouredBed(Case):
         bed = pd.DataFrame(
             {
                 "x_over_d": rows["x"] / DIAMETER,
+                "y_over_d": rows["y"] / DIAMETER,
                 "z_over_d": rows["z"] / DIAMETER,
                 "size": sizes[number],
                 "fixed": (number < len(self.mould.floor)).astype(int),
@@ -240,5 +247,6 @@ MEANING = {
     "stiffness": "of each stage: K d/W, normal and tangential",
     "drag": "of each stage: of the still fluid, m sqrt(g/d)",
     "calm": "of each stage: kinetic energy of a grain with which it ends, W d",
+    "width": "of a strip with periodic sides, d; 0: all grains in one plane",
 }
 """Parameters of the deck, with their units."""

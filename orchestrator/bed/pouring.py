@@ -19,6 +19,8 @@ HEAP = 2.0
 """Height of the grains over the line that are cut away, d."""
 FILLED = 0.83
 """Part of the area that grains fill when they have settled; it only says how many are poured."""
+FILLED_IN_SPACE = 0.6
+"""The same of the volume of a strip."""
 LOOSE = 0.3
 """Room of a grain in the air, beside it and over it, in its own diameters: as little as leaves no
 order among equal grains, so that they fall no further than need be."""
@@ -38,11 +40,14 @@ class Mould:
         Of the row of fixed grains under the line, along the vertical.
     surface : float
         Height over the line, normal to it, above which no centre lies after the cut.
+    width : float
+        Of a strip with periodic sides; 0 of a bed in one plane.
     """
 
     line: BedLine
     depth: float
     surface: float
+    width: float = 0.0
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -52,14 +57,27 @@ class Mould:
 
     @property
     def floor(self) -> FloatArray:
-        """Centres of the fixed grains: along the line one diameter apart, shape (m, 2)."""
+        """Centres of the fixed grains: along the line one diameter apart, shape (m, 3).
+
+        Those of a strip lie in two layers, each over the gaps of the other: nothing falls through.
+        """
         x, z = self.line.corners.T
         along = np.concatenate([[0.0], np.cumsum(self.line.lengths)])
         first, last = np.interp(self.ends, x, along)
         places = np.arange(first + 0.5, last, 1.0)
-        return np.column_stack(
-            [np.interp(places, along, x), np.interp(places, along, z) - self.depth]
-        )
+        upper = self._across(np.interp(places, along, x), np.interp(places, along, z) - self.depth)
+        if not self.width:
+            return upper
+        pitch = self.width / np.ceil(self.width)
+        return np.vstack([upper, upper + np.array([0.5, pitch / 2, -np.sqrt(0.5)])])
+
+    def _across(self, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Places repeated across the flow, at most one diameter apart."""
+        if not self.width:
+            return np.column_stack([x, np.zeros_like(x), z])
+        rows = int(np.ceil(self.width))
+        y = np.tile(np.arange(rows) * self.width / rows, len(x))
+        return np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
 
     @property
     def segments(self) -> FloatArray:
@@ -68,17 +86,20 @@ class Mould:
         raised = z[:-1] + self.surface / tangents[:, 0]
         return np.column_stack([x[:-1], x[1:], raised, tangents[:, 1] / tangents[:, 0]])
 
-    def count(self, mean_area: float) -> int:
-        """How many grains of a mean square of the diameters (d2) fill it, with the heap."""
+    def count(self, mean: float) -> int:
+        """How many grains fill it, with the heap.
+
+        Their discs have a mean area in d2, in a strip the spheres a mean volume in d3.
+        """
         start, end = self.ends
-        fill = (self.depth + self.surface + HEAP) * (end - start) * FILLED
-        return int(np.ceil(fill / (np.pi / 4 * mean_area)))
+        part = FILLED_IN_SPACE * self.width if self.width else FILLED
+        return int(np.ceil((self.depth + self.surface + HEAP) * (end - start) * part / mean))
 
     def rain(self, sizes: FloatArray, seed: int) -> FloatArray:
         """Places in the air of the grains that fill the mould, none touching another.
 
         They lie row upon row, each over what is already there, at a place of its room that the
-        seed decides.
+        seed decides; in a strip in lanes along the flow.
 
         Parameters
         ----------
@@ -89,17 +110,30 @@ class Mould:
 
         Returns
         -------
-        ndarray, shape (n, 2)
+        ndarray, shape (n, 3)
         """
+        chance = np.random.default_rng(seed).uniform(size=(len(sizes), 3 if self.width else 2))
+        places = np.zeros((len(sizes), 3))
+        # with no room to the sides each lane would stay a bed in a plane
+        lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
+        for lane in range(lanes):
+            own = slice(lane, None, lanes)
+            places[own, 0], places[own, 2] = self._lane(sizes[own], chance[own]).T
+            if self.width:
+                wide, free = self.width / lanes, self.width / lanes - sizes[own]
+                places[own, 1] = (lane + 0.5) * wide + (chance[own, 2] - 0.5) * free
+        return places
+
+    def _lane(self, sizes: FloatArray, chance: FloatArray) -> FloatArray:
+        """X and z of grains that rain in one lane, shape (n, 2)."""
         (start, end), room = self.ends, (1 + LOOSE) * sizes
-        chance = np.random.default_rng(seed).uniform(size=(len(sizes), 2))
         tops = _Tops(start, end, float(sizes.max()))
-        for x, z in self.floor:
+        for x, _, z in self.floor:
             tops.put(x - 0.5, x + 0.5, z + 0.5)
         places = np.empty((len(sizes), 2))
         x = start + room[0] * chance[0, 0]
         for number, (size, wide) in enumerate(zip(sizes.tolist(), room.tolist(), strict=True)):
-            beside, over = LOOSE * size * chance[number]
+            beside, over = LOOSE * size * chance[number, :2]
             if x + wide > end:
                 x = start + wide * chance[number, 0]
             place = x + beside + size / 2

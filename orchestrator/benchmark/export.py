@@ -43,7 +43,7 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     ------
     InputError
         If a level needs a study, or the study is not finished, not answered as it asks, or asks for
-        beds that change.
+        beds that change or lie in space.
     """
     if source is None:
         return _formulas(root, levels or FORMULAS)
@@ -59,6 +59,12 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         raise InputError(
             "a pack holds one flow over each bed, and this bed changes under it",
             where=f"{source}: protocol.update",
+            remedy="run the study without it into another directory",
+        )
+    if any(pile.bed.width for pile in planned.piles.values()):
+        raise InputError(
+            "a pack holds grains in the plane of the flow, and this bed is a strip in space",
+            where=f"{source}: bed.width",
             remedy="run the study without it into another directory",
         )
     finished = Finished(asked, planned, space)

@@ -136,7 +136,7 @@ MEANINGLESS: Mapping[str, frozenset[str]] = {
 
 SHAPES = frozenset(
     {
-        *("sizes", "poured_depth", "exposure"),
+        *("sizes", "poured_depth", "width", "exposure"),
         *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
         *("profile", "smoothing", "obstacles", "counted"),
         *("flow_top", "depth_m"),

@@ -11,7 +11,8 @@ from typing import Any, Literal
 
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import LEAST_WIDTH, Scene
+from orchestrator.study.sizes import largest
 from orchestrator.study.study import PARTS, make_scene
 
 Part = Literal["flow", "grains"]
@@ -25,6 +26,10 @@ OCTAVES = 2.0
 """Flows are shared within this ratio of z0."""
 FULL = 1000
 """More layers than any pile has."""
+STRIP = "strip"
+"""A poured bed in space, and the level of the grains that answers one in the plane by it."""
+WIDTH = 5.0
+"""Of that level's strip, d; more where the largest grains need it."""
 FLAT = "flat"
 """The level of the flow that leaves out all forms: exact over a level bed."""
 
@@ -41,11 +46,11 @@ class Level:
         The fields that it sets; a callable where they follow from the scene.
     same_model : bool
         Whether it has the reference's model choices; another turbulence model has not, nor have
-        contacts of one stiffness in N/m. Others are measured and never chosen.
+        contacts of one stiffness in N/m or a bed in space. Others are measured and never chosen.
     most_grains : int or None
         The ladder measures a dear level on piles of no more exposed grains than this.
     not_on : tuple of str
-        Packings that it leaves alone.
+        Packings that it leaves alone, `STRIP` among them.
     """
 
     name: str
@@ -61,11 +66,16 @@ class Level:
 
     def describes(self, scene: Scene) -> bool:
         """Whether the scene is on this level as it is."""
-        return all(
+        return self.takes(scene) and all(
             getattr(getattr(scene, part), field) == value
             for key, value in self.fields(scene).items()
             for part, _, field in (key.partition("."),)
         )
+
+    def takes(self, scene: Scene) -> bool:
+        """Whether it is a way to answer a pile of this packing."""
+        assert isinstance(scene.bed, PileBed)
+        return (STRIP if scene.bed.width else scene.bed.packing) not in self.not_on
 
     def fields(self, scene: Scene) -> Fields:
         """The fields that it sets in a scene."""
@@ -154,6 +164,12 @@ def _paper_stiffness(scene: Scene) -> Fields:
     return {**_mobile(1, FAST), "grain.stiffness": paper_stiffness(scene)}
 
 
+def _strip(scene: Scene) -> Fields:
+    least = LEAST_WIDTH * largest(scene.grain.sizes, scene.grain.diameter)
+    wide = max(WIDTH, float(math.ceil(least))) if scene.is_poured else 0.0
+    return {**_mobile(4, FAST), "bed.width": wide}
+
+
 def _reference(scene: Scene) -> Fields:
     """On a poured bed each further layer that may move lets grains go earlier, up to the sixth."""
     return _mobile(6, SLOW) if scene.is_poured else _mobile(3, SLOWEST)
@@ -208,6 +224,7 @@ GRAINS = (
         "peeling",
         "pivot with blocking by neighbours, without dynamics",
         {"protocol.method": "peeling"},
+        not_on=(STRIP,),
     ),
     _dem("1 layer, coarse", 1, COARSE),
     _dem("1 layer, fast", 1, FAST),
@@ -226,7 +243,15 @@ GRAINS = (
         same_model=False,
         most_grains=40,
         # the contacts of softer grains, in which it was poured, would throw them apart
-        not_on=("poured",),
+        not_on=("poured", STRIP),
+    ),
+    Level(
+        STRIP,
+        "DEM of a poured bed in space, periodic across the flow, 4 mobile layers, load steps 3 % "
+        "apart",
+        _strip,
+        same_model=False,
+        not_on=("aligned", "horizontal", "disordered", STRIP),
     ),
     Level(
         "soft reference",

@@ -43,7 +43,7 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 6
+    recipe: ClassVar[int] = 7
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ class Count:
     Attributes
     ----------
     moved : ndarray of bool, shape (T, N)
-        Displaced downstream by the criterion at a sample, or carried off.
+        Displaced downstream or aside by the criterion at a sample, or carried off.
     fallen : ndarray of bool, shape (T, N)
         Displaced upstream by the criterion at a sample. Such a grain has not moved, but may yet.
     carried : ndarray of bool, shape (T, N)
@@ -33,7 +33,9 @@ class Count:
     carried: BoolArray
 
 
-def count(travel: FloatArray, criterion: float, *, falls_out: bool) -> Count:
+def count(
+    travel: FloatArray, criterion: float, *, falls_out: bool, aside: FloatArray | float = 0.0
+) -> Count:
     """Apply the rule to the tracks of grains.
 
     Parameters
@@ -47,17 +49,26 @@ def count(travel: FloatArray, criterion: float, *, falls_out: bool) -> Count:
         What it means that a grain is gone which was not seen beyond the criterion: from the two
         neighbours of a single grain it fell upstream, for no bed is there to hold it; only lift
         can have taken it from a pile.
+    aside : ndarray, shape (T, N), or 0
+        Displacement across the flow, d; 0 of grains in one plane.
     """
-    ahead, back = _ever(travel >= criterion), _ever(travel <= -criterion)
+    ahead, back = _ever(_moved(travel, aside, criterion)), _ever(travel <= -criterion)
     vanished = _ever(np.isnan(travel) & ~ahead)
     if falls_out:
         return Count(ahead, back | vanished, np.zeros_like(vanished))
     return Count(ahead | vanished, back, vanished)
 
 
-def deck_counts(travel: FloatArray, criterion: float) -> tuple[IntArray, IntArray]:
+def deck_counts(
+    travel: FloatArray, criterion: float, aside: FloatArray | float = 0.0
+) -> tuple[IntArray, IntArray]:
     """What the deck prints at each sample, shape (T,): grains short of the criterion; fallen."""
-    return (travel < criterion).sum(axis=1), (travel <= -criterion).sum(axis=1)
+    lying = ~np.isnan(travel) & ~_moved(travel, aside, criterion)
+    return lying.sum(axis=1), (travel <= -criterion).sum(axis=1)
+
+
+def _moved(travel: FloatArray, aside: FloatArray | float, criterion: float) -> BoolArray:
+    return np.asarray((travel >= criterion) | (aside >= criterion))
 
 
 def _ever(happened: BoolArray) -> BoolArray:

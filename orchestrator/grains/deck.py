@@ -33,6 +33,7 @@ MEANING = {
     "ceiling_x": "ridge of the roof above which a grain in flight is gone, m",
     "ceiling_z": "its height, m",
     "behind": "place along x behind which every grain is gone, m",
+    "width": "of a strip with periodic sides, d; 0: all grains in one plane",
 }
 """Parameters of the deck, with their units."""
 
@@ -53,6 +54,8 @@ class GrainTable:
         Diameter of each grain over `diameter`.
     diameter, density : float
         The diameter d of the deck's units, m; the density of every grain, kg/m3.
+    width : float
+        Of a strip with periodic sides, d; 0 of grains in planes.
     """
 
     position: FloatArray
@@ -61,6 +64,7 @@ class GrainTable:
     sizes: FloatArray
     diameter: float
     density: float
+    width: float = 0.0
 
     @property
     def counted_ids(self) -> NDArray[np.int64]:
@@ -110,7 +114,8 @@ def write(
     """
     (directory / "grains.data").write_text(_data_file(grains, margin))
     # float() because a numpy number's repr is not one that the deck could read
-    numbers = {k: v if isinstance(v, int) else float(v) for k, v in parameters.items()}
+    given = {**parameters, "width": grains.width}
+    numbers = {k: v if isinstance(v, int) else float(v) for k, v in given.items()}
     lines = (
         f"variable        {name} equal {value!r}  # {MEANING[name]}\n"
         for name, value in numbers.items()
@@ -140,6 +145,8 @@ def _data_file(grains: GrainTable, margin: float) -> str:
     there = grains.kind != GONE
     low = (grains.position[there].min(axis=0) - margin).tolist()
     high = (grains.position[there].max(axis=0) + margin).tolist()
+    if grains.width:
+        low[1], high[1] = 0.0, grains.width * grains.diameter
     bounds = "".join(
         f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in zip(low, high, "xyz", strict=True)
     )

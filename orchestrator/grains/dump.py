@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from orchestrator.bed.places import across
 from orchestrator.errors import Exploded, SolverError
 from orchestrator.grains.deck import GrainTable
 
@@ -15,7 +16,7 @@ FloatArray = NDArray[np.float64]
 
 PASSAGE = "passage.dump"
 BED = "bed.dump"
-PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay")
+PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay", "y")
 BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 
 
@@ -28,12 +29,15 @@ class Track:
     travel, rise : ndarray
         Displacement since the settling, along the bed as the flow goes and normal to it, in the
         grain's own diameter.
+    aside : ndarray
+        The same across the flow, whichever way.
     roll : ndarray
         Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
     """
 
     travel: FloatArray
     rise: FloatArray
+    aside: FloatArray
     roll: FloatArray
 
 
@@ -41,11 +45,12 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     """Read what the counted grains did at each sample; arguments as in `read_passage`."""
     ids = grains.counted_ids
     state = read_passage(directory, ids, samples)
-    return _track(state, grains.along[ids - 1], grains.diameter * grains.sizes[ids - 1])
+    width = grains.diameter * grains.width
+    return _track(state, grains.along[ids - 1], grains.diameter * grains.sizes[ids - 1], width)
 
 
 def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> FloatArray:
-    """Read ``passage.dump``: x, z, vx, vz and omegay of the counted grains, shape (5, T + 1, N).
+    """Read ``passage.dump``: x, z, vx, vz, omegay and y of the counted grains, shape (6, T + 1, N).
 
     First after settling, then at each sample. NaN of a grain that is gone; one that the deck does
     not list and that ``bed.dump`` has at the end of the load step is at rest where it had settled.
@@ -82,7 +87,7 @@ def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame)
         part[row, column] = rows[name]
     listed = ~np.isnan(state[0, 1:])
     resting = ~listed & _there(listed, _left(directory, ids, samples), samples)
-    for part, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0), strict=True):
+    for part, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0, state[5, 0]), strict=True):
         np.copyto(part[1:], still, where=resting)
     return state
 
@@ -112,15 +117,16 @@ def _there(
     return found
 
 
-def _track(state: FloatArray, along: FloatArray, diameter: FloatArray) -> Track:
+def _track(state: FloatArray, along: FloatArray, diameter: FloatArray, width: float = 0.0) -> Track:
     right, up = (state[:2, 1:] - state[:2, :1]) / diameter
-    vx, vz, spin = state[2:, 1:]
+    vx, vz, spin, y = state[2:, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):
         roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
     return Track(
         travel=right * along[:, 0] + up * along[:, 1],
         # out of the bed, whichever way is along it
         rise=np.sign(along[:, 0]) * (up * along[:, 0] - right * along[:, 1]),
+        aside=np.abs(across(y - state[5, :1], width)) / diameter,
         roll=roll,
     )
 

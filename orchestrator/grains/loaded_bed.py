@@ -19,7 +19,7 @@ from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import peeling
+from orchestrator.grains import peeling, pockets
 from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces, on_slopes
 from orchestrator.study.parts import PileBed
@@ -122,6 +122,7 @@ class LoadedBed:
             diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
             friction_angle_deg=grain.friction_angle_deg,
             seed=self.bed.seed,
+            width=self.bed.width,
         )
         bed.check_size()
         return (bed,)
@@ -135,8 +136,14 @@ class LoadedBed:
             counts = (counts[0] / d, counts[1] / d)
         for run in self.pouring:
             assert self.cases is not None, "a poured bed is known when its run is done"
-            where, layers = self.cases / run.name, self.bed.mobile_layers
-            return _poured(where, self.line, counts, surface=self.surface, mobile_layers=layers)
+            return _poured(
+                self.cases / run.name,
+                self.line,
+                counts,
+                surface=self.surface,
+                mobile_layers=bed.mobile_layers,
+                width=bed.width,
+            )
         how: dict[str, Any] = {
             "entrainment_angle_deg": bed.entrainment_angle_deg,
             "gap": bed.roughness / d,
@@ -270,8 +277,11 @@ class LoadedBed:
         if self.pouring:
             ratio = np.zeros(len(self.packing.sizes))
             ratio[counted] = speed
-            grains = (self.packing.centres, self.packing.sizes)
-            found = peeling.pivots(*grains, self.loading(ratio), self.force_tables)
+            packed, pushes = self.packing, (self.loading(ratio), self.force_tables)
+            if packed.width:
+                found = pockets.pivots(packed.places, packed.sizes, *pushes)
+            else:
+                found = peeling.pivots(packed.centres, packed.sizes, *pushes)
             return np.asarray(found[counted])
         slopes = np.degrees(np.arctan2(self.tangents[counted, 1], self.tangents[counted, 0]))
         threshold = on_slopes(self.scene, np.where(speed < 0, -slopes, slopes))
@@ -279,9 +289,15 @@ class LoadedBed:
 
     @cached_property
     def pivot_angles_deg(self) -> FloatArray:
-        """Angle of each counted grain's foremost contact from the bed's normal, shape (N,)."""
+        """Angle from the bed's normal over which each counted grain has to roll, shape (N,).
+
+        In a plane that of its foremost contact, in space that of the saddle between two.
+        """
         packed = self.packing
-        found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
+        if packed.width:
+            found = pockets.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
+        else:
+            found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
         return np.asarray(found[packed.windward])
 
     def leaving(self, ratio: FloatArray, there: NDArray[np.bool_] | None = None) -> FloatArray:

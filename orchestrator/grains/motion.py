@@ -191,7 +191,7 @@ def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool)
     samples = _samples(directory)
     track = read_track(directory, grains, samples)
     _reconcile(directory, samples, track, marker)
-    found = counting.count(track.travel, marker, falls_out=falls_out)
+    found = counting.count(track.travel, marker, falls_out=falls_out, aside=track.aside)
     load_step = samples["load_step"].to_numpy(np.int64)
     flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
     return Motion(
@@ -248,7 +248,7 @@ def _samples(directory: Path) -> pd.DataFrame:
 
 def _reconcile(directory: Path, samples: pd.DataFrame, track: Track, marker: float) -> None:
     """Lying, fallen and gone make N at each sample, by the deck's own count and by the places."""
-    lying, fallen = counting.deck_counts(track.travel, marker)
+    lying, fallen = counting.deck_counts(track.travel, marker, track.aside)
     agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
         raise SolverError(

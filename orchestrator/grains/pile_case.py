@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from orchestrator.errors import InputError
 from orchestrator.grains import deck, dump, motion, protocol, rest, wear
 from orchestrator.grains.case import GrainCase
 from orchestrator.grains.deck import GrainTable
@@ -39,7 +40,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 9
+    recipe: ClassVar[int] = 10
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, wear.GRAINS)
 
     @cached_property
@@ -65,7 +66,8 @@ class PileCase(GrainCase):
         # the whole pile is half its rows thick on average
         most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
         length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
-        grains = length * (min(self.loaded.bed.mobile_layers, most) + 3)
+        layers = min(self.loaded.bed.mobile_layers, most) + 3
+        grains = length * layers * (self.loaded.bed.width or 1)
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
@@ -128,6 +130,8 @@ class PileCase(GrainCase):
 def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     """The flow of the settling, then of each load step: from before the first grain goes."""
     rules = bed.scene.protocol
+    if bed.packing.width:
+        return _flows_of_pockets(bed, ratio)
     thresholds = np.sort(bed.leaving(ratio))
     first = thresholds[0]
     if not bed.bed.is_wedge:
@@ -141,6 +145,21 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
     return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
+
+
+def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
+    """The same of a strip in space: no peeling says who frees whom."""
+    rules = bed.scene.protocol
+    thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
+    held = thresholds[(thresholds > 0) & np.isfinite(thresholds)]
+    if not len(held):
+        raise InputError(
+            "no exposed grain lies in a pocket that lets it go",
+            where=f"scene {bed.scene.id}: bed",
+            remedy="a longer or wider bed, or another bed.seed",
+        )
+    last = held[min(int(rules.final_fraction * len(thresholds)), len(held) - 1)]
+    return protocol.flows(protocol.START * held[0], protocol.BEYOND * last, rules.load_increment)
 
 
 def flows_from(reached: float, bed: LoadedBed, ratio: FloatArray, there: BoolArray) -> FloatArray:
@@ -161,12 +180,13 @@ def table(bed: LoadedBed, ratio: FloatArray, worn: Worn) -> GrainTable:
     )
     x, z = worn.places.T * d
     return GrainTable(
-        position=np.column_stack([x, np.zeros_like(x), z]),
+        position=np.column_stack([x, packed.places.xyz[:, 1] * d, z]),
         kind=kind,
         along=bed.downflow(ratio),
         sizes=packed.sizes,
         diameter=d,
         density=bed.scene.grain.density,
+        width=packed.width,
     )
 
 

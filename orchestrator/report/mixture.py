@@ -19,6 +19,8 @@ from orchestrator.report.results import Results, split
 
 SHOWN = 45.0
 """Longest part of a bed that is drawn in one row, d: of a longer one its middle."""
+POURED = "size_over_d"
+"""A column of the grains that those of poured beds alone have."""
 LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
 LINES = (
     ("Wilcock and Crowe", lambda size: measured.wilcock_crowe_hiding(size) / size, "-"),
@@ -28,7 +30,7 @@ LINES = (
 
 def draw(results: Results) -> Iterator[Figure]:
     """The figures of a study with poured beds; none without."""
-    if "pivot_deg" in results.tables.get("pile_grain", pd.DataFrame()):
+    if POURED in results.tables.get("pile_grain", pd.DataFrame()):
         yield from _beds(results)
         yield _pivots(results)
         rows = results.joined("size_class")
@@ -39,7 +41,7 @@ def draw(results: Results) -> Iterator[Figure]:
 def _beds(results: Results) -> Iterator[Figure]:
     """The first poured bed by each threshold method."""
     rows = results.joined("pile_grain")
-    rows = rows[rows["pivot_deg"].notna()]
+    rows = rows[rows[POURED].notna()]
     for (method,), part in split(rows, "answered_method"):
         scene_id = str(part["scene_id"].iloc[0])
         grains = part[part["scene_id"] == scene_id]
@@ -53,26 +55,34 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
     left = max(x.min() - 1, middle - SHOWN / 2)
     window = (left, min(x.max() + 1, left + SHOWN))
     there = (x > window[0]) & (x < window[1])
-    low, high = z[there].min() - 1, z[there].max() + 1.5
+    low, high = (0.0, packed.width) if packed.width else (z[there].min() - 1, z[there].max() + 1.5)
     figure = style.canvas(max(style.WIDTH * (high - low) / (window[1] - window[0]), 1.2) + 1.2)
     ax = figure.subplots()
     flows = grains["ustar0_m_s"].to_numpy(float)
-    reached = flows[np.isfinite(flows)]
+    # one that its pocket does not hold goes at no flow at all
+    reached = flows[np.isfinite(flows) & (flows > 0)]
     scale = ScalarMappable(LogNorm(reached.min(), reached.max() * 1.001), colormaps["viridis_r"])
     colours = np.where(packed.mobile, LYING, FIXED).astype(object)
     for place, flow in zip(np.flatnonzero(packed.windward), flows, strict=True):
         colours[place] = scale.to_rgba(flow) if np.isfinite(flow) else "white"
+    # seen from above the upper grains cover the others
+    order = np.argsort(z) if packed.width else np.arange(len(x))
+    places = packed.places.xyz[:, :2] if packed.width else packed.centres
+    sizes = packed.sizes[order]
     discs = EllipseCollection(
-        packed.sizes, packed.sizes, np.zeros_like(x), units="xy", offsets=packed.centres,
-        offset_transform=ax.transData, facecolors=list(colours), edgecolors=EDGE, lw=0.3,
+        sizes, sizes, np.zeros_like(x), units="xy", offsets=places[order],
+        offset_transform=ax.transData, facecolors=list(colours[order]), edgecolors=EDGE, lw=0.3,
     )  # fmt: skip
     ax.add_collection(discs)
-    ax.set(xlim=window, ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel="$z/d$")
+    up = "$y/d$" if packed.width else "$z/d$"
+    ax.set(xlim=window, ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel=up)
     bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
     bar.set_label("$u_{*0}$ at which the grain goes, m/s")
+    seen = f", a strip of {packed.width:g} d seen from above" if packed.width else ""
     caption = (
-        f"Poured bed, {len(flows)} exposed grains, by {method}: colour is the undisturbed friction "
-        "velocity at which each exposed grain goes, white one that does not go within the flows; "
+        f"Poured bed{seen}, {len(flows)} exposed grains, by {method}: colour is the undisturbed "
+        "friction velocity at which each exposed grain goes, white one that does not go within the "
+        "flows; "
         "pale grains are mobile, grey ones fixed."
     )
     asked = labels.plain("d_m", pile.scene.grain.diameter)
@@ -84,11 +94,16 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
 def _pivots(results: Results) -> Figure:
     rows = results.joined("pile_grain")
     rows = rows[rows["pivot_deg"].notna()].drop_duplicates(["grain_id", "s_m", "pivot_deg"])
+    rows = rows.assign(width=rows["answered_width"].fillna(0.0))
     figure = style.canvas(3.4)
     ax = figure.subplots()
-    angles = np.sort(rows["pivot_deg"].to_numpy(float))
-    percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
-    ax.plot(angles, percent, color="black", label=f"these beds, {len(angles)} grains")
+    for (width,), part in split(rows, "width"):
+        angles = np.sort(part["pivot_deg"].to_numpy(float))
+        percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
+        beds = f"strips of {width:g} d" if width else "beds in one plane"
+        colour = "#d55e00" if width else "black"
+        ax.plot(angles, percent, color=colour, label=f"{beds}, {len(angles)} grains")
+    percent = np.linspace(0.5, 99.5, 100)
     ax.plot(
         measured.kirchner_pivot(percent), percent, color="0.5", ls="--",
         label="Kirchner et al. (1990), $D = D_{50}$",
@@ -98,10 +113,9 @@ def _pivots(results: Results) -> Figure:
     ax.set_xlim(0, 120)
     ax.legend(loc="lower right")
     caption = (
-        "Angle of each exposed grain’s foremost contact from the normal of the bed: the pivot it "
-        "has to roll over. Above 90° a neighbour stands in its way. A bed in one plane has pivots "
-        "over the tops of neighbours, one in space through the saddles between them, so that the "
-        "dashed line is no target."
+        "Angle from the normal of the bed over which each exposed grain has to roll: in one plane "
+        "over the top of its foremost contact, in a strip in space through the saddle between two, "
+        "as on the measured beds of the dashed line. Above 90° a neighbour stands in its way."
     )
     cases = tuple(dict.fromkeys(str(one) for one in results.scenes["case"].dropna()))
     return Figure("pivots", "Pockets of the exposed grains", caption, cases, figure)

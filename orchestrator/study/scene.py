@@ -25,7 +25,7 @@ from orchestrator.study.parts import (
     Protocol,
     UnfitError,
 )
-from orchestrator.study.sizes import Sizes, percentile
+from orchestrator.study.sizes import Sizes, largest, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
@@ -33,6 +33,8 @@ LEAST_DEPTH = 3.0
 """Of a channel, heights of the forms: the rows of its mesh are level at half of it."""
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: contacts give back 0.05 W d."""
+LEAST_WIDTH = 3.0
+"""Of a strip, in diameters of its largest grain: a grain must not touch another from both sides."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
@@ -70,6 +72,8 @@ class Scene(Part):
         if self.grain.sizes is not None and not self.is_poured:
             what = "a lattice has equal grains: a mixture needs a poured bed"
             raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
+        if isinstance(self.bed, PileBed) and self.bed.width:
+            self._check_strip(self.bed)
         if self.is_poured and self.protocol.method == "dem":
             check_poured_stiffness(self.grain.stiffness)
         if self.forces.exposure == "protrusion":
@@ -84,6 +88,24 @@ class Scene(Part):
         if self.protocol.update:
             self._check_update()
         return self
+
+    def _check_strip(self, bed: PileBed) -> None:
+        """A strip in space is poured, wider than its grains, and known to few methods."""
+        if bed.packing != "poured":
+            what = "a lattice is one layer in the plane of the flow"
+            raise UnfitError("bed.width", what, 'bed.packing = "poured", or leave it out')
+        least = LEAST_WIDTH * largest(self.grain.sizes, self.grain.diameter)
+        if bed.width < least:
+            what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
+            raise UnfitError(
+                "bed.width", what, f"at least {least:.4g}, or 0 for a bed in the plane"
+            )
+        if self.protocol.method == "peeling":
+            what = "the method peeling knows grains in the plane of the flow alone"
+            raise UnfitError("bed.width", what, 'protocol.method = "dem" or "pivot", or width 0')
+        if self.protocol.update:
+            what = "a bed that changes is one layer in the plane of the flow"
+            raise UnfitError("bed.width", what, "leave it or protocol.update out")
 
     def _check_update(self) -> None:
         """A bed that changes needs a flow that sees a row go, and grains that free others."""

@@ -85,6 +85,13 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     return float(np.exp(np.interp(part, finer, np.log(diameters))))
 
 
+def largest(sizes: Sizes | None, diameter: float) -> float:
+    """The largest grain of a mixture over one diameter; 1 of equal grains."""
+    if sizes is None:
+        return 1.0
+    return sizes.ends[1] if isinstance(sizes, LogNormal) else sizes[-1][0] / diameter
+
+
 def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:
     """Diameters of some grains over one diameter, in random order, shape (count,).
 

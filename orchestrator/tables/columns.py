@@ -95,7 +95,9 @@ COLUMNS: dict[str, str] = {
     " tolerance, the fraction was not reached; empty if nothing",
     "pivot_ustar0_m_s": "ustar0_m_s by the closed form with each grain's own stress",
     "size_over_d": "diameter of the grain over d; of a size class the geometric mean",
-    "pivot_deg": "angle of the grain's foremost contact from the normal of the bed",
+    "pivot_deg": "angle of the grain's foremost contact from the normal of the bed; in a strip of"
+    " the saddle that it rolls through, empty where none lets it go",
+    "y_m": "place across the flow in a strip",
     "class_moved": "part of the size class that had moved when the fraction of all grains had",
     "shields_own": "tau_c/((rho_sol - rho_f) g d_i) at the fraction of a size class of d_i",
     "shields_own_low": "lower end of its interval",

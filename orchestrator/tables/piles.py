@@ -87,11 +87,11 @@ def grains(answer: Answer) -> pd.DataFrame:
 
 def _of_its_own(pile: Pile) -> Row:
     """What differs from grain to grain of a poured bed."""
-    chosen = pile.packing.windward
-    return {
-        "size_over_d": pile.packing.sizes[chosen],
-        "pivot_deg": pile.pivot_angles_deg,
-    }
+    packed, chosen = pile.packing, pile.packing.windward
+    found = {"size_over_d": packed.sizes[chosen], "pivot_deg": pile.pivot_angles_deg}
+    if packed.width:
+        found["y_m"] = packed.places.xyz[chosen, 1] * pile.scene.grain.diameter
+    return found
 
 
 def size_class_rows(answer: Answer) -> Iterator[Row]:

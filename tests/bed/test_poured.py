@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine
+from orchestrator.bed.places import Places
 from orchestrator.bed.poured_case import BED, DUMP, PouredBed
 from orchestrator.bed.shapes import triangle
 from orchestrator.errors import SolverError
@@ -64,7 +65,7 @@ def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
 
 def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
     centres, sizes = _grains(mixed)
-    touching = poured.contacts(centres, sizes)
+    touching = poured.contacts(Places.of(centres), sizes)
     number = np.bincount(touching.ravel(), minlength=len(sizes))
     lying = np.arange(len(sizes)) >= len(_bed().mould.floor)
     assert np.mean(number[lying] >= 2) > 0.98
@@ -80,7 +81,9 @@ def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
 def test_packing_and_contacts_lie_between_loose_and_close(mixed: Path) -> None:
     centres, sizes = _grains(mixed)
     inner = (centres[:, 1] > -2.5) & (centres[:, 1] < -1) & (np.abs(centres[:, 0] - 7) < 14)
-    number = np.bincount(poured.contacts(centres, sizes).ravel(), minlength=len(sizes))[inner]
+    number = np.bincount(poured.contacts(Places.of(centres), sizes).ravel(), minlength=len(sizes))[
+        inner
+    ]
     # discs in the plane: three contacts hold a frictional packing, four one without friction
     assert 3.0 < number.mean() < 4.0
 
@@ -98,7 +101,7 @@ class Lattice(PouredBed):
     @cached_property
     def _grains(self) -> tuple[FloatArray, FloatArray]:
         floor = self.mould.floor
-        rows = [floor[: len(floor) - row] + np.array([row / 2, 1.1 * row]) for row in range(5)]
+        rows = [floor[: len(floor) - row] + np.array([row / 2, 0.0, 1.1 * row]) for row in range(5)]
         centres = np.vstack(rows)
         return centres, np.ones(len(centres))
 
@@ -133,14 +136,15 @@ def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:
     assert poured.unshadowed(along, height, radii / 2).tolist() == [True, True, True]
 
 
+@pytest.mark.parametrize("width", [0.0, 8.0])
 @pytest.mark.parametrize("sizes", [None, MIXED, LogNormal(sigma_g=1.6)])
-def test_grains_in_the_air_touch_nothing(sizes: Sizes | None) -> None:
+def test_grains_in_the_air_touch_nothing(sizes: Sizes | None, width: float) -> None:
     # a step that is nearly upright, and a slope: their fixed grains stand beside those in the air
     line = BedLine((-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0)
-    bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3)
+    bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3, width)
     centres, diameters = bed._grains
     fixed, (start, end) = len(bed.mould.floor), bed.mould.ends
-    touching = poured.contacts(centres, diameters, 0.0)
+    touching = poured.contacts(Places(centres, width), diameters, 0.0)
     assert not (touching.max(axis=1) >= fixed).any()
     falling = centres[fixed:, 0]
     assert (falling - diameters[fixed:] / 2 > start).all()

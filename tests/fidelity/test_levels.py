@@ -5,7 +5,8 @@ import re
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import levels
+from orchestrator.fidelity import calibration, levels
+from orchestrator.fidelity.decision import decide
 from orchestrator.fidelity.levels import AS_ASKED, LEVELS, Part, changed
 from tests.fidelity.conftest import MakePile
 
@@ -15,7 +16,8 @@ def test_a_scene_that_is_on_a_level_as_it_is_asked_is_recognised(
     part: Part, pile: MakePile
 ) -> None:
     for one in LEVELS[part]:
-        assert levels.holding(one.answer(pile()))[part] == one.name
+        if one.takes(pile()):
+            assert levels.holding(one.answer(pile()))[part] == one.name
     other = changed(pile(), {"flow.expansion_ratio": 1.15, "protocol.load_increment": 0.05})
     assert levels.holding(other)[part] == AS_ASKED
 
@@ -61,3 +63,18 @@ def test_the_meaning_of_levels_leaves_out_what_is_none() -> None:
         "linear theory of the flow over a low hill"
     )
     assert levels.meaning({"flow": AS_ASKED, "grains": AS_ASKED}) == ""
+
+
+def test_a_strip_is_a_class_of_its_own_and_never_chosen_for_a_bed_in_the_plane(
+    pile: MakePile,
+) -> None:
+    plane = changed(pile(), {"bed.packing": "poured"})
+    strip = levels.level("grains", "strip").answer(plane)
+    assert strip.bed.width == 5.0  # type: ignore[union-attr]
+    assert levels.holding(strip)["grains"] == "4 layers, fast"
+    classes = [calibration.scene_class("grains", one) for one in (plane, strip)]
+    assert classes == ["poured", "strip"]
+    known = calibration.known({"grains": "reference"}, {"grains": "strip"}, [0.3])
+    assert decide(plane, 10.0).levels["grains"] != "strip"
+    if known == [calibration.UNKNOWN]:
+        assert decide(strip, 10.0).is_as_asked

@@ -80,6 +80,7 @@ def test_files_hold_every_digit(tmp_path: Path) -> None:
     assert [line.split()[:4] for line in given.splitlines()] == [
         ["variable", "diameter", "equal", "0.001"],
         ["variable", "enough", "equal", "7"],
+        ["variable", "width", "equal", "0.0"],
     ]
     flows = (tmp_path / "load_steps.txt").read_text().splitlines()
     assert [float(line) for line in flows] == load_steps.tolist()

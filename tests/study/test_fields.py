@@ -33,6 +33,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "bed.length": {"bed.shape": "trapezoid", "bed.length": 0.1},
     "bed.spacing": {"bed.forms": 3, "bed.spacing": 0.5},
     "bed.counted": {"bed.counted": "windward"},
+    "bed.width": {"bed.packing": "poured", "bed.width": 5.0},
     "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
 }

@@ -247,7 +247,7 @@ def _look_entries(parts: Sequence[pd.DataFrame]) -> list[Artist]:
         if (rows["marker"] == marker).any()
     ]
     if not rows["same_model"].all():
-        label = "hollow: another turbulence model"
+        label = "hollow: another turbulence model, contact or bed"
         entries.append(Line2D([], [], marker=HIGH, mfc="white", label=label, **shared))
     if (rows["reference_error"] > FLOOR).any():
         entries.append(Patch(label="error of the reference itself", **REFERENCE))

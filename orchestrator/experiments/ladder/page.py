@@ -14,7 +14,8 @@ from orchestrator.runs.workspace import Workspace
 
 CAPTION = (
     "A panel for each packing; the largest error over the four fractions and over the scenes. "
-    "Hollow points have another turbulence model: their distance is the spread of the models."
+    "Hollow points have another turbulence model, contacts of one stiffness in N/m or a bed in "
+    "space: their distance is that of the models."
 )
 
 

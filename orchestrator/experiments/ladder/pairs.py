@@ -16,7 +16,7 @@ from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.fidelity import calibration, spread
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import FLAT, LEVELS, Level, Part, level
+from orchestrator.fidelity.levels import FLAT, LEVELS, STRIP, Level, Part, level
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.study.parts import PileBed
@@ -75,11 +75,13 @@ def key_of(asked: Mapping[str, Decision], grains: str) -> str:
 
 def _pairs(bed: PileBed, scene: Scene) -> Iterator[Pair]:
     by_dem = scene.protocol.method == "dem"
-    if bed.is_level:
-        yield from ((FLAT, one.name) for one in _affordable("grains", bed, scene) if by_dem)
+    # neither a level bed nor one in space has what the flow's levels are measured beside
+    if bed.is_level or bed.width:
+        flow = FLAT if bed.is_level else REFERENCE[0]
+        yield from ((flow, one.name) for one in _affordable("grains", bed, scene) if by_dem)
         return
-    for flow in _affordable("flow", bed, scene):
-        yield flow.name, BESIDE
+    for one in _affordable("flow", bed, scene):
+        yield one.name, BESIDE
     if by_dem:
         yield from ((REFERENCE[0], one.name) for one in _affordable("grains", bed, scene))
         yield from USED
@@ -89,7 +91,7 @@ def _affordable(part: Part, bed: PileBed, scene: Scene) -> Iterator[Level]:
     line = of_bed(bed)
     exposed = line.lengths[counted_segments(line, bed.counts)].sum() / scene.grain.diameter
     for one in LEVELS[part]:
-        if bed.packing in one.not_on:
+        if not one.takes(scene):
             continue
         if one.most_grains is None or exposed <= one.most_grains * (1 + 1e-9):
             yield one
@@ -123,6 +125,7 @@ def points(
 
 def _point(decision: Decision, pile: Pile, cases: Path, cpu_s: Mapping[str, float]) -> Row:
     scene, (flow, grains) = decision.asked, pair_of(decision)
+    assert isinstance(scene.bed, PileBed)
     started = time.process_time()
     motion = pile.motion(cases)
     own = time.process_time() - started if pile.scene.protocol.method != "dem" else 0.0
@@ -132,13 +135,14 @@ def _point(decision: Decision, pile: Pile, cases: Path, cpu_s: Mapping[str, floa
         "scene_id": scene.id,
         "scene": label(scene),
         **point(scene),
-        "packing": pile.bed.packing + (", level bed" if pile.bed.is_level else ""),
+        "packing": (STRIP if scene.bed.width else scene.bed.packing)
+        + (", level bed" if pile.bed.is_level else ""),
         "asked": scene.protocol.method,
         **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
         "count": motion.count,
         "flow_level": flow,
         "grain_level": grains,
-        "same_model": level("flow", flow).same_model,
+        "same_model": level("flow", flow).same_model and level("grains", grains).same_model,
         "model_floor": spread.floor(scene),
         "flow_s": sum(cpu_s[run.name] for run in pile.model.cases),
         "grains_s": own + sum(cpu_s[run.name] for run in pile.method.cases),
@@ -156,4 +160,6 @@ def label(scene: Scene) -> str:
         words.append(f"gaps {scene.bed.disorder:g} d")
     if scene.is_poured:
         words.append(f"poured, seed {scene.bed.seed}")
+    if scene.bed.width:
+        words.append(f"strip of {scene.bed.width:g} d")
     return ", ".join(words)

@@ -12,7 +12,7 @@ from functools import cache, reduce
 from operator import add
 from pathlib import Path
 
-from orchestrator.fidelity.levels import FLAT, Levels, Part
+from orchestrator.fidelity.levels import FLAT, STRIP, Levels, Part
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -85,7 +85,7 @@ def scene_class(part: Part, scene: Scene) -> str:
     if packing == "disordered":
         size = next(size for size in DISORDERS if scene.bed.disorder <= size)
         packing = f"disordered up to {size:g} d"
-    return packing + ending
+    return (STRIP if scene.bed.width else packing) + ending
 
 
 def model_class(scene: Scene) -> str:

@@ -165,6 +165,14 @@ class PileBed(Bed):
         Info("depth of the mould", unit="d", scope="poured beds"),
     ] = 6.0
     """depth of a poured bed under the bed line, along the vertical, to a row of fixed grains"""
+    width: Annotated[
+        float,
+        Field(ge=0, le=50),
+        unless(0.0),
+        Info("width of the strip", unit="d", scope="poured beds", about="answer"),
+    ] = 0.0
+    """width of a poured bed across the flow, a strip in space with periodic sides: at least 3 of
+    its largest grains; 0 is one layer of grains in the plane of the flow"""
     seed: Annotated[
         int,
         Field(ge=0, le=10**9),
