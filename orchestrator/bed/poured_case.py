@@ -24,12 +24,12 @@ DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
 """The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
 CONTACT = {"damping": 0.1, "time_step": 0.2}
 """With more damping, or a longer step, equal spheres jitter: they settle into crystals."""
-STIFFNESS, DRAG, CALM = (1e3, 1e4, 1e4), (0.0, 5.0, 1.0), (1e-2, 1e-4, 1e-7)
+STIFFNESS, DRAG, CALM = (1e3, 1e4, 1e4), (0.0, 5.0, 1.0), (1e-2, 1e-4, 1e-6)
 """Of each stage: K d/W, drag over m sqrt(g/d), and the kinetic energy of a grain, over W d, with
 which it ends. The grains fall on soft springs. Then a drag takes the energy of waves that run up
 and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is enough,
-and lets grains roll into their pockets. The last energy is 1e-3 W^2/K: decks take ten times as much
-for rest."""
+and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to other decks
+too: in a long bed there is always a grain that still rolls somewhere."""
 MOST_LOOKS = 400
 """Time that the grains have in a stage, sqrt(d/g')."""
 SETTLING = "settling.csv"
@@ -72,7 +72,7 @@ class PouredBed(Case):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 2
+    recipe: ClassVar[int] = 3
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
@@ -179,12 +179,13 @@ class PouredBed(Case):
             for a, b, axis in zip(low, high, "xyz", strict=True)
         )
         kinds = np.where(np.arange(len(centres)) < len(self.mould.floor), 1, 2).tolist()
-        columns = zip(
-            kinds, (sizes * DIAMETER).tolist(), (centres * DIAMETER).tolist(), strict=True
-        )
+        columns = (kinds, (sizes * DIAMETER).tolist(), (centres * DIAMETER).tolist())
+        grains = list(zip(*columns, strict=True))
+        # neighbours along the bed are near in memory: a fifth less time for 20,000 grains
         rows = "".join(
-            f"{number} {kind} {size!r} {DENSITY!r} {x!r} {y!r} {z!r}\n"
-            for number, (kind, size, (x, y, z)) in enumerate(columns, 1)
+            f"{number + 1} {kind} {size!r} {DENSITY!r} {x!r} {y!r} {z!r}\n"
+            for number in np.argsort(centres[:, 0], kind="stable").tolist()
+            for kind, size, (x, y, z) in (grains[number],)
         )
         head = f"grains: id type diameter density x y z\n\n{len(kinds)} atoms\n4 atom types\n\n"
         return f"{head}{bounds}\nAtoms\n\n{rows}"
