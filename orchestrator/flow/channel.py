@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -30,9 +29,6 @@ class ChannelFlow(FlowCase):
     """
 
     closed: bool = False
-
-    template: ClassVar[str] = "openfoam/channel"
-    recipe: ClassVar[int] = 1
 
     @property
     def depth_m(self) -> float:

@@ -17,8 +17,8 @@ APPROACH_ERROR = 0.08
 models, whose log law is another, are within 0.07."""
 SEPARATES_FROM_DEG = 15.0
 """Slope from which the flow always separates behind the crest, and reattaches 5 to 9 h from it."""
-SHORTEST_BUBBLE = 4.8
-"""Least of these lengths, h; upwind convection gives 3.5 to 4.6."""
+SHORTEST_BUBBLE = 5.0
+"""Least of these lengths, h; upwind convection gives 3.6 to 4.6 and a part of a cell of h/3."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,20 @@ def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
     reversed.
     """
     top = stress.x_m[int(np.argmax(stress.z_m))]
-    reversed_at = stress.x_m[(stress.x_m > top) & (stress.tau_wall < 0)]
-    if not reversed_at.size:
+    faces = np.flatnonzero((stress.x_m > top) & (stress.tau_wall < 0))
+    if not faces.size:
         return None
-    ends = np.flatnonzero(np.diff(reversed_at) > height)
-    last = reversed_at[ends[0]] if ends.size else reversed_at[-1]
-    return float(reversed_at[0] - top) / height, float(last - top) / height
+    ends = np.flatnonzero(np.diff(stress.x_m[faces]) > height)
+    first, last = faces[0], faces[ends[0]] if ends.size else faces[-1]
+    begins = _without_stress(stress, first, first - 1)
+    stops = _without_stress(stress, last, min(last + 1, len(stress.x_m) - 1))
+    return (begins - top) / height, (stops - top) / height
+
+
+def _without_stress(stress: WallStress, backward: int, forward: int) -> float:
+    """Place between two faces where the stress changes its sign, m: cells of h/3 lie there."""
+    pair = [backward, forward]
+    return float(np.interp(0.0, stress.tau_wall[pair], stress.x_m[pair]))
 
 
 def to_csv(found: dict[str, Diagnostic], path: Path) -> None:

@@ -10,6 +10,15 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics.hills import MeasuredHill, measured
 from orchestrator.tables.scenes import Row
 
+WINDWARD = {
+    "ustar_foot": 0.0,
+    "ustar_quarter": 0.25,
+    "ustar_half": 0.5,
+    "ustar_three_quarters": 0.75,
+    "ustar_top": 1.0,
+}
+"""Parts of the way along the bed from the foot to the top at which u*/u*_0 is told."""
+
 
 def row(pile: Pile, cases: Path) -> Row:
     """What the solved flow of a pile is over: one row for all piles that share it."""
@@ -31,7 +40,10 @@ def row(pile: Pile, cases: Path) -> Row:
         "downstream_over_h": flow.downstream,
         "separation_over_h": bubble[0],
         "reattachment_over_h": bubble[1],
-        "ustar_top": float(np.interp(line.crest_s, stress.s_m, ustar)),
+        **{
+            name: float(np.interp(part * line.crest_s, stress.s_m, ustar))
+            for name, part in WINDWARD.items()
+        },
         "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
         "ustar_largest": float(ustar.max()),
         **_beside(measured_hill(pile)),

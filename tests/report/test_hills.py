@@ -40,6 +40,14 @@ def test_a_steep_hill_separates_where_it_was_measured_to(results: Results) -> No
     assert table["ustar_mean"].between(1.2, 1.5).all()
 
 
+def test_the_flow_slows_at_the_foot_and_gains_up_to_near_the_top(results: Results) -> None:
+    table = results.tables["flow"]
+    climb = table[["ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters"]]
+    assert (climb.diff(axis=1).iloc[:, 1:] > 0).all(axis=None)
+    assert table["ustar_foot"].between(0.3, 1).all()
+    assert (table["ustar_three_quarters"] > table["ustar_top"]).all()
+
+
 def test_computed_stands_beside_measured(results: Results) -> None:
     (figure,) = hills.draw(results)
     assert figure.canvas

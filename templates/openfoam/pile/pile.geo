@@ -1,4 +1,4 @@
-// A bed line under a boundary layer: a block of hexahedra from each of its corners to the next one,
+// A bed line under a flow: a block of hexahedra from each of its corners to the next one,
 // with vertical grid lines, one cell thick. x downstream, z upwards from the flat bed.
 Include "parameters.geo";
 Include "bed_line.geo";
@@ -9,7 +9,7 @@ Mesh.Binary = 0;
 thickness = height/10;
 // below it cells grow by `growth`, above it by `growth_far`
 near = 4*height;
-If (near > lid/2)
+If (near > lid/2 || closed)
   near = lid/2;
 EndIf
 
@@ -22,6 +22,9 @@ first_up = first_cell/Cos(slope_deg*Pi/180);
 cells_near = Ceil(Log(1 + near*(growth - 1)/first_up)/Log(growth));
 first_far = first_up*growth^cells_near;
 cells_far = Ceil(Log(1 + (lid - near)*(growth_far - 1)/first_far)/Log(growth_far));
+If (closed)
+  cells_far = cells_near;
+EndIf
 
 // the ratio at which `cells` cells, beginning with `first`, fill `length` exactly
 Macro Ratio
@@ -53,10 +56,16 @@ For i In {0:last}
     Call Ratio;
     ratio_near = ratio;
     first = first_up*ratio_near^cells_near;
+    If (closed)  // the rows at the lid are those of the bed, from above
+      first = first_up;
+    EndIf
     cells = cells_far;
     length = lid - near;
     Call Ratio;
     ratio_far = ratio;
+    If (closed)
+      ratio_far = 1/ratio;
+    EndIf
   EndIf
   Point(1 + i) = {x, 0, level};
   Point(1 + n + i) = {x, 0, lid};

@@ -1,1 +1,0 @@
-../pile/bed_line.geo
