@@ -20,6 +20,9 @@ from orchestrator.study.scene import Scene
 MARGIN = 3.0
 """From the outermost grains to the walls of the box, and from a face to the height at which a
 grain in flight is gone, diameters."""
+EARLY = 0.01
+"""Part of the grains of a poured bed that may go before the first load step: a few of many hundred
+hardly lie, and load steps from their flow on would take most of the time."""
 
 
 @dataclass(frozen=True)
@@ -133,18 +136,24 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     if bed.packing.width:
         return _flows_of_pockets(bed, ratio)
     thresholds = np.sort(bed.leaving(ratio))
-    first = thresholds[0]
+    first = going = _first(bed, thresholds)
     if not bed.bed.is_wedge:
         # a row without an edge holds its grains until they push one another out of it
-        first = min(first, bed.pivot_thresholds(ratio[bed.packing.windward])[0])
-    if not 0 < thresholds[0] < np.inf or bed.scene.forces.loaded_grains != "exposed":
+        first = min(first, _first(bed, bed.pivot_thresholds(ratio[bed.packing.windward])))
+    if not 0 < going < np.inf or bed.scene.forces.loaded_grains != "exposed":
         # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
         thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
-        first = thresholds[0]
+        first = _first(bed, thresholds)
     last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
     if not np.isfinite(last):
-        last = thresholds[np.isfinite(thresholds)].max(initial=2 * thresholds[0])
+        last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
     return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
+
+
+def _first(bed: LoadedBed, thresholds: FloatArray) -> float:
+    """The first of sorted flows; of a poured bed that of the first grain but a few."""
+    held = thresholds[thresholds > 0] if bed.pouring else thresholds
+    return float(held[int(EARLY * len(held))] if bed.pouring and len(held) else thresholds[0])
 
 
 def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:

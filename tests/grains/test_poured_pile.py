@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator import plan, tables
 from orchestrator.fidelity.decision import decide
+from orchestrator.grains import pile_case
 from orchestrator.plan import Plan
 from orchestrator.report import mixture
 from orchestrator.report.results import Results
@@ -54,6 +55,14 @@ def test_each_method_answers(finished: tuple[Plan, Path]) -> None:
     assert set(early.index) == {"pivot", "peeling", "dem"}
     assert (early > 0.005).all()
     assert (early < 0.2).all()
+
+
+def test_load_steps_begin_at_the_first_grain_that_lies(finished: tuple[Plan, Path]) -> None:
+    planned, _ = finished
+    (pile, *_) = planned.piles.values()
+    assert pile_case._first(pile, np.array([0.0, 0.1, 0.2])) == 0.1
+    many = np.concatenate([[0.0], np.arange(1.0, 401.0)])
+    assert pile_case._first(pile, many) == 5.0
 
 
 def test_each_size_class_has_its_threshold(finished: tuple[Plan, Path]) -> None:
