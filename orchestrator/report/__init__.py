@@ -26,7 +26,7 @@ LOADED_AFTER_S = 1.0
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Import what draws beside the runs of a block: after the last of them nobody waits for it."""
+    """Load what draws beside the runs of a block: after the last of them nobody waits for it."""
     with settings.own():
         pass  # matplotlib is imported here: that changes what other threads see of the environment
     timer = threading.Timer(LOADED_AFTER_S, _load)
@@ -40,7 +40,9 @@ def loading() -> Iterator[None]:
 
 def _load() -> None:
     with contextlib.suppress(Exception), settings.own():  # who draws says what does not load
-        from orchestrator.report import drawing, page  # noqa: F401
+        from orchestrator.report import drawing
+
+        drawing.warm()
 
 
 def write(

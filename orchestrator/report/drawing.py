@@ -13,8 +13,10 @@ from orchestrator.report import (
     FIGURES,
     compared,
     hills,
+    labels,
     mixture,
     overview,
+    page,
     piles,
     single,
     stress,
@@ -45,6 +47,16 @@ SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (1, (overview.draw,)),
 )
 """What is drawn in one process, the dearest first, and its place on the page."""
+
+
+def warm() -> None:
+    """Do once what every process that draws would do first: libraries, fonts, mathematics."""
+    import pyvista  # noqa: F401
+
+    figure = style.canvas(1.0)
+    figure.subplots().set(xlabel=labels.RE_AXIS, ylabel=labels.TAU_AXIS, xscale="log")
+    style.svg(figure)
+    page.template_of("page.html.j2", page.FOLDER)
 
 
 def draw(results: Results, folder: Folder) -> list[Figure]:

@@ -79,7 +79,7 @@ def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
     css, script = (Markup(_text(name)) for name in ("page.css", "page.js"))
     digest = base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
     given = {"css": css, "script": script, "script_digest": f"sha256-{digest}", **values}
-    return _template(template, folder).render(**given)
+    return template_of(template, folder).render(**given)
 
 
 @cache
@@ -88,7 +88,8 @@ def _text(name: str) -> str:
 
 
 @cache
-def _template(name: str, folder: Path) -> Template:
+def template_of(name: str, folder: Path) -> Template:
+    """A template, read once."""
     environment = Environment(
         loader=FileSystemLoader(folder),
         autoescape=True,

@@ -51,8 +51,9 @@ def prepare(
 def _extent(axes: Sequence[Axes], xlim: tuple[float, float]) -> tuple[float, float]:
     """Least and largest tau that is drawn between two Re*, of what the limits must hold."""
     marks = (*RESULT, WATER, MEASURED)
-    lines = [line.get_xydata() for ax in axes for line in ax.lines if line.get_gid() in marks]
-    xy = np.concatenate([np.asarray(line, float) for line in lines])
+    every = [(line, str(line.get_gid())) for ax in axes for line in ax.lines]
+    chosen = [line.get_xydata() for line, gid in every if gid in marks or gid.startswith(AIR)]
+    xy = np.concatenate([np.asarray(line, float) for line in chosen])
     tau = xy[(xy[:, 0] >= xlim[0]) & (xy[:, 0] <= xlim[1]), 1]
     return float(np.nanmin(tau)), float(np.nanmax(tau))
 

@@ -110,5 +110,5 @@ def _map(ax: Axes, results: Results, scene_id: str, h: float) -> None:
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_formatter("")
-    ax.set(xlabel="$x/h$ from the first foot", ylabel=r"$u^\star_0$ at which it goes, m/s")
+    ax.set(xlabel="$x/h$ from the first foot", ylabel=r"goes at $u^\star_0$, m/s")
     ax.figure.colorbar(dots, ax=ax, location="bottom", aspect=60, label="$n/N$ by then")

@@ -310,3 +310,15 @@ def test_piles_in_water_are_held_against_the_shields_curve(results: Results) -> 
     (ax,) = drawn(piles.extended(wet))["extended-shields-d30"]
     assert marked(ax, shields.WATER)
     assert marked(ax, shields.MEASURED)
+
+
+def test_a_curve_that_the_legend_names_is_within_the_frame(results: Results) -> None:
+    figure = next(piles.extended(only(results, "pile")))
+    (ax,) = drawn([figure])[figure.name]
+    (curve,) = marked(ax, "air: Shao & Lu 2000")
+    x, y = np.asarray(curve.get_xydata(), float).T
+    left, right = ax.get_xlim()
+    inside = y[(x > left) & (x < right)]
+    assert len(inside)
+    low, high = ax.get_ylim()
+    assert low < inside.min() <= inside.max() < high

@@ -62,8 +62,10 @@ def sampled(pile: Pile, cases: Path, window: Window, unit: float) -> FloatArray:
 
 
 def _frame(results: Results, piles: list[Pile]) -> Canvas:
-    window = _window(piles)
-    figure = style.canvas(1.5 * len(piles) + 0.8)
+    window = left, right, bottom, top = _window(piles)
+    # as high as to scale, with a title over each panel
+    panel = 0.4 + 0.9 * style.WIDTH * (top - bottom) / (right - left)
+    figure = style.canvas(panel * len(piles) + 0.9)
     axes = list(figure.subplots(len(piles), 1, sharex=True, squeeze=False)[:, 0])
     for ax, pile in zip(axes, piles, strict=True):
         velocity = sampled(pile, results.cases, window, pile.bed.height)
