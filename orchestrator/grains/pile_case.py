@@ -24,6 +24,9 @@ EARLY = 0.01
 """Part of the grains of a poured bed that may go before the first load step: a few of many hundred
 hardly lie, and load steps from their flow on would take most of the time."""
 
+IN_SPACE = 5.0
+"""Cost of a grain in space over that of one in a plane: of contacts, and of fixed grains around."""
+
 
 @dataclass(frozen=True)
 class PileCase(GrainCase):
@@ -70,7 +73,7 @@ class PileCase(GrainCase):
         most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
         length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
         layers = min(self.loaded.bed.mobile_layers, most) + 3
-        grains = length * layers * (self.loaded.bed.width or 1)
+        grains = length * layers * (IN_SPACE * self.loaded.bed.width or 1)
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
         return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
 
@@ -168,7 +171,8 @@ def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
             remedy="a longer or wider bed, or another bed.seed",
         )
     last = held[min(int(rules.final_fraction * len(thresholds)), len(held) - 1)]
-    return protocol.flows(protocol.START * held[0], protocol.BEYOND * last, rules.load_increment)
+    first = held[int(EARLY * len(held))]
+    return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
 
 
 def flows_from(reached: float, bed: LoadedBed, ratio: FloatArray, there: BoolArray) -> FloatArray:

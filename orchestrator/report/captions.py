@@ -310,8 +310,9 @@ def bed(results: Results, pile: Pile) -> str:
         if pile.scene.protocol.update
         else ""
     )
+    strip = f"all rows of a strip of {pile.bed.width:g} d from the side, " * bool(pile.bed.width)
     return (
-        f"After Fig. 13 of the paper. Grains {when}; orange: {moved}; pale "
+        f"After Fig. 13 of the paper. Grains {strip}{when}; orange: {moved}; pale "
         "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. The shade of blue is "
         "the speed of the flow by OpenFOAM over the whole pile, over that at the lid; it does not "
         f"see the grains. {wears}d is one diameter. {_pile(results, pile)}"

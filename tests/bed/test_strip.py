@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 WIDTH, DEPTH, SURFACE = 4.0, 4.0, 0.5 + 1 / 30
 INNER = 6.0
 """Half the length that is away from the walls, d."""
-LOOSE, CLOSE = 0.55, 0.64
+LOOSE, CLOSE = 0.536, 0.634
 """Volume fractions of random packings of equal frictional spheres: the loosest and the closest (C.
 Song, P. Wang, H. A. Makse, Nature 453, 2008, doi:10.1038/nature06981), whose grains have 4 to 6
 contacts."""

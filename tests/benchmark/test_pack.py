@@ -16,6 +16,8 @@ from orchestrator.benchmark.export import export
 from orchestrator.benchmark.problem import EXPECTED
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
+from orchestrator.runs.claim import STUDY
+from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from tests.benchmark.conftest import ROOT
@@ -267,3 +269,21 @@ def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
         assert "Traceback" not in ended.stderr
         assert all(word in ended.stderr for word in words), ended.stderr
     assert (tmp_path / "mine" / "thesis.tex").is_file()
+
+
+@pytest.mark.parametrize(
+    ("fields", "named"),
+    [
+        ('bed.packing = "poured"\nbed.width = 5.0', "bed.width"),
+        ("protocol.update = 0.1", "protocol.update"),
+    ],
+)
+def test_beds_that_no_pack_holds_are_refused(fields: str, named: str, tmp_path: Path) -> None:
+    text = f'grain.diameter = 1e-3\nbed.kind = "pile"\nbed.slope_deg = 20.0\n{fields}\n'
+    text += 'protocol.method = "dem"\nflow.first_cell_height = 1e-3\n'
+    space = Workspace(tmp_path)
+    space.root.mkdir(exist_ok=True)
+    with space.held(STUDY, "held"):
+        space.describe(STUDY, "held", [], study=text, tolerance=None)
+    with pytest.raises(InputError, match=named):
+        export(tmp_path / "pack", tmp_path, ())

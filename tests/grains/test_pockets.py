@@ -68,7 +68,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
         width=WIDTH,
     )
     grain = Grain(diameter=d, stiffness=1e4)
-    rules = Protocol(load_increment=0.002, waiting_time=3.0)
+    rules = Protocol(load_increment=0.002, waiting_time=8.0)
     rising = protocol.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
     weight = 2500.0 * np.pi / 6 * d**3 * 9.81
     numbers = {
