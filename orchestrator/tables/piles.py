@@ -190,7 +190,7 @@ def _levels(decision: Decision) -> Row:
 
 
 def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
-    """What the load steps and the count enclose; at least the known error, as a factor both ways."""
+    """What load steps and count enclose; at least the known error, as a factor both ways."""
     return {
         "shields_low": shields(scene, min(found.tau_low, found.tau / (1 + error))),
         "shields_high": shields(scene, max(found.tau_high, found.tau * (1 + error))),
