@@ -56,8 +56,12 @@ class Results:
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
     def shown(self, scene_id: str) -> Pile:
-        """The pile that shows how a scene's grains move: where DEM only checked it, the check."""
-        return self.plan.checks.get(scene_id, self.plan.piles[scene_id])
+        """The pile that shows how a scene's grains move: where DEM only checked it, the check.
+
+        A check that has not run, or failed, shows nothing.
+        """
+        check = self.plan.checks.get(scene_id)
+        return check if check and self.has_files(check) else self.plan.piles[scene_id]
 
     def asked(self, pile: Pile) -> pd.Series:
         """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""

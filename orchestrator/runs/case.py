@@ -245,10 +245,11 @@ def size(directory: Path, state: Mapping[str, Any]) -> int:
 
 
 def is_whole(case: Case, cases: Path) -> bool:
-    """Whether a finished case has all of its files: nothing was pruned, or a rerun made it anew."""
+    """Whether a case is done and has all of its files: none was pruned, or a rerun made it anew."""
     state = read_json(cases / case.name / DONE)
-    pruned = state.get("pruned", []) if isinstance(state, dict) else []
-    return all((cases / case.name / name).is_file() for name in pruned)
+    if not isinstance(state, dict):
+        return False
+    return all((cases / case.name / name).is_file() for name in state.get("pruned", []))
 
 
 def names_in(cases: Path) -> list[str]:

@@ -130,6 +130,16 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 
+def test_a_check_that_did_not_run_shows_nothing(results: Results) -> None:
+    ((scene_id, pile),) = results.plan.piles.items()
+    rules = pile.scene.protocol.model_copy(update={"load_increment": 0.07})
+    other = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+    failed = replace(results, plan=replace(results.plan, checks={scene_id: other}))
+    assert not failed.has_files(other)
+    assert failed.shown(scene_id) is pile
+    assert list(bed.chosen(failed)) == [pile]
+
+
 def test_a_bed_without_results_has_no_picture(results: Results) -> None:
     assert list(bed.draw(only(results, "grain"))) == []
     none = replace(results, tables={**results.tables, "pile_threshold": pd.DataFrame()})
