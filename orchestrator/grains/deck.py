@@ -25,6 +25,7 @@ MEANING = {
     "waiting_time": "a load step ends when nothing has passed for this long, sqrt(d/g')",
     "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
     "settle": "time before the first load step, sqrt(d/g')",
+    "settle_drag": "of a still fluid in that time, m sqrt(g/d)",
     "displacement_criterion": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
     "away": "displacement along the bed from which on a counted grain is gone, d",

@@ -213,7 +213,7 @@ def _numbers(bed: LoadedBed, grains: GrainTable, enough: int) -> dict[str, float
         "density": bed.scene.grain.density,
         "gravity": bed.scene.reduced_gravity,
         **protocol.contact(bed.scene.grain, rules),
-        **protocol.raising(rules, enough),
+        **protocol.raising(rules, enough, is_poured=bed.scene.is_poured),
         "slope": slope,
         "ceiling_x": ridge[0] * d,
         "ceiling_z": ridge[1] * d,

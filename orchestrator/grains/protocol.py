@@ -13,6 +13,9 @@ SAMPLING_INTERVAL = 0.5
 """Time between two samples of the grains, sqrt(d/g')."""
 SETTLE = 10.0
 """Time in which the bed settles before the first load step, sqrt(d/g')."""
+POURED_DRAG = 2.0
+"""Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be softer than
+those of the pouring, and without a drag a pile of 25 degrees was not at rest at the end."""
 SETTLE_FLOW = math.sqrt(0.5)
 """Flow of the settling over that of the first load step: about half of its force. Without any, a
 bed at its limiting slope would not come to rest."""
@@ -52,7 +55,7 @@ def flows(first: float, last: float, step: float) -> FloatArray:
     return np.concatenate([[SETTLE_FLOW * first], rising])
 
 
-def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
+def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict[str, float | int]:
     """How the deck waits at a load step, looks at the grains and goes on to the next.
 
     Parameters
@@ -61,11 +64,14 @@ def raising(protocol: Protocol, enough: int) -> dict[str, float | int]:
         Of the scene.
     enough : int
         The sequence of load steps ends early when no more than this many grains still lie.
+    is_poured : bool
+        Whether the bed was poured, and so on springs of its own.
     """
     return {
         "waiting_time": protocol.waiting_time,
         "sampling_interval": SAMPLING_INTERVAL,
         "settle": SETTLE,
+        "settle_drag": POURED_DRAG if is_poured else 0.0,
         "displacement_criterion": protocol.displacement_criterion,
         "stir": STIR,
         "away": AWAY,
