@@ -3,7 +3,7 @@
 import contextlib
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -85,16 +85,24 @@ def _parts(folder: Folder) -> list[list[Figure]]:
     context = multiprocessing.get_context("fork")
     workers = min(os.cpu_count() or 1, len(SECTIONS))
     for _ in range(retry.MOST):
-        with (
-            contextlib.suppress(BrokenProcessPool),
-            ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),)) as pool,
-        ):
-            return list(pool.map(_section, range(len(SECTIONS)), [folder] * len(SECTIONS)))
+        pool = ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),))
+        # no `pool.map`: it cancels what a pool that is killed then ends, which prints a traceback
+        with contextlib.suppress(BrokenProcessPool), _closed(pool):
+            drawn = [pool.submit(_section, number, folder) for number in range(len(SECTIONS))]
+            return [one.result() for one in drawn]
     raise OrchestratorError(
         "a process that draws figures was killed",
         where=str(folder.root),
         remedy="out of memory? `orchestrator report` draws them again",
     )
+
+
+@contextlib.contextmanager
+def _closed(pool: ProcessPoolExecutor) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 _shared: list[Results] = []

@@ -237,13 +237,17 @@ def _workers(driver: int, folder: Path) -> list[int]:
     return found
 
 
-def test_the_whole_session_gets_the_users_interrupt(pile: Bench, ledger: Ledger) -> None:
-    with ledger.fault("SIGINT to all", "figures"):
+@pytest.mark.parametrize("number", [INT, TERM])
+def test_the_whole_session_is_asked_to_end(
+    pile: Bench, ledger: Ledger, number: signal.Signals
+) -> None:
+    with ledger.fault(f"{number.name} to all", "figures"):
         seen, after = STAGES["figures"]
         driver = _stopped(pile, (), seen, after)
-        os.killpg(driver.pid, signal.SIGINT)
+        os.killpg(driver.pid, number)
         os.killpg(driver.pid, signal.SIGCONT)
         code, said = ended(driver)
         assert code == 130, said
+        assert "Traceback" not in said, said
         assert none_left_in(pile.folder)
         pile.check_finished()
