@@ -102,7 +102,8 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
     listed = list(classes.classes(pile.packing.sizes[pile.packing.windward]))
     for fraction in scene.protocol.fractions:
         found = {one.number: _of_class(answer, one, fraction) for one in listed}
-        middle = found[0]["shields_own"] if 0 in found else np.nan
+        # a class whose first grains lie loose has a threshold of zero, which hides nothing
+        middle = (found[0]["shields_own"] if 0 in found else np.nan) or np.nan
         whole = threshold.first_level(answer.motion, fraction)
         for one in listed:
             moved = answer.motion.moved_by(whole or 0)[one.chosen]

@@ -134,6 +134,8 @@ def known(found: pd.DataFrame) -> pd.DataFrame:
 def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
     for scene_class, alike in table.groupby(f"class_{part}", sort=True):
         by_level = {level: rows.set_index("scene_id") for level, rows in alike.groupby(name)}
+        # a flow that is finer still is run on small piles alone; other grains on every one
+        unsure = None if part == "flow" else alike.iloc[:0]
         # without the reference nothing is known of the others
         for level, rows in by_level.items() if dearest in by_level else ():
             for column in _columns(table, TAU):
@@ -143,17 +145,20 @@ def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str)
                     "scene_class": scene_class,
                     "fraction": float(column[len(TAU) :]),
                     "error": _shift(rows, by_level[dearest], column),
-                    "uncertainty": _shift(by_level.get(again), by_level[dearest], column),
+                    "uncertainty": _shift(by_level.get(again, unsure), by_level[dearest], column),
                     "cost_core_s": float(rows[f"{part}_s"].mean()),
                     "scenes": len(rows),
                 }
 
 
 def _shift(own: pd.DataFrame | None, reference: pd.DataFrame, column: str) -> float:
-    """The largest relative difference over the scenes that both have."""
+    """The largest relative difference over the scenes that both have; infinite if there is none."""
     if own is None:
         return 0.0
-    value, base = own[column], reference[column].reindex(own.index)
+    both = own.index.intersection(reference.index)
+    if both.empty:
+        return math.inf
+    value, base = own.loc[both, column], reference.loc[both, column]
     # where neither reaches the fraction they agree; where one does, they could not differ more
     apart = (value / base - 1).abs().fillna(math.inf).where(value.notna() | base.notna(), 0.0)
     return float(apart.max())
