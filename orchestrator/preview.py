@@ -48,7 +48,8 @@ def _cases(planned: Plan, missing: Sequence[Case], workers: int) -> Iterator[str
         yield f"  {kind}: {count}, {todo[kind]} to run"
     costs = {one.name: one.cost_s for one in missing}
     # no chain of cases takes less than its own time, however many run beside it
-    chains = (one.cost_s + sum(costs.get(need.name, 0.0) for need in one.needs) for one in missing)
+    walls = {one.name: one.cost_s / min(one.ranks, workers) for one in missing}
+    chains = (sum(walls.get(each.name, 0.0) for each in (one, *one.needs)) for one in missing)
     runs = max(sum(costs.values()) / workers, max(chains, default=0.0))
     size = sum(BYTES.get(one.kind, OTHERS) for one in missing)
     yield (

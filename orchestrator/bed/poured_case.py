@@ -100,8 +100,13 @@ class PouredBed(Case):
 
     @property
     def cost_s(self) -> float:
-        """Expected wall time, s: 15,000 steps at 6e6 grain-steps a second."""
+        """Expected time of one core, s: 15,000 steps at 6e6 grain-steps a second."""
         return 1 + self.mould.count(self._mean) * 15_000 / 6e6
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with."""
+        return liggghts.ranks(self.mould.count(self._mean))
 
     def check_size(self) -> None:
         """See that the mould does not take more grains than a machine bears.
@@ -127,7 +132,7 @@ class PouredBed(Case):
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
-        return {liggghts.PROGRAM: liggghts.version()}
+        return liggghts.programs(self.ranks)
 
     @cached_property
     def _grains(self) -> tuple[FloatArray, FloatArray]:
@@ -152,6 +157,7 @@ class PouredBed(Case):
             "downstream": end * DIAMETER,
             "most_looks": MOST_LOOKS,
             "width": self.width,
+            "ranks": self.ranks,
         }
         lines = [
             f"variable        {name} equal {value!r}  # {MEANING[name]}\n"
@@ -249,5 +255,6 @@ MEANING = {
     "drag": "of each stage: of the still fluid, m sqrt(g/d)",
     "calm": "of each stage: kinetic energy of a grain with which it ends, W d",
     "width": "of a strip with periodic sides, d; 0: all grains in one plane",
+    "ranks": "processes that share the grains; Allrun reads it",
 }
 """Parameters of the deck, with their units."""

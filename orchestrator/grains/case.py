@@ -19,7 +19,7 @@ class GrainCase(Case):
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
-        return {liggghts.PROGRAM: liggghts.version()}
+        return liggghts.programs(self.ranks)
 
     def share(self, directory: Path) -> float:
         """Load steps that have begun over those that there may be."""

@@ -53,7 +53,7 @@ class SingleGrainCase(GrainCase):
 
     @property
     def cost_s(self) -> float:
-        """Expected wall time, s."""
+        """Expected time of one core, s."""
         rules = self.scenes[0].protocol
         load_steps = np.log(1.02 / protocol.START) / np.log1p(rules.load_increment)
         return protocol.run_cost_s(load_steps, 3 * len(self.scenes), rules, self._grain.stiffness)

@@ -62,8 +62,8 @@ def count(
 def deck_counts(
     travel: FloatArray, criterion: float, aside: FloatArray | float = 0.0
 ) -> tuple[IntArray, IntArray]:
-    """What the deck prints at each sample, shape (T,): grains short of the criterion; fallen."""
-    lying = ~np.isnan(travel) & ~_moved(travel, aside, criterion)
+    """What the deck prints at each sample, shape (T,): grains that have not moved; fallen."""
+    lying = ~np.isnan(travel) & ~_ever(_moved(travel, aside, criterion))
     return lying.sum(axis=1), (travel <= -criterion).sum(axis=1)
 
 

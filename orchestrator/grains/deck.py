@@ -35,6 +35,7 @@ MEANING = {
     "ceiling_z": "its height, m",
     "behind": "place along x behind which every grain is gone, m",
     "width": "of a strip with periodic sides, d; 0: all grains in one plane",
+    "ranks": "processes that share the grains; Allrun reads it",
 }
 """Parameters of the deck, with their units."""
 
@@ -95,6 +96,7 @@ def write(
     flows: FloatArray,
     force: FloatArray,
     margin: float,
+    ranks: int = 1,
 ) -> None:
     """Write the grains, parameters, flows and forces of a deck.
 
@@ -112,10 +114,12 @@ def write(
         The flow's force on each grain at these flows, N; only pushed grains feel one.
     margin : float
         Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
+    ranks : int
+        Processes that share the grains.
     """
     (directory / "grains.data").write_text(_data_file(grains, margin))
     # float() because a numpy number's repr is not one that the deck could read
-    given = {**parameters, "width": grains.width}
+    given = {**parameters, "width": grains.width, "ranks": ranks}
     numbers = {k: v if isinstance(v, int) else float(v) for k, v in given.items()}
     lines = (
         f"variable        {name} equal {value!r}  # {MEANING[name]}\n"

@@ -15,6 +15,7 @@ from orchestrator.grains.loaded_bed import FloatArray, LoadedBed
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.wear import BoolArray, Worn, WornFlow
 from orchestrator.runs.case import Case
+from orchestrator.solvers import liggghts
 from orchestrator.study.scene import Scene
 
 MARGIN = 3.0
@@ -46,7 +47,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 10
+    recipe: ClassVar[int] = 11
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, wear.GRAINS)
 
     @cached_property
@@ -67,15 +68,25 @@ class PileCase(GrainCase):
 
     @property
     def cost_s(self) -> float:
-        """Expected wall time, s."""
-        rules, line = self.scene.protocol, self.loaded.line
+        """Expected time of one core, s."""
+        rules = self.scene.protocol
+        load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
+        return protocol.run_cost_s(load_steps, self._size, rules, self.scene.grain.stiffness)
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with."""
+        return liggghts.ranks(self._size)
+
+    @property
+    def _size(self) -> int:
+        """How many grains of the plane make the deck as dear, about; known before any is poured."""
+        line = self.loaded.line
         # the whole pile is half its rows thick on average
         most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
         length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
         layers = min(self.loaded.bed.mobile_layers, most) + 3
-        grains = length * layers * (IN_SPACE * self.loaded.bed.width or 1)
-        load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
-        return protocol.run_cost_s(load_steps, int(grains), rules, self.scene.grain.stiffness)
+        return int(length * layers * (IN_SPACE * self.loaded.bed.width or 1))
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
@@ -89,7 +100,7 @@ class PileCase(GrainCase):
         force = bed.loading(ratio).in_steps(rising.tolist())
         grains, margin = table(bed, ratio, worn), MARGIN * self.scene.grain.diameter
         numbers = _numbers(bed, grains, self._enough(bed))
-        deck.write(directory, grains, numbers, rising, force, margin=margin)
+        deck.write(directory, grains, numbers, rising, force, margin=margin, ranks=self.ranks)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each windward grain did to ``motion.csv``."""

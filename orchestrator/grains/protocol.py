@@ -80,7 +80,7 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
 
 
 def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
-    """Expected wall time of a deck, s: holds of twice the waiting time, 4.5e7 grain-steps a second.
+    """Expected time of one core, s: holds of twice the waiting time, 4.5e7 grain-steps a second.
 
     Of piles of 30 to 770 counted grains and of 150 single ones on one core: holds are shorter and
     steps dearer than that.

@@ -130,7 +130,7 @@ class WornFlow(Case):
 
     @property
     def cost_s(self) -> float:
-        """Expected wall time, s: that of the whole pile."""
+        """Expected time of one core, s: that of the whole pile."""
         return self.loaded.flow.cost_s
 
     def versions(self) -> dict[str, str]:

@@ -64,7 +64,12 @@ class Case(ABC):
     @property
     @abstractmethod
     def cost_s(self) -> float:
-        """Expected wall time on one core, s: for ordering and for the time left, nothing else."""
+        """Expected time of one core, s: for ordering and for the time left, nothing else."""
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with, and so the cores that it takes."""
+        return 1
 
     def share(self, directory: Path) -> float:
         """Share of its work that a running case has done, 0 to 1; 0 where that is not known."""

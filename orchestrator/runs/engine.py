@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,7 @@ from orchestrator.runs import case as case_states
 from orchestrator.runs import process, retry
 from orchestrator.runs.agenda import Agenda
 from orchestrator.runs.case import Case
+from orchestrator.runs.cores import Cores
 
 POLL_S = 0.2
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -78,7 +79,7 @@ class Pool:
 def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     """Threads of this process, each with one solver at a time.
 
-    While `workers` solvers run, other threads prepare the next cases and read what the last ones
+    While solvers hold all cores, other threads prepare the next cases and read what the last ones
     left, so that no solver waits for Python. An exception ends all children before it goes on.
 
     Parameters
@@ -86,12 +87,12 @@ def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     cases : Path
         The directory of the study's cases.
     workers : int
-        How many solvers run at a time.
+        How many cores the solvers take, most of them one each.
     limit_s : float
         Wall time after which a run counts as hung, s.
     """
-    stop, turn = threading.Event(), threading.BoundedSemaphore(workers)
-    task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, turn=turn)
+    stop = threading.Event()
+    task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, cores=Cores(workers))
     places = 2 * workers
     with concurrent.futures.ThreadPoolExecutor(places, thread_name_prefix="case") as threads:
         try:
@@ -107,7 +108,7 @@ def execute(
     cases: Path,
     limit_s: float,
     stop: threading.Event | None = None,
-    turn: AbstractContextManager[object] = nullcontext(),  # noqa: B008 - it holds nothing
+    cores: Cores | None = None,
 ) -> float:
     """Run one case from its inputs to its marker of being done, and return what it took, s.
 
@@ -121,8 +122,8 @@ def execute(
         Wall time after which the run counts as hung, s.
     stop : threading.Event, optional
         Set by another thread to end the run early.
-    turn : context manager, optional
-        Held while the solver runs; the wait for it is not counted.
+    cores : Cores, optional
+        Those that the solver takes while it runs; the wait for them is not counted.
 
     Raises
     ------
@@ -136,7 +137,7 @@ def execute(
     directory = case_states.prepare(case, cases)
     outside_s = time.monotonic() - began
     try:
-        with turn:
+        with cores.held(case.ranks) if cores else nullcontext():
             ended = retry.run(
                 ["sh", "Allrun"],  # a disk may forbid to run files, or know no right to
                 cwd=directory,

@@ -97,7 +97,7 @@ class Forecast:
     todo : collection of Case
         All that is to be run.
     workers : int
-        How many run at a time.
+        Cores that the runs share.
     after_s : float
         What is known to follow the last run, s.
     """
@@ -124,7 +124,7 @@ class Forecast:
         self._left[kind] -= cost
         if not outcome.error:
             self._ended[kind] += cost
-            self._took[kind] += outcome.seconds
+            self._took[kind] += outcome.seconds * outcome.case.ranks
 
     @property
     def done(self) -> float:

@@ -21,6 +21,8 @@ ENVIRONMENT = {
 of a machine that resolves nowhere; without the last it looks for fast networks for 0.2 s. Without
 the second all such processes of a user share a directory, which one may remove while another
 starts: of 2000 short runs, four at a time, 16 failed."""
+MANY = 5000
+"""Grains from which on two processes share them: 29,000 of them are poured in half the time."""
 LAST_WORDS = "the protocol has ended"
 
 
@@ -57,6 +59,27 @@ def _judge(number: tuple[int, int], path: str) -> None:
             f"{path} is version {number[0]}.{number[1]}; the decks were tried with 3.8",
             stacklevel=3,
         )
+
+
+def ranks(grains: float) -> int:
+    """Processes that share the grains of a deck: by their number, whatever the machine has.
+
+    Other processes sum in another order, and a bed of many grains is then another one.
+    """
+    return 2 if grains >= MANY else 1
+
+
+def programs(ranks: int) -> dict[str, str]:
+    """The programs that run a deck with so many processes, with their versions.
+
+    Raises
+    ------
+    SolverError
+        If one is missing.
+    """
+    if ranks > 1:
+        program.find("mpirun", remedy="install it: apt-get install openmpi-bin")
+    return {PROGRAM: version()}
 
 
 def check_log(directory: Path, last_words: str = LAST_WORDS) -> None:

@@ -90,6 +90,13 @@ def test_the_rule_is_latched_and_nobody_is_both_moved_and_not(
     assert (found.moved >= found.carried).all()
 
 
+def test_a_grain_that_rocks_about_the_criterion_has_moved_once() -> None:
+    rocks, lies = [0.29, 0.31, 0.29, 0.31, 0.29], [0.0] * 5
+    lying, fallen = counting.deck_counts(np.array([rocks, lies]).T, 0.3)
+    assert lying.tolist() == [2, 1, 1, 1, 1]
+    assert fallen.tolist() == [0] * 5
+
+
 def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     asked = study.parse(LIFT_OFF, name="lift", where="lift")
     ended = pipeline.run(asked, tmp_path, workers=1)

@@ -1,8 +1,10 @@
 """What the decks are given: forces of the grains, files that LIGGGHTS reads."""
 
+import contextlib
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +83,7 @@ def test_files_hold_every_digit(tmp_path: Path) -> None:
         ["variable", "diameter", "equal", "0.001"],
         ["variable", "enough", "equal", "7"],
         ["variable", "width", "equal", "0.0"],
+        ["variable", "ranks", "equal", "1"],
     ]
     flows = (tmp_path / "load_steps.txt").read_text().splitlines()
     assert [float(line) for line in flows] == load_steps.tolist()
@@ -115,6 +118,59 @@ def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
     # MPI's own would be made here, and removed while another run starts
     subprocess.run(["./Allrun"], cwd=copy, check=True, env={**os.environ, "TMPDIR": str(shared)})
     assert shared.stat().st_mtime_ns == untouched
+
+
+def _shared(copy: Path, ranks: int) -> None:
+    """Let some processes share the template's grains."""
+    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    numbers = copy / "parameters.liggghts"
+    numbers.write_text(numbers.read_text().replace("ranks equal 1 ", f"ranks equal {ranks} "))
+
+
+def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":
+    """Grains that lie at the end of each load step; the results."""
+    subprocess.run(["./Allrun"], cwd=copy, check=True)
+    rows = [row.split(",") for row in (copy / "samples.csv").read_text().splitlines()[1:]]
+    lying = {row[0]: row[3] for row in rows}
+    return list(lying.values()), [
+        (copy / name).read_bytes() for name in ("samples.csv", "passage.dump", "bed.dump")
+    ]
+
+
+def test_processes_that_share_the_grains_find_the_same(tmp_path: Path) -> None:
+    for name, ranks in (("one", 1), ("two", 2), ("again", 2)):
+        _shared(tmp_path / name, ranks)
+    alone, _ = _solve(tmp_path / "one")
+    shared, results = _solve(tmp_path / "two")
+    assert "2 by 1 by 1 MPI processor grid" in (tmp_path / "two" / "log.liggghts").read_text()
+    assert shared == alone
+    assert _solve(tmp_path / "again")[1] == results
+
+
+def _at_work_in(folder: Path) -> list[int]:
+    """Processes whose working directory is a folder."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if (process / "cwd").resolve() == folder.resolve():
+                found.append(int(process.name))
+    return found
+
+
+def test_processes_that_share_the_grains_die_with_their_shell(tmp_path: Path) -> None:
+    _shared(tmp_path / "bed", 2)
+    numbers = tmp_path / "bed" / "parameters.liggghts"
+    numbers.write_text(numbers.read_text().replace("time_step equal 0.2", "time_step equal 2e-4"))
+    shell = subprocess.Popen(["./Allrun"], cwd=tmp_path / "bed")
+    deadline = time.monotonic() + 60
+    while len(_at_work_in(tmp_path / "bed")) < 4 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert len(_at_work_in(tmp_path / "bed")) >= 4
+    shell.kill()
+    shell.wait()
+    while _at_work_in(tmp_path / "bed") and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert _at_work_in(tmp_path / "bed") == []
 
 
 def test_ids_of_the_counted_grains() -> None:

@@ -1,0 +1,31 @@
+# Read by Allrun: `solve DECK` runs a deck with as many processes as parameters.liggghts says.
+
+# a solver must not outlive the shell that started it
+bound=
+setpriv --pdeathsig KILL true 2>/dev/null && bound="setpriv --pdeathsig KILL"
+
+# no search for fast networks, which takes 0.2 s
+export OMPI_MCA_pml=ob1
+
+solve() {
+    ranks=$(sed -n 's/^variable *ranks equal \([0-9]*\).*/\1/p' parameters.liggghts)
+    # unbuffered, or the message of an error is lost with the process
+    run="$bound stdbuf -o0 liggghts -in $1 -nocite -log none"
+    if [ "${ranks:-1}" -eq 1 ]; then
+        # one process needs no MPI daemon: where the machine's own name resolves nowhere, it would
+        # wait 5 s; nor a directory that it shares with others, one of which may remove it while
+        # this one starts
+        export OMPI_MCA_ess_singleton_isolated=1 OMPI_MCA_orte_create_session_dirs=0
+        $run
+        return
+    fi
+    # all on this machine, in a container too, as root too
+    export OMPI_MCA_plm=isolated OMPI_MCA_btl_vader_single_copy_mechanism=none
+    export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+    # a directory that no other run may remove
+    own=$(mktemp -d) || return
+    OMPI_MCA_orte_tmpdir_base=$own $bound mpirun --oversubscribe --bind-to none -np "$ranks" $run
+    ended=$?
+    rm -rf "$own"
+    return $ended
+}
