@@ -46,7 +46,7 @@ def threshold(
     diameter : array_like
         d, m.
     density, fluid_density : array_like
-        Of grain and fluid, kg/m3.
+        Densities of grain and fluid, kg/m3.
     viscosity : array_like
         Kinematic, m2/s.
     slope_deg, entrainment_angle_deg : array_like
@@ -54,11 +54,11 @@ def threshold(
     roughness : array_like or str
         Roughness length z0, m, or a part of the diameter such as ``d/10``.
     lift_coefficient : array_like
-        Of Saffman's lift.
+        Coefficient of Saffman's lift.
     gravity : array_like
         m/s2.
     depth : array_like, optional
-        Of a liquid, m: for its mean velocity.
+        Depth of a liquid, m: for its mean velocity.
     law : str or None
         A force law, or ``paper`` for the paper's rule; None: every law.
 

@@ -23,7 +23,7 @@ class Card:
     Attributes
     ----------
     title : str
-        Of the study.
+        Title of the study.
     link : str
         To its page, relative to the gallery.
     says : tuple of str

@@ -65,7 +65,7 @@ def run(
     workers : int
         Cases at a time.
     queue : Queue, optional
-        Of the cluster that runs them; without it, this machine does.
+        Queue of the cluster that runs them; without it, this machine does.
     guests : sequence of callable
         Whoever may add to the page.
 

@@ -62,7 +62,7 @@ def cover(
     Parameters
     ----------
     line : BedLine
-        Of the flow, diameters.
+        Bed line of the flow, diameters.
     ground : BedLine
         The same without obstacles.
     counts : {"windward", "all"} or (float, float)

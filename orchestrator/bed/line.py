@@ -142,7 +142,7 @@ class BedLine:
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """The segment nearest to each of m points, and the arc length of the nearest place on it.
 
-        Of two that are as near the one further up counts: the face, where it meets the flat bed.
+        If two are as near, the one further up counts: the face, where it meets the flat bed.
         """
         order = np.argsort(points[:, 0], kind="stable")
         chosen, arc_length = np.empty(len(points), np.int64), np.empty(len(points))

@@ -17,7 +17,7 @@ SIDE_DEG = 75.0
 FENCE = 0.1
 """Thickness of a fence at its top, of its height."""
 CHORDS = 16
-"""Of a half-cylinder."""
+"""Chords of a half-cylinder."""
 
 
 def with_obstacles(line: BedLine, obstacles: Sequence[Obstacle]) -> BedLine:

@@ -19,8 +19,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 TIE = 1e-6
-"""Of a diameter: neighbours of a lattice lie exactly on the limits below, and a tie must not be
-decided by round-off."""
+"""Part of a diameter: neighbours of a lattice lie exactly on the limits below, and round-off must
+not decide a tie."""
 APRON = 10.0
 """Length of the fixed flat bed beyond each toe, diameters."""
 STRAY = 0.1
@@ -55,7 +55,7 @@ class Packing:
     across : ndarray, shape (n,), or 0
         y of each centre; 0 in one plane.
     width : float
-        Of a strip with periodic sides; 0 in one plane.
+        Width of a strip with periodic sides; 0 in one plane.
     """
 
     centres: FloatArray
@@ -93,7 +93,7 @@ def pile(
     Parameters
     ----------
     line : BedLine
-        Of the flow, diameters.
+        Bed line of the flow, diameters.
     entrainment_angle_deg : float
         beta of the lattice.
     gap : float
@@ -103,9 +103,9 @@ def pile(
     mobile_layers : int
         Layers of the windward face that may move.
     disorder : float
-        Of a disordered packing: largest gap in the row below the mobile ones, diameters.
+        Largest gap in the row below the mobile ones of a disordered packing, diameters.
     seed : int
-        Of a disordered packing: which of the many. Of a lattice: itself, or which of its replicas.
+        Chooses one disordered packing of many; on a lattice 0 is itself, others are its replicas.
     """
     beta = np.radians(entrainment_angle_deg)
     surface = 0.5 + gap

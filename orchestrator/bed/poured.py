@@ -39,9 +39,9 @@ def read(
     Parameters
     ----------
     directory : Path
-        Of the case `PouredBed`.
+        Directory of the case `PouredBed`.
     line : BedLine
-        Of the flow, d.
+        Bed line of the flow, d.
     counts : {"windward", "all"} or (float, float)
         Which exposed grains are counted: those of segments that rise, all, or a range of x.
     surface : float
@@ -49,7 +49,7 @@ def read(
     mobile_layers : int
         Layers of the forms that may move.
     width : float
-        Of a strip with periodic sides; 0 in one plane.
+        Width of a strip with periodic sides; 0 in one plane.
     """
     rows = pd.read_csv(directory / BED)
     centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)

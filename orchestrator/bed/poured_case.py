@@ -25,18 +25,18 @@ DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
 CONTACT = {"damping": 0.1, "time_step": 0.2}
 """With more damping, or a longer step, equal spheres jitter: they settle into crystals."""
 STIFFNESS, DRAG, CALM = (1e3, 1e4, 1e4), (0.0, 5.0, 1.0), (1e-2, 1e-4, 1e-6)
-"""Of each stage: K d/W, drag over m sqrt(g/d), and the kinetic energy of a grain, over W d, with
-which it ends. The grains fall on soft springs. Then a drag takes the energy of waves that run up
-and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is enough,
-and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to other decks
-too: in a long bed there is always a grain that still rolls somewhere."""
+"""Stiffness K d/W of each stage, its drag over m sqrt(g/d), and the kinetic energy of a grain, over
+W d, at which it ends. The grains fall on soft springs. Then a drag takes the energy of waves that
+run up and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is
+enough and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to
+other decks too: in a long bed there is always a grain that still rolls somewhere."""
 MOST_LOOKS = 400
 """Time that the grains have in a stage, sqrt(d/g')."""
 SETTLING = "settling.csv"
 DUMP = "poured.dump"
 BED = "bed.csv"
 MOST_GRAINS = 100_000
-"""Of a poured bed: some hundred megabytes, and half an hour of one core."""
+"""Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +46,19 @@ class PouredBed(Case):
     Attributes
     ----------
     line : BedLine
-        Of the flow.
+        Bed line of the flow.
     depth, surface : float
         As `Mould` takes them.
     sizes : LogNormal, sequence of classes, or None
-        Of the grains; None for equal ones.
+        Sizes of the grains; None for equal ones.
     diameter : float
         The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
     friction_angle_deg : float
-        Of the grains.
+        Friction angle of the grains.
     seed : int
         Which of the many.
     width : float
-        Of a strip with periodic sides; 0 of a bed in one plane.
+        Width of a strip with periodic sides; 0 of a bed in one plane.
     """
 
     line: BedLine

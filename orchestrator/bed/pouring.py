@@ -35,13 +35,13 @@ class Mould:
     Attributes
     ----------
     line : BedLine
-        Of the flow.
+        Bed line of the flow.
     depth : float
-        Of the row of fixed grains under the line, along the vertical.
+        Depth of the row of fixed grains under the line, along the vertical.
     surface : float
         Height over the line, normal to it, above which no centre lies after the cut.
     width : float
-        Of a strip with periodic sides; 0 of a bed in one plane.
+        Width of a strip with periodic sides; 0 of a bed in one plane.
     """
 
     line: BedLine
@@ -106,7 +106,7 @@ class Mould:
         sizes : ndarray, shape (n,)
             Their diameters, d.
         seed : int
-            Of the places, and of where each row begins.
+            Seed of the places, and of the offset of each row.
 
         Returns
         -------

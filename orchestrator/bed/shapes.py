@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 UPSTREAM, DOWNSTREAM = 10.0, 20.0
 """Flat bed before and behind the forms, in heights of them."""
 CHORDS = 40
-"""Of the windward side of a form that is a curve."""
+"""Chords of the windward side of a form that is a curve."""
 GAUSSIAN_END = 3.5
 """Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its height."""
 ARC_DEG = 2.0

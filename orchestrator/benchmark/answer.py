@@ -20,7 +20,7 @@ FILE = "answer.csv"
 MOST = 4 * 2**20
 """Size of an answer, bytes: more numbers than any pack asks."""
 LARGEST = 1e30
-"""Of a number in SI units, or of one without a unit."""
+"""Largest number in SI units, or without a unit."""
 Key = tuple[str, str]
 """Quantity, and the text of its `at` with seven digits."""
 COUNTS = ("moved", "not_moved", "carried_off")

@@ -19,7 +19,7 @@ FILES = ("expected.csv", "scenes.csv", "times.csv", "study.toml", "README.md")
 """Beside the manifest and the directory of the scenes."""
 SCENES = "scenes"
 MOST_BYTES = 64 * 2**20
-"""Of a file."""
+"""Largest file, bytes."""
 MOST_SCENES, MOST_MEMBERS, MOST_LINES = 20_000, 20, 200_000
 """Scenes of a pack; files of a scene; lines of the expected answers."""
 _SCENE = r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*"
@@ -41,7 +41,7 @@ RANGES: dict[str, Between] = {
     "lift_off": (0.0, 1.0),
     "count": (1, 1e6),
 }
-"""Of the parameters that are used here, wherever they are given; SI units, angles in degrees."""
+"""Ranges of the parameters that are used here, wherever they are given; SI units, degrees."""
 _GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "time_step", "reduced_gravity_m_s2")
 _FLUID = ("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
 _FLOW = ("alpha_deg", "h_m", "z0_m", "rho_f_kg_m3", "lid_m", "u_e_m_s", "ustar0_m_s")

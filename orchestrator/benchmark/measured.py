@@ -31,15 +31,15 @@ FACE = (0.1, 0.9)
 GRAINS, LINE = 0.03, 0.10
 """Relative tolerances of a pile's thresholds under the given stress, and with one's own flow."""
 SCATTER = 0.10
-"""Of the count, that the number of moved grains may differ by besides one load step: three engines
-with
-one contact law do so by up to 13 % where a chain of grains goes at once (docs/benchmark.md)."""
+"""Part of the count by which the number of moved grains may differ, besides one load step: three
+engines with one contact law do so by up to 13 % where a chain of grains goes at once
+(docs/benchmark.md)."""
 LEVEL_ROWS = 0.35
-"""Of N: level rows are judged until so many have moved. Then a whole step goes at once or not, as
-the least detail decides: runs that differ in the time step, the dashpots or places by 1e-3 d are up
-to 20 % of N and six load steps apart (docs/benchmark.md)."""
+"""Part of N: level rows are judged until so many have moved. Then a whole step goes at once or not,
+as the least detail decides: runs that differ in the time step, the dashpots or places by 1e-3 d
+are up to 20 % of N and six load steps apart (docs/benchmark.md)."""
 POURED_SCATTER = 0.15
-"""Of N, on poured beds: of two that three engines answered, one has 11 % of 46 grains between them
+"""Part of N on poured beds: three engines answered two, and on one they are 11 % of 46 grains apart
 beyond a load step, where a grain that goes or stays holds up others (docs/benchmark.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
@@ -228,9 +228,9 @@ class Margins:
     Attributes
     ----------
     threshold : float
-        Of thresholds, relative.
+        Relative tolerance of thresholds.
     count : float
-        Of numbers of moved grains, over N.
+        Tolerance of the numbers of moved grains, over N.
     until : float
         Largest n/N that is judged.
     """

@@ -24,7 +24,7 @@ EXACT = 1e-5
 """Relative: a formula with a known mistake is met this closely; dry and submerged weight differ by
 2e-4 in air."""
 FEW = 0.05
-"""Of N: counts this close to those of a known mistake are taken for it."""
+"""Part of N: counts this close to those of a known mistake are taken for it."""
 ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians taken for degrees"}
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""

@@ -13,11 +13,11 @@ from orchestrator.study import fields
 from orchestrator.study.scene import Scene
 
 SCHEMA = 1
-"""Of the exchange format, ``docs/benchmark.md``."""
+"""Version of the exchange format, ``docs/benchmark.md``."""
 SCENE = "scene.json"
 ASK = "ask.csv"
 NUMBER = "%.9g"
-"""Of all tables of a pack."""
+"""Format of the numbers in all tables of a pack."""
 EXPECTED = ("quantity", "at", "value", "low", "high", "tolerance", "ours")
 Row = dict[str, Any]
 
@@ -31,7 +31,7 @@ class Problem:
     level : int
         1 to 5.
     name : str
-        Of the scene among those of its level.
+        Name of the scene, unique among those of its level.
     kind : str
         What is to be solved.
     parameters : mapping

@@ -15,13 +15,13 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Of a keyword and in JSON.
+        Name of the keyword, also in JSON.
     option : str
-        Of the command line.
+        Option of the command line.
     field : str
-        Of a study file; the depth has none.
+        Field of a study file; the depth has none.
     column : str
-        Of a table, with the unit.
+        Column of a table, with the unit.
     label : str
         Symbol and unit, for people.
     default : float or str or None

@@ -26,7 +26,7 @@ PAPER = "paper"
 GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
 DEEPEST = 2e4
-"""Of a liquid, m: twice the deepest sea."""
+"""Largest depth of a liquid, m: twice the deepest sea."""
 Values = Mapping[str, FloatArray]
 
 

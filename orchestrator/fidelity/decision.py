@@ -32,7 +32,7 @@ class Decision:
     asked, scene : Scene
         As the study asks for it, and as it is answered.
     levels : mapping of str to str
-        Of a pile, the fidelity level of each part by name; empty for a single grain.
+        The fidelity level of each part of a pile, by name; empty for a single grain.
     known : Known
         The error of tau_c on these levels and its uncertainty, at the fraction of the scene where
         the two together are largest; infinite where it is not known.

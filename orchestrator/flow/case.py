@@ -43,7 +43,7 @@ MESH = (
 )
 """Files of a mesh that gmshToFoam makes."""
 FIELDS = ("U", "epsilon", "k", "nut", "omega", "p", "phi", "wallShearStress")
-"""Of the last iteration; epsilon or omega, as the turbulence model has it."""
+"""Fields of the last iteration; epsilon or omega, as the turbulence model has it."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class FlowCase(Case):
     convection_scheme : str
         Scheme for the convection of U: linearUpwind, upwind or limitedLinear.
     non_orthogonal_correctors : int
-        Of the pressure for cells that are not orthogonal, in each iteration.
+        Repeated pressure solves in each iteration, for cells that are not orthogonal.
     lid, upstream, downstream : float
         Height of the lid above the flat bed, flat bed before and behind the forms, in h.
     line : BedLine, optional
@@ -222,7 +222,7 @@ class FlowCase(Case):
 
     @property
     def _residual(self) -> float:
-        """Of p, at which iterations end.
+        """Residual of p at which iterations end.
 
         An iteration carries a change past some twenty cells: with more of them along the bed the
         flow still goes on to change at a residual at which that over a pile has ended.

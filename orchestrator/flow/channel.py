@@ -12,7 +12,7 @@ from orchestrator.physics.log_law import depth_mean_speed
 from orchestrator.solvers.openfoam import read_last_time
 
 MEAN_SPEED_ERROR = 0.1
-"""Of the mean speed in the column before the inlet against the log law's."""
+"""Largest relative difference of the column's mean speed, before the inlet, from the log law's."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.runs.files import write_durably
 
 APPROACH_ERROR = 0.08
-"""Of u* in the column before the inlet against the log law: by k-epsilon it is within 0.02, other
-models, whose log law is another, are within 0.07."""
+"""Largest relative difference of u* in the column before the inlet from the log law: k-epsilon is
+within 0.02, other models, whose log law is another, are within 0.07."""
 SEPARATES_FROM_DEG = 15.0
 """Slope from which the flow always separates behind the crest, and reattaches 5 to 9 h from it."""
 SHORTEST_BUBBLE = 5.0
@@ -50,11 +50,11 @@ def of(
     Parameters
     ----------
     stress : WallStress
-        Of the solved flow.
+        The stress of the solved flow.
     approach : float
         Friction velocity before the inlet over that of the log law.
     slope_deg, height, roughness : float
-        Of the pile, degrees and m.
+        Slope of the pile, degrees; its height and roughness length, m.
     reynolds : float
         u*_0 over the solve's nu, 1/m.
     """

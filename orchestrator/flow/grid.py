@@ -64,7 +64,7 @@ def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float
     line : BedLine
         m.
     slope_deg : float
-        Of the face that has `cells_per_face` cells if it is as high as the form; 0: there is none.
+        Slope of the face that has `cells_per_face` cells if it is as high as the form; 0: none.
     cells_per_face : int
         Their number.
     growth : float

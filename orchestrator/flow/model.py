@@ -39,7 +39,7 @@ class FlowModel(ABC):
     Parameters
     ----------
     scene : Scene
-        Of a pile.
+        A scene with a pile.
     """
 
     scene: Scene

@@ -129,7 +129,7 @@ class Seen:
 
     @property
     def slopes(self) -> Array:
-        """Of the cells between the places."""
+        """Slopes of the cells between the places."""
         return np.diff(self.z) / np.diff(self.x)
 
 

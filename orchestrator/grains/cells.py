@@ -29,8 +29,8 @@ WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 LAST = 1.2
 """Flow of the last load step: a grain that still lies then contradicts the closed form by 20 %."""
 SPACING = 3.0
-"""Of the cells across the flow, in diameters of the largest grain: grains of two cells never
-meet."""
+"""Spacing of the cells across the flow, in diameters of the largest grain: grains of two cells
+never meet."""
 UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
 BLOCK = 512

@@ -57,7 +57,7 @@ class GrainTable:
     diameter, density : float
         The diameter d of the deck's units, m; the density of every grain, kg/m3.
     width : float
-        Of a strip with periodic sides, d; 0 of grains in planes.
+        Width of a strip with periodic sides, d; 0 for grains in planes.
     """
 
     position: FloatArray

@@ -33,7 +33,7 @@ TOE = 0.05
 MANY = 20
 """Kinds of grains in a bed beyond which their tables of forces have fewer places."""
 DIGITS = 9
-"""Of lengths in d that a poured bed depends on: beds that differ in their scale alone share it."""
+"""Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
 _packed = cache(packing.pile)
 _covered = cache(cover)
@@ -69,7 +69,7 @@ class LoadedBed:
     Attributes
     ----------
     scene : Scene
-        Of a pile.
+        A scene with a pile.
     cases : Path or None
         Holds the finished runs; only the grains of a poured bed are read from there.
     """
@@ -191,7 +191,7 @@ class LoadedBed:
         Returns
         -------
         ndarray, shape (n,)
-            Of the mean stress around each grain; positive is downstream.
+            Ratio for the mean stress around each grain; positive is downstream.
         """
         return self.ratio(self.stress(cases), self.line)
 

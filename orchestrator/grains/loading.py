@@ -16,7 +16,7 @@ Force = Callable[[FloatArray], FloatArray]
 RANGE = 1e-4, 1e4
 """Local friction velocities of a table of forces, over that at which a grain goes by itself."""
 PLACES, FEWER = 4001, 501
-"""Of a table. With fewer it is within 1e-8 of the force law, and made in a tenth of the time."""
+"""Places of a table. Fewer are within 1e-8 of the force law and take a tenth of the time."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ class PileCase(GrainCase):
     Attributes
     ----------
     scene : Scene
-        Of the pile.
+        Scene of the pile.
     flow : WornFlow or None
         The flow of the round; None: that of the whole pile.
     before : PileCase or None

@@ -31,7 +31,7 @@ def pivots(
     Parameters
     ----------
     places : Places
-        Of n grains, in one unit of length d.
+        Places of n grains, in one unit of length d.
     sizes : ndarray, shape (n,)
         Diameter of each grain, d.
     loading : Loading

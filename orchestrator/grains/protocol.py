@@ -61,7 +61,7 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
     Parameters
     ----------
     protocol : Protocol
-        Of the scene.
+        Protocol of the scene.
     enough : int
         The sequence of load steps ends early when no more than this many grains still lie.
     is_poured : bool
@@ -82,8 +82,8 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
 def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
     """Expected time of one core, s: holds of twice the waiting time, 4.5e7 grain-steps a second.
 
-    Of piles of 30 to 770 counted grains and of 150 single ones on one core: holds are shorter and
-    steps dearer than that.
+    Measured on piles of 30 to 770 counted grains and 150 single ones, on one core: holds are
+    shorter and steps dearer than that.
     """
     steps = load_steps * 2 * protocol.waiting_time * math.sqrt(stiffness) / protocol.time_step
     return 0.1 + steps * grains / 4.5e7

@@ -61,7 +61,7 @@ def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
     Parameters
     ----------
     motion : Motion
-        Of the N windward grains.
+        Motion of the N windward grains.
     speed : ndarray, shape (N,)
         Signed local friction velocity over the undisturbed one.
     fluid_density : float
@@ -137,6 +137,6 @@ def _signed(speed: FloatArray) -> FloatArray:
 
 
 def _mean(motion: Motion, stress: FloatArray, level: int) -> float:
-    """Of the moved grains; NaN before any has."""
+    """Mean stress on the moved grains; NaN before any has moved."""
     own = stress[motion.moved_by(level)]
     return float(own.mean()) if len(own) else math.nan

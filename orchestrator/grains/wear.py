@@ -31,7 +31,7 @@ LIGGGHTS, in its case."""
 EDGE = 2.0
 """Length over which the edge of a bared part is rounded, d."""
 SPACING = 0.25
-"""Of the places at which the height of the grains is asked, d."""
+"""Spacing of the places at which the height of the grains is asked, d."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class WornFlow(Case):
     Attributes
     ----------
     scene : Scene
-        Of the pile.
+        Scene of the pile.
     before : FlowCase or WornFlow
         The flow of the round before.
     run : Case or None

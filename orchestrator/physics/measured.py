@@ -19,8 +19,8 @@ class Bin:
     count : int
         How many measurements.
     median, tenth, ninetieth : float
-        Of their threshold Shields numbers; the order statistics of rank int(n/10) + 1 and
-        int(9 n/10) + 1.
+        Median and percentiles of their threshold Shields numbers: the order statistics of rank
+        int(n/10) + 1 and int(9 n/10) + 1.
     """
 
     low: float

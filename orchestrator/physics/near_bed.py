@@ -36,7 +36,7 @@ def viscous_length(exposure: Exposure) -> FloatArray:
 def rough_speed(exposure: Exposure) -> FloatArray:
     """V_f/ustar of Eq. 4: the logarithmic profile averaged from z0 to z0 + d.
 
-    Of a grain that stands higher or lower it is averaged over its own height.
+    For a grain that stands higher or lower the profile is averaged over its own height.
     """
     r = exposure.ratio
     alike = INVERSE_KARMAN * ((1 + r) * np.log1p(1 / r) - 1)

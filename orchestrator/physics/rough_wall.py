@@ -26,7 +26,7 @@ SMOOTHEST, TALLEST = 1e-3, 1e9
 Below, the speed is y to 16 digits; above, the shear is that of the log law to 9.
 """
 STEP = 0.03
-"""Of the table in ln y: interpolation errs by less than 1e-12, relative."""
+"""Step of the table in ln y: interpolation errs by less than 1e-12, relative."""
 
 
 def shift(roughness: FloatArray) -> FloatArray:

@@ -77,7 +77,7 @@ def threshold(
     exposure : Exposure
         The grains and the fluid.
     density : array_like
-        Of the grain, kg/m3.
+        Density of the grain, kg/m3.
     slope_deg : array_like
         alpha, positive where the flow goes up the slope.
     entrainment_angle_deg : array_like

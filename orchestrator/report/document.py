@@ -46,7 +46,7 @@ def write(
     Parameters
     ----------
     title : str
-        Of the page.
+        Title of the page.
     sections : sequence of Section
         Its parts, in their order.
     folder : Folder

@@ -32,7 +32,7 @@ _AT = np.searchsorted([one.high for one in BINS], GRID, side="right")
 TENTHS = np.array([one.tenth for one in BINS])[_AT]
 NINETIETHS = np.array([one.ninetieth for one in BINS])[_AT]
 DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
-"""Of Re*, in which there are measurements."""
+"""Decades of Re* in which there are measurements."""
 
 
 @dataclass(frozen=True, eq=False)

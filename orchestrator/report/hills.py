@@ -18,7 +18,7 @@ COLOURS = {
     "kOmegaSST": "#cc79a7",
 }
 HEIGHT = 2.7
-"""Of a hill's panels, inches."""
+"""Height of a hill's panels, inches."""
 AROUND = (-9.0, 13.0)
 """Bed shown around the top, h."""
 

@@ -60,7 +60,7 @@ def draw(results: Results) -> Iterator[Figure]:
 def choose(results: Results) -> list[Pile]:
     """Piles whose flows stand for all.
 
-    Of each kind that with the least z0, and that with the largest if it differs much.
+    Each kind gives its pile with the least z0, and the one with the largest if that differs much.
     """
     found: dict[Kind, list[Pile]] = {}
     for pile in results.flows.values():

@@ -21,7 +21,7 @@ from orchestrator.report import FIGURES
 from orchestrator.runs.folder import Folder
 
 WIDTH = 7.0
-"""Of a figure across two columns of a paper, inches."""
+"""Width of a figure across two columns of a paper, inches."""
 
 SHADES = {
     "beta_deg": ("viridis", 0.0, 0.85),

@@ -23,7 +23,7 @@ BESIDE = 4.0
 ABOVE = 2.5
 """Flow shown above the bed, h."""
 HEIGHT = 3.6
-"""Of a bed's three panels, inches."""
+"""Height of a bed's three panels, inches."""
 UNMOVED = "0.75"
 
 

@@ -25,7 +25,7 @@ from orchestrator.runs.files import (
 from orchestrator.runs.folder import TEMPORARY, Folder
 
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
-"""Of a case's directory."""
+"""Name of a case's directory."""
 IDENTITY = "case.json"
 DONE = "done.json"
 FAILED = "failed.json"

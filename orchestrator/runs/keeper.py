@@ -30,9 +30,9 @@ THREADS = 16
 ENTRY = 4096
 """A file takes this much of a disk even if it is empty, bytes."""
 _SET_DEATH_SIGNAL, _SET_DUMPABLE, _SET_SUBREAPER = 1, 4, 36
-"""Of prctl on Linux."""
+"""Options of prctl on Linux."""
 _READ_ONLY = 1
-"""Of mount."""
+"""Flag of mount."""
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
 

@@ -31,7 +31,7 @@ class Said:
     Attributes
     ----------
     text : str
-        Of both streams; what is no UTF-8 is replaced.
+        Text of both streams; bytes that are no UTF-8 are replaced.
     returncode : int
         As `subprocess` gives it: negative where a signal ended the program.
     """

@@ -25,7 +25,7 @@ class Display:
     Parameters
     ----------
     forecast : Forecast
-        Of the cases that are to be run.
+        Forecast of the cases that are to be run.
     cases : Path
         Where they are run.
     """

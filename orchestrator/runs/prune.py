@@ -41,7 +41,7 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
     Parameters
     ----------
     space : Workspace
-        Of the study; held.
+        Workspace of the study; held.
     done : mapping of str to Case
         The finished cases by name.
     shown : container of str

@@ -30,7 +30,7 @@ def run(
     Returns
     -------
     Ended
-        Of the last try; the seconds are its own.
+        The end of the last try; the seconds are its own.
     """
     tries = 0
     while True:

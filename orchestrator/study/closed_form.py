@@ -145,7 +145,7 @@ def law_holds(scene: Scene) -> bool:
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     """Each scene with one force law; by the paper's rule one becomes two in the transition.
 
-    Of many scenes at once it takes a hundredth of the time that it takes of one after the other.
+    Many scenes at once take a hundredth of the time that one after the other takes.
     """
     named = {scene.forces.law for scene in scenes} - {PAPER, "low", "high"}
     for name in named:

@@ -19,11 +19,11 @@ COLUMNS = ("x_m", "z_m")
 LARGEST = 20_000_000
 """Bytes of a file."""
 LARGEST_NUMBER = 1e5
-"""Of a coordinate, m."""
+"""Largest coordinate, m."""
 FEWEST = 3
 """Points."""
 MOST_CORNERS = 3000
-"""Of a bed line, each of which is a grid line of the flow's mesh."""
+"""Most corners of a bed line, each of which is a grid line of the flow's mesh."""
 GAP = 20.0
 """A step along x this many times the middle one is a gap, in a profile of `MANY` points."""
 MANY = 20
@@ -46,7 +46,7 @@ class Profile:
     text : str
         The file itself.
     digest : str
-        Of what it says: all that two profiles differ in.
+        Digest of the content: all that two profiles differ in.
     """
 
     name: str = field(compare=False)

@@ -19,7 +19,7 @@ class Profiles:
     Attributes
     ----------
     folder : Path
-        Of the study file.
+        Folder of the study file.
     texts : dict
         Text of each, of the study's own table `profiles` at first.
     added : str

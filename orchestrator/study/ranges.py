@@ -25,7 +25,7 @@ Height = Annotated[float, Field(ge=1e-6, le=1e4)]
 Speed = Annotated[float, Field(ge=1e-6, le=1e3)]
 """From creeping to supersonic, which no incompressible flow is."""
 Length = Annotated[float, Field(ge=1e-12, le=1e4)]
-"""Of a mesh's cells, which resolve what the lengths above allow."""
+"""Length of a mesh's cells, which resolve what the lengths above allow."""
 OverHeight = Annotated[float, Field(ge=1e-4, le=100)]
 """A length over a pile's height: from far below a cell of any mesh to several piles."""
 FormHeights = Annotated[float, Field(ge=3, le=1000)]

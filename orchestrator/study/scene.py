@@ -30,11 +30,11 @@ from orchestrator.study.sizes import Sizes, largest, percentile
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
 LEAST_DEPTH = 3.0
-"""Of a channel, heights of the forms: the rows of its mesh are level at half of it."""
+"""Least depth of a channel, heights of the forms: the rows of its mesh are level at half of it."""
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: contacts give back 0.05 W d."""
 LEAST_WIDTH = 3.0
-"""Of a strip, in diameters of its largest grain: a grain must not touch another from both sides."""
+"""Least width of a strip, diameters of its largest grain: none touches another from both sides."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
@@ -329,7 +329,7 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
 def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:
     """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``.
 
-    Of a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
+    In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
     finer than.
     """
     if not isinstance(value, str):

@@ -41,7 +41,7 @@ BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
-"""Of a study file: what lists every scene that there may be is shorter."""
+"""Largest study file, bytes: one that lists every scene that there may be is smaller."""
 MOST_SEEDS = 1000
 
 

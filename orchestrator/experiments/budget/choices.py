@@ -125,7 +125,7 @@ def _exposures(scene: Scene) -> Alternatives:
 
 
 def _packings(scene: Scene) -> Alternatives:
-    """Of a poured bed other seeds; else the other packings of the plane, random gaps by seeds."""
+    """Other seeds of a poured bed; else the other packings of the plane, random gaps by seeds."""
     if scene.is_poured:
         return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
     rows = {"rows along the slope": "aligned", "level rows": "horizontal"}

@@ -42,7 +42,7 @@ def write(ax: Axes, tags: Sequence[Tag], points: FloatArray, size: float) -> Non
     points : ndarray, shape (n, 2)
         All points that no text shall cover, in the data's units.
     size : float
-        Of the font.
+        Size of the font.
     """
     figure = ax.get_figure(root=True)
     assert figure is not None

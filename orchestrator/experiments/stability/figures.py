@@ -77,7 +77,7 @@ def sheet(judged: Sequence[Judged]) -> Canvas:
 
 
 def _height(line: "Sequence[Cells]", size: Size) -> float:
-    """Of some maps side by side, with the words above and below them, inches."""
+    """Height of some maps side by side, with the words above and below them, inches."""
     words = [_filled(cells.map, size) for cells in line]
     above, below = (
         max(pair[side].count("\n") + bool(pair[side]) for pair in words) for side in (0, 1)

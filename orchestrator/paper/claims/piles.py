@@ -106,7 +106,7 @@ def roughness(evidence: Evidence) -> Claim:
 
 
 def curves(evidence: Evidence) -> Iterator[pd.DataFrame]:
-    """Of each pile the load steps in which something had moved, in their order."""
+    """Each pile's load steps in which something had moved, in their order."""
     table = evidence.piles("pile_curve")
     for _, own in split(table, "scene_id"):
         moved = own[own["moved"] > 0].sort_values("load_step")
