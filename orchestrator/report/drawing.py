@@ -1,9 +1,8 @@
 """All figures of a study drawn side by side, in the order of the page."""
 
-import contextlib
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -87,22 +86,18 @@ def _parts(folder: Folder) -> list[list[Figure]]:
     for _ in range(retry.MOST):
         pool = ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),))
         # no `pool.map`: it cancels what a pool that is killed then ends, which prints a traceback
-        with contextlib.suppress(BrokenProcessPool), _closed(pool):
+        try:
             drawn = [pool.submit(_section, number, folder) for number in range(len(SECTIONS))]
             return [one.result() for one in drawn]
+        except BrokenProcessPool:
+            continue
+        finally:
+            pool.shutdown(cancel_futures=True)
     raise OrchestratorError(
         "a process that draws figures was killed",
         where=str(folder.root),
         remedy="out of memory? `orchestrator report` draws them again",
     )
-
-
-@contextlib.contextmanager
-def _closed(pool: ProcessPoolExecutor) -> Iterator[None]:
-    try:
-        yield
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 _shared: list[Results] = []
