@@ -166,8 +166,10 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
 
 def _first(bed: LoadedBed, thresholds: FloatArray) -> float:
     """The first of sorted flows; of a poured bed that of the first grain but a few."""
-    held = thresholds[thresholds > 0] if bed.pouring else thresholds
-    return float(held[int(EARLY * len(held))] if bed.pouring and len(held) else thresholds[0])
+    held = thresholds[thresholds > 0]
+    if not bed.pouring or not len(held):
+        return float(thresholds[0])
+    return float(held[int(EARLY * len(held))])
 
 
 def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
@@ -182,7 +184,7 @@ def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
             remedy="a longer or wider bed, or another bed.seed",
         )
     last = held[min(int(rules.final_fraction * len(thresholds)), len(held) - 1)]
-    first = held[int(EARLY * len(held))]
+    first = _first(bed, held)
     return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
 
 
