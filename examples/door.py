@@ -18,6 +18,8 @@ SETTLE = 10.0
 """Time of load step 0."""
 MARGIN = 3.0
 """From a face to the height at which a grain in flight is gone, d."""
+AWAY = 10.0
+"""Displacement from which on a counted grain is gone, and how far behind the bed any is, d."""
 
 
 class Bed:
@@ -63,6 +65,17 @@ class Bed:
         sizes = (float(row["d_m"]) for row in self.grains if row["kind"] != "fixed")
         mass = self.scene["mass_kg"] * (min(sizes) / self.scene["d_m"]) ** 3
         return self.scene["time_step"] * math.sqrt(mass / self.scene["spring_n_m"])
+
+    @property
+    def settle_drag(self):
+        """Drag of the still fluid in which a poured bed settles over a grain's speed, kg/s."""
+        return self.scene.get("settle_drag_kg_s", 0.0)
+
+    @property
+    def behind(self):
+        """The x behind which every grain is gone, m."""
+        mobile = (row for row in self.grains if row["kind"] != "fixed")
+        return max(float(row["x_m"]) for row in mobile) + AWAY * self.scene["d_m"]
 
     @property
     def flow(self):

@@ -159,6 +159,8 @@ def bed(scene, case):
         for row in asked.grains
     ]
     protocol = Protocol(asked, ids)
+    if asked.settle_drag:
+        O.engines += [PyRunner(command="protocol.drag()", iterPeriod=2)]
     period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
     # one run with samples inside: between two runs YADE waits a twentieth of a second
     O.engines += [PyRunner(command="protocol.sample()", iterPeriod=period, initRun=False)]
@@ -177,6 +179,7 @@ class Protocol:
         self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
         self.marker = scene["displacement_criterion"] * scene["d_m"]
+        self.far = door.AWAY * scene["d_m"]
         self.waiting_samples = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
         self.roof = asked.roof
         places = [(float(row["x_m"]), float(row["z_m"])) for row in grains]
@@ -185,13 +188,23 @@ class Protocol:
         self.high = [max(values) + margin for values in zip(*places, strict=True)]
         self.start = []
         self.settling = int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5)
+        self.behind = asked.behind
         self._begin(0)
 
     def _begin(self, load_step):
         self.load_step, self.calm = load_step, 0
         for number, (fx, fz) in zip(self.ids, self.asked.force(load_step), strict=True):
-            if (fx or fz) and O.bodies[number] is not None:
+            if O.bodies[number] is not None:
                 O.forces.setPermF(number, (fx, 0, fz))
+
+    def drag(self):
+        """Slow the grains by a still fluid while a poured bed settles."""
+        if self.load_step > 0:
+            return
+        gamma, force = self.asked.settle_drag, self.asked.force(0)
+        for number, (fx, fz) in zip(self.ids, force, strict=True):
+            vx, _, vz = O.bodies[number].state.vel
+            O.forces.setPermF(number, (fx - gamma * vx, 0, fz - gamma * vz))
 
     def sample(self):
         """Note who has moved, remove who is gone, go on to the next load step if all is calm."""
@@ -203,6 +216,7 @@ class Protocol:
             return
         self.calm = 0 if self._note() else self.calm + 1
         self.moving = [number for number in self.moving if not self._gone(number)]
+        self._remove_far()
         lie = 0 in self.moved_in
         if lie and self.calm < self.waiting_samples:
             return
@@ -220,16 +234,24 @@ class Protocol:
         return self.moved_in.count(0) < before
 
     def _passed(self, number, start, along):
-        body = O.bodies[number]
-        if body is None:
-            return True
-        x, _, z = body.state.pos
-        return (x - start[0]) * along[0] + (z - start[2]) * along[1] >= self.marker
+        return O.bodies[number] is None or self._travel(number, start, along) >= self.marker
+
+    def _remove_far(self):
+        """Remove the counted grains that have come far, once they are known to have moved."""
+        for number, start, along in zip(self.counted, self.start, self.asked.along, strict=True):
+            far = O.bodies[number] is not None and self._travel(number, start, along) > self.far
+            if far:
+                O.bodies.erase(number)
+                self.moving.remove(number)
+
+    def _travel(self, number, start, along):
+        x, _, z = O.bodies[number].state.pos
+        return (x - start[0]) * along[0] + (z - start[2]) * along[1]
 
     def _gone(self, number):
         x, _, z = O.bodies[number].state.pos
         slope, ridge_x, ridge_z = self.roof
-        over = z > ridge_z - abs(x - ridge_x) * math.tan(slope)
+        over = x > self.behind or z > ridge_z - abs(x - ridge_x) * math.tan(slope)
         inside = self.low[0] < x < self.high[0] and self.low[1] < z < self.high[1]
         if over or not inside:
             O.bodies.erase(number)
