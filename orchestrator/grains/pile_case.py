@@ -69,9 +69,12 @@ class PileCase(GrainCase):
     @property
     def cost_s(self) -> float:
         """Expected time of one core, s."""
-        rules = self.scene.protocol
+        rules, grain = self.scene.protocol, self.scene.grain
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
-        return protocol.run_cost_s(load_steps, self._size, rules, self.scene.grain.stiffness)
+        if self.loaded.pouring:
+            exposed = self._length * (self.loaded.bed.width or 1)
+            return protocol.poured_cost_s(load_steps, self._size, exposed, rules, grain)
+        return protocol.run_cost_s(load_steps, self._size, rules, grain.stiffness)
 
     @property
     def ranks(self) -> int:
@@ -81,12 +84,17 @@ class PileCase(GrainCase):
     @property
     def _size(self) -> int:
         """How many grains of the plane make the deck as dear, about; known before any is poured."""
-        line = self.loaded.line
+        bed = self.loaded.bed
         # the whole pile is half its rows thick on average
-        most = self.loaded.bed.poured_depth if self.loaded.pouring else line.h / 2
-        length = line.crest_s if self.loaded.bed.is_wedge else line.x[-2] - line.x[1]
-        layers = min(self.loaded.bed.mobile_layers, most) + 3
-        return int(length * layers * (IN_SPACE * self.loaded.bed.width or 1))
+        most = bed.poured_depth if self.loaded.pouring else self.loaded.line.h / 2
+        layers = min(bed.mobile_layers, most) + 3
+        return int(self._length * layers * (IN_SPACE * bed.width or 1))
+
+    @property
+    def _length(self) -> float:
+        """Length of the bed whose grains may move, d."""
+        line = self.loaded.line
+        return line.crest_s if self.loaded.bed.is_wedge else float(line.x[-2] - line.x[1])
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""

@@ -92,6 +92,13 @@ def largest(sizes: Sizes | None, diameter: float) -> float:
     return sizes.ends[1] if isinstance(sizes, LogNormal) else sizes[-1][0] / diameter
 
 
+def smallest(sizes: Sizes | None, diameter: float) -> float:
+    """The smallest grain of a mixture over one diameter; 1 of equal grains."""
+    if sizes is None:
+        return 1.0
+    return sizes.ends[0] if isinstance(sizes, LogNormal) else sizes[0][0] / diameter
+
+
 def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:
     """Diameters of some grains over one diameter, in random order, shape (count,).
 
