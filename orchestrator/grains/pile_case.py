@@ -73,7 +73,8 @@ class PileCase(GrainCase):
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / wear.rounds(self.scene)
         if self.loaded.pouring:
             exposed = self._length * (self.loaded.bed.width or 1)
-            return protocol.poured_cost_s(load_steps, self._size, exposed, rules, grain)
+            size = self._size * (IN_SPACE if self.loaded.bed.width else 1)
+            return protocol.poured_cost_s(load_steps, size, exposed, rules, grain)
         return protocol.run_cost_s(load_steps, self._size, rules, grain.stiffness)
 
     @property
@@ -83,12 +84,12 @@ class PileCase(GrainCase):
 
     @property
     def _size(self) -> int:
-        """How many grains of the plane make the deck as dear, about; known before any is poured."""
+        """How many grains the deck has, about: before any is poured."""
         bed = self.loaded.bed
         # the whole pile is half its rows thick on average
         most = bed.poured_depth if self.loaded.pouring else self.loaded.line.h / 2
         layers = min(bed.mobile_layers, most) + 3
-        return int(self._length * layers * (IN_SPACE * bed.width or 1))
+        return int(self._length * layers * (bed.width or 1))
 
     @property
     def _length(self) -> float:

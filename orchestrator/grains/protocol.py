@@ -81,7 +81,7 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
 
 
 def poured_cost_s(
-    load_steps: float, grains: int, exposed: float, rules: Protocol, grain: Grain
+    load_steps: float, grains: float, exposed: float, rules: Protocol, grain: Grain
 ) -> float:
     """Expected time of one core for a deck of a poured bed, s: 6e6 grain-steps a second.
 
