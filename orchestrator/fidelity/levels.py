@@ -29,7 +29,7 @@ FULL = 1000
 STRIP = "strip"
 """A poured bed in space, and the level of the grains that answers one in the plane by it."""
 WIDTH = 5.0
-"""Of that level's strip, d; more where the largest grains need it."""
+"""Width of that level's strip, d; more where the largest grains need it."""
 FLAT = "flat"
 """The level of the flow that leaves out all forms: exact over a level bed."""
 
@@ -116,7 +116,7 @@ def holding(scene: Scene) -> Levels:
 
 
 def meaning(levels: Levels) -> str:
-    """What some levels are; without those that a scene is on none of."""
+    """Meanings of some levels; parts without a level are left out."""
     named = ((part, name) for part, name in levels.items() if name != AS_ASKED)
     return "; ".join(level(part, name).meaning for part, name in named)
 
@@ -202,7 +202,7 @@ REALIZABLE = {**STANDARD, "flow.turbulence_model": "realizableKE"}
 OTHER_MODEL = "standard, with another turbulence model"
 
 FLOW = (
-    Level(FLAT, "log law on a flat bed: u*_0 everywhere", {"flow.model": "flat"}),
+    Level(FLAT, "log law on a flat bed: u*₀ everywhere", {"flow.model": "flat"}),
     Level("hill", "linear theory of the flow over a low hill", {"flow.model": "hill"}),
     Level("waves", "linear theory, each wavelength by itself", {"flow.model": "waves"}),
     Level("shared", "coarse; one solve for each octave of z0/h", _shared),

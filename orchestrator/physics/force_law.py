@@ -31,7 +31,7 @@ class Bound:
         if np.isnan(value):
             return f"{self.quantity} is not a number"
         side = f"below {self.low:g}" if value < self.low else f"not below {self.high:g}"
-        return f"{self.quantity} {value:.3g} is {side}"
+        return f"{self.quantity} {float(f'{value:.3g}'):g} is {side}"
 
 
 class ForceLaw(ABC):

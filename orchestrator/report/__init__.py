@@ -99,7 +99,7 @@ def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "
 
 
 def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
-    """What a study found, for a terminal: its thresholds with their intervals, and sentences."""
+    """The answer of a study for a terminal: thresholds with their intervals, and sentences."""
     with settings.own():
         from orchestrator.report import answer as found
         from orchestrator.report.results import Results

@@ -1,13 +1,14 @@
 """The answer of a study in few words: sentences, and a short table of its thresholds."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import pandas as pd
 
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.fidelity.spread import lowest_floor
 from orchestrator.physics.log_law import log_law_speed
-from orchestrator.report import labels
+from orchestrator.report import hills, labels
 from orchestrator.report.apart import varying
 from orchestrator.report.facts import Sheet
 from orchestrator.report.overview import nearest_fraction
@@ -21,10 +22,12 @@ FEW = 12
 
 
 def sentences(results: Results) -> list[str]:
-    """What was found, from the least slope to the largest; a warning where little is usable."""
+    """The answer, from the least slope to the largest; a warning where little is usable."""
     piles = results.joined("pile_threshold")
     if len(piles):
-        found = [_of_pile(row, results) for row in _ends(piles)]
+        found = list(hills.sentences(results))
+        if valid(piles).any() or not found:
+            found += [_of_pile(row, results) for row in _ends(piles)]
         worth = _worth(piles, results.study.tolerance)
         return [*found, *_warnings(piles), *_frozen(piles), *_chosen(results), *worth]
     single = results.joined("single_grain")
@@ -34,8 +37,9 @@ def sentences(results: Results) -> list[str]:
 def _ends(piles: pd.DataFrame) -> list[pd.Series]:
     """The piles of the least and of the largest slope that the study's picture shows, too."""
     here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
-    order = here.assign(valid=valid(here)).sort_values(
-        ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
+    dem = here["answered_method"] == "dem"
+    order = here.assign(valid=valid(here), dem=dem).sort_values(
+        ["valid", "d_m", "dem", "z0_over_d"], ascending=[False, False, False, True], kind="stable"
     )
     firsts = order.drop_duplicates("alpha_deg").sort_values("alpha_deg")
     return (
@@ -48,11 +52,15 @@ def _ends(piles: pd.DataFrame) -> list[pd.Series]:
 def _of_pile(row: pd.Series, results: Results) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     ratio = f"{row['shields'] / single:.2g} times the stress of a single one"
-    pile = f"{row['alpha_deg']:g}°, d = {labels.millimetres(row['d_m'])}"
+    pile = f"{_slope(row['alpha_deg'])}, d = {labels.millimetres(row['d_m'])}"
     return (
         f"{pile}: {row['fraction']:.0%} of the exposed grains move at {ratio}, τ_c = "
         f"{row['shields']:.3g}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
     )
+
+
+def _slope(alpha: Any) -> str:
+    return labels.amount(float(alpha), "°")
 
 
 def _grain_ends(grains: pd.DataFrame) -> list[pd.Series]:
@@ -70,8 +78,8 @@ def _of_grain(row: pd.Series) -> str:
     ustar = "ustar_m_s" if by_dem else "ustar_closed_form_m_s"
     shields = row["shields_dem" if by_dem else "shields_closed_form"]
     return (
-        f"One grain of {labels.millimetres(row['d_m'])} on {row['alpha_deg']:g}° starts to move at "
-        f"{_flow(row, ustar)}, τ_c = {shields:.3g}{_unless(row)}."
+        f"One grain of {labels.millimetres(row['d_m'])} on {_slope(row['alpha_deg'])} starts to "
+        f"move at {_flow(row, ustar)}, τ_c = {shields:.3g}{_unless(row)}."
     )
 
 
@@ -153,10 +161,13 @@ def _each(rows: pd.DataFrame) -> Sheet:
     telling = varying(rows, "alpha_deg", "d_m", "force_law")
     cells = [
         (
-            f"{row['alpha_deg']:g}°",
+            _slope(row["alpha_deg"]),
             labels.millimetres(row["d_m"]),
             labels.value("force_law", row["force_law"]),
-            *(labels.value(one, row[one]) if pd.notna(row[one]) else "—" for one in telling),
+            *(
+                labels.value(one, row[one]) if labels.is_told(one, row[one]) else "—"
+                for one in telling
+            ),
             *_threshold(row),
         )
         for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows()
@@ -189,7 +200,7 @@ def _ranges(rows: pd.DataFrame) -> Sheet:
         usable = own[valid(own)]
         cells.append(
             (
-                f"{alpha:g}°",
+                _slope(alpha),
                 _span(own["d_m"] * 1e3, "g") + " mm",
                 labels.value("force_law", law),
                 _span(usable["shields"], ".4f"),
@@ -217,7 +228,7 @@ def grains(results: Results) -> Sheet | None:
         low, high = (f"{name}_low", f"{name}_high") if method == "dem" else (name, name)
         cells.append(
             (
-                f"{alpha:g}°",
+                _slope(alpha),
                 _span(own["d_m"] * 1e3, "g") + " mm",
                 labels.value("force_law", law),
                 "DEM" if method == "dem" else "closed form",

@@ -1,4 +1,4 @@
-"""What tells the rows of a figure apart beyond its axes and colours: panels and markers."""
+"""Panels and markers, which tell the rows of a figure apart beyond its axes and colours."""
 
 from collections.abc import Sequence
 
@@ -15,25 +15,37 @@ SHAPES = "os^DvP<X>p8hd*"
 """Markers that are told from each other."""
 SHAPE = "marker"
 """The column that holds a row's marker."""
+METHOD = "method"
+OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
+"""Scopes of fields that have no effect by other methods."""
 
 
 def varying(table: pd.DataFrame, *shown: str) -> list[str]:
     """The fields in which rows differ that agree in all columns that are shown.
 
-    Of fields that vary together one is enough: what is asked comes before how it is answered.
-    Which of many alike a row is does not count.
+    One of several fields that vary together is enough: the question comes before the method, and
+    the method before the fields that only some methods have. Which of many alike a row is does not
+    count.
     """
     found: list[str] = []
     told = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
-    for about in ("question", "answer"):
-        for column in fields.others(table, *shown):
-            if column in fields.COLUMNS and fields.COLUMNS[column].info.about == about:
-                codes, values = pd.factorize(table[column], use_na_sentinel=False)
-                finer, groups = pd.factorize(told * len(values) + codes)
-                if len(groups) > told.max(initial=-1) + 1:
-                    found.append(column)
-                    told = finer
+    for column in sorted(fields.others(table, *shown), key=_rank):
+        if column in fields.COLUMNS and fields.COLUMNS[column].info.about != "replica":
+            codes, values = pd.factorize(table[column], use_na_sentinel=False)
+            finer, groups = pd.factorize(told * len(values) + codes)
+            if len(groups) > told.max(initial=-1) + 1:
+                found.append(column)
+                told = finer
     return found
+
+
+def _rank(column: str) -> int:
+    if column == METHOD or column not in fields.COLUMNS:
+        return 1
+    info = fields.COLUMNS[column].info
+    if info.about == "question":
+        return 2 if info.scope in OF_METHODS else 0
+    return 3
 
 
 def _count(table: pd.DataFrame, columns: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""What must be said under each figure."""
+"""Captions of the figures."""
 
 from collections.abc import Iterable, Sequence
 
@@ -20,7 +20,7 @@ DRAG_LAW = (
 )
 PAIR = "Eq. 2 holds for Re* < 3 and Eq. 4 for Re* ≥ 30; shaded: where neither does"
 OUTSIDE = ", whose Re* can lie outside the shaded range by one of the two"
-HOLLOW = "Hollow markers: not usable, for the reason in the column why_not of the tables."
+HOLLOW = "Hollow markers: not usable, for the reason in the column `why_not` of the tables."
 
 
 def listed(values: Iterable[float], scale: float = 1) -> str:
@@ -29,7 +29,7 @@ def listed(values: Iterable[float], scale: float = 1) -> str:
 
 
 def closed_form(scenes: pd.DataFrame, by: str, number: int) -> str:
-    """Of the closed form by entrainment angle or by slope."""
+    """Describe the closed form by entrainment angle or by slope."""
     what = "entrainment angle β" if by == "beta_deg" else "slope α (the flow goes up it)"
     return (
         f"After Fig. {number} of the paper. Threshold stress of one grain against the friction "
@@ -58,7 +58,7 @@ def _hollow(rows: pd.DataFrame) -> str:
 def overview(
     results: Results, found: Sequence[Fit], piles: pd.DataFrame, grains: pd.DataFrame
 ) -> str:
-    """Of the one diagram of a study."""
+    """Describe the one diagram of a study."""
     scenes = results.scenes
     points = []
     if len(piles):
@@ -78,7 +78,7 @@ def overview(
 
 
 def by_angle(scenes: pd.DataFrame, points: pd.DataFrame) -> str:
-    """Of the laws side by side, a panel for each entrainment angle."""
+    """Describe the laws side by side, a panel for each entrainment angle."""
     dem = (
         f" Markers: DEM of one grain. {hold_protocol(points)} {_hollow(points)}"
         if len(points)
@@ -122,7 +122,7 @@ def _water() -> str:
 
 
 def _values(column: str, piles: Iterable[Pile]) -> str:
-    """What some piles were run with, as a text."""
+    """The values of a column that some piles were run with, as a text."""
     used = dict.fromkeys(fields.COLUMNS[column].used(pile.scene) for pile in piles)
     return ", ".join(labels.value(column, value) for value in used)
 
@@ -143,7 +143,7 @@ def hold_protocol(rows: pd.DataFrame) -> str:
 
 
 def grain_dem(points: pd.DataFrame, number: int) -> str:
-    """Of the single grains by DEM on the lines of the closed form."""
+    """Describe the single grains by DEM on the lines of the closed form."""
     return (
         f"After Fig. {number} of the paper. Markers: thresholds of one mobile sphere on its two "
         "fixed neighbours, by LIGGGHTS; lines, band and curves as in the figure before. "
@@ -153,7 +153,7 @@ def grain_dem(points: pd.DataFrame, number: int) -> str:
 
 
 def accuracy(dem: pd.DataFrame) -> str:
-    """Of the ratio of DEM and closed form."""
+    """Describe the ratio of DEM and closed form."""
     ratio = dem["ustar_m_s"] / dem["ustar_closed_form_m_s"] - 1
     holds = valid(dem)
     parts = []
@@ -170,7 +170,7 @@ def accuracy(dem: pd.DataFrame) -> str:
 
 
 def stress(results: Results, piles: list[Pile]) -> str:
-    """Of the friction velocity along the bed."""
+    """Describe the friction velocity along the bed."""
     mean, crest = eq10_over_wall(results, [pile.flow.name for pile in piles])
     return (
         "Signed friction velocity along the bed over the undisturbed u*₀ = 0.41 U_e/ln((10 h + "
@@ -185,7 +185,7 @@ def stress(results: Results, piles: list[Pile]) -> str:
 
 
 def where() -> str:
-    """Of the map of thresholds."""
+    """Describe the map of thresholds."""
     return (
         "Each bed, from the top: signed friction velocity along the bed over the undisturbed one "
         "(shaded: flow that runs back); the bed with the speed of the flow over it, where its "
@@ -197,7 +197,7 @@ def where() -> str:
 
 
 def hills() -> str:
-    """Of hills that others measured."""
+    """Describe hills that others measured."""
     return (
         "Hills of the wind-tunnel experiment RUSHIL, each with the flow of each turbulence model: "
         "signed friction velocity along the bed over the undisturbed one, and below it where the "
@@ -227,7 +227,7 @@ def eq10_over_wall(results: Results, flow_cases: Iterable[str]) -> tuple[float, 
 
 
 def fractions(rows: pd.DataFrame) -> str:
-    """Of n/N against the flow."""
+    """Describe n/N against the flow."""
     return (
         "After Fig. 14 of the paper. Fraction of the N(d) exposed grains of the windward face that "
         "had moved at a flow (a marker), against τ of the mean signed wall stress over the grains "
@@ -238,7 +238,7 @@ def fractions(rows: pd.DataFrame) -> str:
 
 
 def extended(rows: pd.DataFrame) -> str:
-    """Of the extended Shields diagram."""
+    """Describe the extended Shields diagram."""
     return (
         "After Figs. 15 and 16 of the paper. Mean signed wall stress over the grains that had "
         "moved when their fraction first reached n/N; thin lines join piles that differ in d "
@@ -262,7 +262,7 @@ def low_regime(rows: pd.DataFrame) -> str:
 
 
 def flow(piles: list[Pile]) -> str:
-    """Of the picture of the flow."""
+    """Describe the picture of the flow."""
     return (
         f"Steady turbulent flow by OpenFOAM ({_values('turbulence_model', piles)}, rough wall), at "
         f"the last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other "
@@ -273,7 +273,7 @@ def flow(piles: list[Pile]) -> str:
 
 
 def wear() -> str:
-    """Of the figure of beds that change."""
+    """Describe the figure of beds that change."""
     return (
         "The threshold at which n grains have moved, the mean stress on them. Dashed: the flow of "
         "the whole pile acts until the end, as in the paper. Solid: after each part of the grains "
@@ -284,7 +284,7 @@ def wear() -> str:
 
 
 def mesh(pile: Pile) -> str:
-    """Of the picture of the mesh."""
+    """Describe the picture of the mesh."""
     flow, z0 = pile.flow, pile.bed.roughness
     return (
         "After Fig. 11 of the paper, which has triangles. Hexahedra, one cell deep, by gmsh: "
@@ -296,7 +296,7 @@ def mesh(pile: Pile) -> str:
 
 
 def bed(results: Results, pile: Pile) -> str:
-    """Of the picture of the bed."""
+    """Describe the picture of the bed."""
     moved = (
         f"moved, that is {_values('displacement_criterion', [pile])} downstream along the bed; "
         "hollow: left the box, where it lay"
@@ -320,7 +320,7 @@ def bed(results: Results, pile: Pile) -> str:
 
 
 def _pile(results: Results, pile: Pile) -> str:
-    """What a pile is beside its slope and diameter, as far as the study's piles differ."""
+    """Properties of a pile beside slope and diameter, as far as the study's piles differ."""
     columns = ["z0_over_d", "packing", "force_law"]
     columns += varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
     used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}

@@ -45,7 +45,7 @@ SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (
     (7, (single.accuracy,)),
     (1, (overview.draw,)),
 )
-"""What is drawn in one process, the dearest first, and its place on the page."""
+"""Functions that one process draws, the dearest first, each with its place on the page."""
 
 
 def warm() -> None:
@@ -76,7 +76,7 @@ def draw(results: Results, folder: Folder) -> list[Figure]:
     places = [place for place, _ in SECTIONS]
     order = sorted(zip(places, parts, strict=True), key=lambda pair: pair[0])
     figures = [figure for _, part in order for figure in part]
-    return sorted(figures, key=lambda figure: not figure.leads)
+    return sorted(figures, key=lambda figure: (not figure.first, not figure.leads))
 
 
 def _parts(folder: Folder) -> list[list[Figure]]:
@@ -101,7 +101,7 @@ def _parts(folder: Folder) -> list[list[Figure]]:
 
 
 _shared: list[Results] = []
-"""What the workers inherit: results are too large to be sent to each."""
+"""Results that the workers inherit: they are too large to be sent to each."""
 
 
 def _section(number: int, folder: Folder) -> list[Figure]:

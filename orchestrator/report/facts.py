@@ -1,4 +1,4 @@
-"""What the page says in words and numbers beside its figures."""
+"""Words and numbers of the page beside its figures."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ PACKAGES = (
     "vtk",
 )
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
-"""What each row of the table of piles says of its pile."""
+"""Columns that each row of the table of piles tells."""
 MANY = 12
 """Values of a parameter beyond which only their range is listed."""
 
@@ -53,7 +53,7 @@ def piles(results: Results) -> Sheet | None:
     extra = varying(found, *SHOWN, "fraction")
     fractions = sorted(set(found["fraction"]))
     heads = (f"τ_c at n/N = {fraction:.0%}" for fraction in fractions)
-    choices = ("and",) if extra else ()
+    choices = ("other choices",) if extra else ()
     head = ("pile: α, d, z₀", "forces, ν in m²/s", *choices, "N", *heads, "case")
     rows = []
     for _, own in split(found, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
@@ -67,11 +67,11 @@ def piles(results: Results) -> Sheet | None:
 def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
     forces = labels.value("force_law", row["force_law"])
     cells = (
-        f"{row['alpha_deg']:g}°, {labels.millimetres(row['d_m'])},\n"
+        f"{labels.amount(row['alpha_deg'], '°')}, {labels.millimetres(row['d_m'])},\n"
         f"{labels.ratio_of(row['z0_over_d'], 'd')}",
         f"{forces}, {row['nu_m2_s']:g}",
     )
-    chosen = "\n".join(labels.plain(c, row[c]) for c in extra if pd.notna(row[c]))
+    chosen = "\n".join(labels.plain(c, row[c]) for c in extra if labels.is_told(c, row[c]))
     return (*cells, chosen) if extra else cells
 
 
@@ -209,7 +209,7 @@ def _spent(name: str, rows: pd.DataFrame) -> tuple[str, ...]:
 
 
 def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
-    """What a reader must know of this study's results before using them."""
+    """Remarks that a reader must know before using this study's results."""
     found = []
     if failures:
         found.append(f"Cases that failed: {len(failures)}. The figures lack them; see below.")
@@ -228,14 +228,14 @@ def remarks(results: Results, failures: Mapping[str, str]) -> list[str]:
 
 
 def _of_transition(scenes: pd.DataFrame) -> str:
-    """What the paper's rule does between its two laws."""
+    """A sentence on the paper's rule between its two laws."""
     both = scenes["force_law"].isin(laws.PAIR) & (scenes["regime"] == "transition")
     said = f"{int(both.sum())} of them by Eq. 2 or Eq. 4 where neither holds. "
     return said if both.any() else ""
 
 
 def _upstream(curve: pd.DataFrame) -> Iterator[str]:
-    """What grains of piles did other than to move downstream over the bed."""
+    """Motions of grains of piles other than downstream over the bed."""
     if curve.empty:
         return
     most = curve.groupby("scene_id")[["carried_off", "fallen_upstream"]].max()
@@ -289,7 +289,7 @@ def levels(results: Results) -> Sheet | None:
                 "not known" if pd.isna(known) else f"{100 * known:.1f} %",
             )
         )
-    head = ("flow | grains", "what they are", "why", "piles", "known error of τ_c, up to")
+    head = ("flow | grains", "description", "reason", "piles", "known error of τ_c, up to")
     return Sheet(head, tuple(rows))
 
 
@@ -300,7 +300,7 @@ def checks(results: Results) -> Sheet | None:
         return None
     rows = [
         (
-            f"{one['alpha_deg']:g}°, {one['packing']}, "
+            f"{labels.amount(one['alpha_deg'], '°')}, {one['packing']}, "
             f"{labels.value('force_law', one['force_law'])}",
             f"{1e3 * one['d_m']:g} mm",
             f"{one['fraction']:.0%}",

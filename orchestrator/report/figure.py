@@ -26,6 +26,8 @@ class Figure:
         What the page's script needs to answer a pointer or a slider, as JSON; None if nothing.
     fold : bool
         Whether the page shows it on demand alone.
+    first : bool
+        Whether it answers the study's question and stands before all others.
     """
 
     name: str
@@ -36,8 +38,9 @@ class Figure:
     image: bytes = b""
     data: Any = None
     fold: bool = False
+    first: bool = False
 
     @property
     def leads(self) -> bool:
         """Whether it stands at the head of the page."""
-        return self.data is not None and not self.fold
+        return self.first or (self.data is not None and not self.fold)

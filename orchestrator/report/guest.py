@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Addition:
-    """What a guest adds to the page of a study.
+    """The part of a study's page that a guest adds.
 
     Attributes
     ----------

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
-from orchestrator.report import captions, style
+from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.study.parts import Flow
@@ -21,27 +22,66 @@ HEIGHT = 2.7
 """Height of a hill's panels, inches."""
 AROUND = (-9.0, 13.0)
 """Bed shown around the top, h."""
+MEASURED: style.Look = {
+    "color": "black",
+    "lw": 1.2,
+    "gid": "measured",
+    "label": "measured end of the reversed flow",
+}
+NOTHING: style.Look = {**style.NOTE, "ha": "center", "va": "center"}
 
 
 def draw(results: Results) -> Iterator[Figure]:
     """One figure, a panel for each hill; none where no hill of the study was measured."""
+    hills = list(_hills(results))
+    if not hills:
+        return
+    flows = pd.concat([rows for _, rows in hills])
+    canvas = style.canvas(HEIGHT * len(hills) + 0.3)
+    panels = canvas.subplots(2 * len(hills), 1, sharex=True, height_ratios=[3, 1] * len(hills))
+    for number, (aspect, rows) in enumerate(hills):
+        _hill(panels[2 * number], panels[2 * number + 1], results, rows)
+        steepest = labels.amount(float(rows["alpha_deg"].iloc[0]), "°")
+        panels[2 * number].set_title(f"half length {aspect:g} h, {steepest}", loc="left")
+    panels[-1].set(xlabel="$x/h$ from the top", xlim=AROUND)
+    names = [name for name in COLOURS if name in set(flows["turbulence_model"])]
+    colours = [style.entry(label(name), COLOURS[name]) for name in names]
+    known = flows["measured_reattachment_over_h"].notna().any()
+    style.legends(canvas, colours, [Line2D([], [], **MEASURED)] if known else [])
+    cases = tuple(flows["flow_case"])
+    yield Figure("hills", "Hills that others measured", captions.hills(), cases, canvas, first=True)
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """Where reversed flow ends behind each hill, by model and as measured."""
+    for hill, rows in _hills(results):
+        models = [label(str(name)) for name in rows["turbulence_model"]]
+        ends = list(zip(models, rows["reattachment_over_h"].tolist(), strict=True))
+        found = [f"by {name} to {end:.1f} h" for name, end in ends if pd.notna(end)]
+        none = [name for name, end in ends if pd.isna(end)]
+        if none:
+            found.append(f"none by {', '.join(none)}")
+        known = rows["measured_reattachment_over_h"].iloc[0]
+        measured_ = f"measured to {known:.1f} h" if pd.notna(known) else "none measured"
+        yield (
+            f"Reversed flow behind the top of the hill of half length {hill:g} h: {measured_}; "
+            f"{', '.join(found)}."
+        )
+
+
+def _hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
+    """The flows over each measured hill with its half length, the steepest first."""
     flows = results.tables.get("flow", pd.DataFrame())
     if "measured_source" not in flows:
         return
-    flows = flows.dropna(subset=["measured_source"])
-    hills = [rows for _, rows in flows.groupby("alpha_deg", sort=True)][::-1]
-    canvas = style.canvas(HEIGHT * len(hills) + 0.3)
-    panels = canvas.subplots(2 * len(hills), 1, sharex=True, height_ratios=[3, 1] * len(hills))
-    for number, rows in enumerate(hills):
-        _hill(panels[2 * number], panels[2 * number + 1], results, rows)
-    panels[-1].set(xlabel="$x/h$ from the top", xlim=AROUND)
-    names = [name for name in COLOURS if name in set(flows["turbulence_model"])]
-    style.legends(canvas, [style.entry(_label(name), COLOURS[name]) for name in names], [])
-    cases = tuple(flows["flow_case"])
-    yield Figure("hills", "Hills that others measured", captions.hills(), cases, canvas)
+    for _, rows in reversed(list(flows.dropna(subset=["measured_source"]).groupby("alpha_deg"))):
+        hill = measured_hill(results.flows[str(rows["flow_case"].iloc[0])])
+        assert hill
+        yield hill.aspect, rows
 
 
-def _label(name: str) -> str:
+def label(name: str) -> str:
+    """The name of a turbulence model for people."""
     info = Flow.model_fields["turbulence_model"].metadata
     choices = next(one.choices for one in info if hasattr(one, "choices"))
     return str(choices[name])
@@ -59,10 +99,9 @@ def _hill(stress: Axes, reversed_: Axes, results: Results, rows: pd.DataFrame) -
     one = rows.iloc[0]
     if pd.notna(one["measured_reattachment_over_h"]):
         at = one["measured_reattachment_over_h"]
-        reversed_.axvline(at, color="black", lw=1.2, gid="measured")
-    aspect = measured_hill(results.flows[str(one["flow_case"])])
-    assert aspect
+        reversed_.axvline(at, **MEASURED)
+    if rows["reattachment_over_h"].isna().all():
+        reversed_.text(0.5, 0.5, "no reversed flow", transform=reversed_.transAxes, **NOTHING)
     stress.axhline(0, color="0.4", lw=0.6)
     stress.set(ylabel=r"$u^\star/u^\star_0$")
-    stress.set_title(f"half length {aspect.aspect:g} h, {one['alpha_deg']:.3g}°", loc="left")
     reversed_.set(yticks=[], ylim=(len(rows) - 0.3, -0.7), ylabel="reversed")

@@ -15,8 +15,10 @@ RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
 WIDTH = 60
 """Letters of a line over a panel."""
+LISTS = ("obstacles",)
+"""Columns of fields that are lists: an empty cell is an empty list."""
 FRACTION = Info("fraction", "n/N", "%")
-"""Of the fraction of grains at which a threshold is read; it is no field of its own."""
+"""The fraction of grains at which a threshold is read; no field of its own."""
 
 
 def words(column: str) -> Info:
@@ -39,13 +41,22 @@ def plain(column: str, value: Any) -> str:
 def _said(info: Info, value: Any, symbol: str, number: Callable[[float], str]) -> str:
     if isinstance(value, str):
         return info.choices.get(value, f"{info.label} {value}")
+    if pd.isna(value):
+        return f"no {info.label}"
     return f"{symbol or info.label} = {amount(float(value), info.unit, number)}"
 
 
 def value(column: str, value: Any) -> str:
     """A value alone."""
     info = words(column)
-    return info.choices.get(value, value) if isinstance(value, str) else amount(value, info.unit)
+    if isinstance(value, str):
+        return info.choices.get(value, value)
+    return "none" if pd.isna(value) else amount(value, info.unit)
+
+
+def is_told(column: str, value: Any) -> bool:
+    """Whether a row has a value to tell: one without obstacles has none of them."""
+    return bool(pd.notna(value)) or column in LISTS
 
 
 def text_of(symbol: str) -> str:
@@ -68,7 +79,7 @@ def amount(value: float, unit: str, number: Callable[[float], str] = "{:g}".form
         case "%":
             return f"{100 * value:.3g} %"
         case "°":
-            return f"{value:g}°"
+            return f"{value:.4g}°"
     wide = value and not 1e-3 < abs(value) < 1e5
     return f"{number(value) if wide else f'{value:g}'} {unit}".rstrip()
 
@@ -100,9 +111,10 @@ def methods(rows: pd.DataFrame) -> str:
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
-    """What all that a panel or a marker shows agrees in; what has no effect on it is left out.
+    """Values that all rows of a panel or a marker share; fields without effect are left out.
 
     It is broken into lines that fit beside another panel.
     """
-    said = ", ".join(written(column, row[column]) for column in columns if pd.notna(row[column]))
+    told = (column for column in columns if is_told(column, row[column]))
+    said = ", ".join(written(column, row[column]) for column in told)
     return textwrap.fill(said, WIDTH, break_long_words=False)

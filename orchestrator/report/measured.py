@@ -1,4 +1,4 @@
-"""What the page says of force laws against measured thresholds."""
+"""The page's section on force laws against measured thresholds."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -59,7 +59,7 @@ def written(ranges: Iterable[Range]) -> str:
 
 
 def sentences(grains: pd.DataFrame, found: Sequence[Fit]) -> list[str]:
-    """What follows from the numbers: the best, what none meets, small Re*, air."""
+    """Conclusions from the numbers: the best law, ranges that none meets, small Re*, air."""
     return [*_best(found), *_unmet(found), *_small(found), *_air(grains, found)]
 
 

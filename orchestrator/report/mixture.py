@@ -42,13 +42,17 @@ def _beds(results: Results) -> Iterator[Figure]:
     """The first poured bed by each threshold method."""
     rows = results.joined("pile_grain")
     rows = rows[rows[POURED].notna()]
-    for (method,), part in split(rows, "answered_method"):
-        scene_id = str(part["scene_id"].iloc[0])
-        grains = part[part["scene_id"] == scene_id]
-        yield _bed(results.plan.piles[scene_id], grains, str(method))
+    firsts = rows.drop_duplicates("answered_method").sort_values("answered_method")["scene_id"]
+    shown = rows[rows["scene_id"].isin(firsts)]
+    # one that its pocket does not hold goes at no flow at all
+    reached = shown["ustar0_m_s"][np.isfinite(shown["ustar0_m_s"]) & (shown["ustar0_m_s"] > 0)]
+    norm = LogNorm(reached.min(), reached.max() * 1.001)
+    for scene_id in firsts:
+        yield _bed(results.plan.piles[scene_id], shown[shown["scene_id"] == scene_id], norm)
 
 
-def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
+def _bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
+    method = _method(grains)
     packed = pile.packing
     x, z = packed.centres.T
     middle = (x[packed.windward].min() + x[packed.windward].max()) / 2
@@ -59,9 +63,7 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
     figure = style.canvas(max(style.WIDTH * (high - low) / (window[1] - window[0]), 1.2) + 1.2)
     ax = figure.subplots()
     flows = grains["ustar0_m_s"].to_numpy(float)
-    # one that its pocket does not hold goes at no flow at all
-    reached = flows[np.isfinite(flows) & (flows > 0)]
-    scale = ScalarMappable(LogNorm(reached.min(), reached.max() * 1.001), colormaps["viridis_r"])
+    scale = ScalarMappable(norm, colormaps["viridis_r"])
     colours = np.where(packed.mobile, LYING, FIXED).astype(object)
     for place, flow in zip(np.flatnonzero(packed.windward), flows, strict=True):
         colours[place] = scale.to_rgba(flow) if np.isfinite(flow) else "white"
@@ -77,7 +79,8 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
     up = "$y/d$" if packed.width else "$z/d$"
     ax.set(xlim=window, ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel=up)
     bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
-    bar.set_label("$u_{*0}$ at which the grain goes, m/s")
+    bar.set_label(r"$u^\star_0$ at which the grain goes, m/s; the same colours by every method")
+    style.plain_ticks(bar.ax.xaxis)
     seen = f", a strip of {packed.width:g} d seen from above" if packed.width else ""
     caption = (
         f"Poured bed{seen}, {len(flows)} exposed grains, by {method}: colour is the undisturbed "
@@ -87,8 +90,13 @@ def _bed(pile: Pile, grains: pd.DataFrame, method: str) -> Figure:
     )
     asked = labels.plain("d_m", pile.scene.grain.diameter)
     runs = tuple(run.name for run in pile.runs)
+    name = f"poured-{grains['answered_method'].iloc[0]}"
     title = f"Where grains go, by {method}, {asked}"
-    return Figure(f"poured-{method}", title, caption, runs, figure)
+    return Figure(name, title, caption, runs, figure)
+
+
+def _method(rows: pd.DataFrame) -> str:
+    return labels.value("method", rows["answered_method"].iloc[0])
 
 
 def _pivots(results: Results) -> Figure:
@@ -128,9 +136,12 @@ def _hiding(rows: pd.DataFrame) -> Figure:
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
     for ax, part in zip(axes, methods, strict=True):
         _hiding_panel(ax, part, colours)
-        ax.set_title(str(part["answered_method"].iloc[0]), loc="left")
+        ax.set_title(_method(part), loc="left")
         ax.set_xlabel("$d_i/d_{50}$")
     axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
+    for ax in axes:
+        style.plain_ticks(ax.xaxis)
+        style.plain_ticks(ax.yaxis)
     entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
     looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in LINES]
     looks.append(Line2D([], [], color="0.3", ls=":", label="one stress moves all sizes"))

@@ -19,7 +19,7 @@ NAME = "shields"
 FRACTION = 0.3
 """n/N of the piles where there are many."""
 SAID = ("alpha_deg", "d_m", "z0_over_d", "force_law", "fraction")
-"""What a point says of its scene."""
+"""Columns that a point tells of its scene."""
 FEW = 8
 """Piles of which every fraction is drawn."""
 LAWS = 3
@@ -56,7 +56,7 @@ def draw(results: Results) -> Iterator[Figure]:
     bottom, top = ax.get_ylim()
     ax.set_ylim(min([bottom, *(t / 1.4 for t in tau)]), max([top, *(1.4 * t for t in tau)]))
     style.plain_ticks(ax.yaxis)
-    style.legends(figure, [], [*entries, *lines, *references])
+    style.legends(figure, [], [*entries, *lines, *shields.within([ax], references)])
     cases = tuple(sorted(set(_known(piles, "case")) | set(_known(grains, "case"))))
     caption = captions.overview(results, fits_, piles, grains)
     yield Figure(NAME, "Extended Shields diagram", caption, cases, figure, data=told.groups)
@@ -161,7 +161,7 @@ def _slope(alpha: float) -> str:
 def _said(row: pd.Series, columns: Sequence[str], extra: Sequence[str]) -> list[str]:
     """Scene, threshold with its interval, what speaks against it, case."""
     told = (*SAID[:-1], *extra)
-    scene = ", ".join(labels.plain(c, row[c]) for c in told if pd.notna(row[c]))
+    scene = ", ".join(labels.plain(c, row[c]) for c in told if labels.is_told(c, row[c]))
     value, low, high = (row[column] for column in columns)
     ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]
     where = f" at n/N = {row['fraction']:.0%}" if "fraction" in row else ""

@@ -48,3 +48,8 @@ for (const box of document.querySelectorAll("[data-steps]")) {
   slider.addEventListener("input", () => show(+slider.value));
   show(+slider.value);
 }
+
+// paper has no folds: captions are printed, and closed again on the screen
+const captions = [...document.querySelectorAll("figcaption > details")].map((fold) => [fold, fold.open]);
+addEventListener("beforeprint", () => captions.forEach(([fold]) => { fold.open = true; }));
+addEventListener("afterprint", () => captions.forEach(([fold, open]) => { fold.open = open; }));

@@ -70,6 +70,7 @@ def render(
         programs=facts.programs(results),
         times=facts.times(timings),
         **_flow_facts(results),
+        **_grain_facts(results),
         **_examples(results),
     )
 
@@ -102,8 +103,8 @@ def template_of(name: str, folder: Path) -> Template:
 
 
 def typeset(text: str) -> Markup:
-    """HTML of a text: ``V_f`` has an index, ``frozen_bed`` none; what backticks hold is code."""
-    index = r"\b([^\W\d_]{1,3})_([A-Za-z]+)\b(?!_)"
+    """HTML of a text: ``V_f`` has an index, ``why_not`` none; what backticks hold is code."""
+    index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
     html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
 
@@ -115,7 +116,7 @@ def _json(data: Any) -> Markup:
 
 
 def entry(figure: Figure) -> dict[str, Any]:
-    """What the templates need of a figure with its image; one that answers is inline."""
+    """The values of a figure for the templates, with its image; an interactive one is inline."""
     kept = ("name", "title", "caption", "cases", "data", "fold", "leads")
     drawn = {
         "type": "svg+xml" if figure.image.lstrip().startswith((b"<svg", b"<?xml")) else "png",
@@ -159,6 +160,17 @@ def _flow_facts(results: Results) -> dict[str, Any]:
         return {"wall_stress": False}
     mean, crest = captions.eq10_over_wall(results, results.flows)
     return {"wall_stress": True, "eq10_mean": mean, "eq10_crest": crest}
+
+
+def _grain_facts(results: Results) -> dict[str, bool]:
+    methods = set(results.scenes["answered_method"])
+    scenes = [pile.scene for pile in results.plan.piles.values()]
+    return {
+        "by_dem": "dem" in methods,
+        "without_dem": bool(methods - {"dem"}),
+        "mixed": any(scene.grain.sizes is not None for scene in scenes),
+        "strips": any(pile.bed.width for pile in results.plan.piles.values()),
+    }
 
 
 def _examples(results: Results) -> dict[str, str]:

@@ -14,7 +14,7 @@ from orchestrator.report.results import Results, split
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
-"""What figures, panels, axes, colours and markers tell apart."""
+"""Columns that figures, panels, axes, colours and markers tell apart."""
 
 MOST = 6
 """Panels of a figure."""
@@ -42,7 +42,7 @@ def fractions(results: Results) -> Iterator[Figure]:
             some = pd.concat(panels)
             yield Figure(
                 f"fractions-alpha{alpha:g}" + (f"-{number + 1}" if number else ""),
-                f"Fraction of moving grains, α = {alpha:g}°" + _part(number),
+                f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}" + _part(number),
                 captions.fractions(some),
                 tuple(sorted(set(some["case"].dropna()))),
                 _fractions(panels, keys, curves, colours, variants),
@@ -106,7 +106,7 @@ def _fractions(
     shields.label_lowest(axes, labels.TAU_AXIS)
     used = set(rows["d_m"])
     entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
-    style.legends(figure, entries, [*shields.point_entries(rows), *variants])
+    style.legends(figure, entries, [*shields.point_entries(rows, variants), *variants])
     return figure
 
 
@@ -154,10 +154,10 @@ def _extended(
     shields.mark_drag_law(axes, panels)
     entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
     looks = [
-        *shields.line_entries(rows, dashes),
-        *shields.point_entries(rows),
+        *shields.within(axes, shields.line_entries(rows, dashes)),
+        *shields.point_entries(rows, variants),
         *variants,
-        *references,
+        *shields.within(axes, references),
     ]
     style.legends(figure, entries, looks)
     return figure

@@ -1,4 +1,4 @@
-"""What a report draws from: the study, its cases and its tables."""
+"""The source of a report: the study, its cases and its tables."""
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass

@@ -27,12 +27,12 @@ RC: Mapping[Any, Any] = {
     "svg.hashsalt": "orchestrator",
     "savefig.dpi": PIXELS_PER_INCH,
 }
-"""What differs from matplotlib's own defaults."""
+"""Settings that differ from matplotlib's own defaults."""
 VARIABLES: Mapping[str, str | None] = {
     "MATPLOTLIBRC": os.devnull,
     "MPLBACKEND": None,
 }
-"""What matplotlib is told by the environment when it is imported."""
+"""Variables of the environment that matplotlib reads when it is imported."""
 
 
 @contextlib.contextmanager

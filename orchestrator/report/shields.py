@@ -1,11 +1,12 @@
 """The Shields diagram: axes, what is known of them, closed-form lines and points with intervals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ RESULT = ("closed form", "points", "points, law does not hold")
 WATER = "water curve"
 MEASURED = "measured"
 AIR = "air: "
+BESIDE = 3
+"""Markers that one entry of a legend has room for."""
 
 
 def prepare(
@@ -142,7 +145,7 @@ def draw_water(ax: Axes) -> list[Artist]:
     high = grey_opening(_filled(band.high), size=(SPIKE,))
     known = np.isfinite(band.low).tolist()
     ax.fill_between(band.reynolds, low, high, where=known, zorder=1, gid="water band", **look)
-    return [Patch(label="water: spread of published curves", **look)]
+    return [Patch(label="water: spread of published curves", gid=WATER, **look)]
 
 
 def _filled(edge: FloatArray) -> FloatArray:
@@ -160,7 +163,7 @@ def draw_measured(ax: Axes) -> list[Artist]:
     ax.hlines(y, [one.low for one in bins], [one.high for one in bins], **look)
     ax.plot(x, y, "s", ms=3.5, **look)
     label = "measured: median, 10 to 90 %"
-    return [Line2D([], [], color="black", lw=0.7, marker="s", ms=3.5, label=label)]
+    return [Line2D([], [], color="black", lw=0.7, marker="s", ms=3.5, label=label, gid=MEASURED)]
 
 
 def draw_air(ax: Axes, scenes: pd.DataFrame) -> list[Artist]:
@@ -168,8 +171,9 @@ def draw_air(ax: Axes, scenes: pd.DataFrame) -> list[Artist]:
     entries: list[Artist] = []
     lines = reference.air_lines(scenes)
     for (name, (x, y)), look in zip(lines.items(), AIR_STYLES, strict=False):
-        ax.plot(x, y, color=style.AIR, ls=look, lw=0.9, zorder=1.5, gid=AIR + name)
-        entries.append(Line2D([], [], color=style.AIR, ls=look, lw=0.9, label=f"air: {name}"))
+        own: style.Look = {"color": style.AIR, "ls": look, "lw": 0.9, "gid": AIR + name}
+        ax.plot(x, y, zorder=1.5, **own)
+        entries.append(Line2D([], [], label=f"air: {name}", **own))
     return entries
 
 
@@ -183,33 +187,69 @@ def draw_sloped_air(ax: Axes, scenes: pd.DataFrame, colour: str) -> list[Artist]
     label = f"air: {name} × slope factor"
     # a colour that means one slope says nothing of the others
     shown = colour if colour == style.AIR else "0.2"
-    return [Line2D([], [], color=shown, ls="--", lw=0.7, label=label)]
+    return [Line2D([], [], color=shown, ls="--", lw=0.7, label=label, gid=AIR + name)]
 
 
 def line_entries(rows: pd.DataFrame, dashes: Mapping[str, laws.Dash]) -> list[Artist]:
     """Legend of the closed form's line styles, for the laws of some rows."""
     named = {name: labels.value("force_law", name) for name in dashes if name not in laws.PAIR}
     pair = {laws.PAIR[0]: "Eqs. 3, 5"} if laws.PAIR[0] in dashes else {}
+    own: style.Look = {"color": "0.2", "gid": RESULT[0]}
     entries: list[Artist] = [
-        Line2D([], [], color="0.2", lw=1.1, ls=dashes[name], label=f"closed form: {label}")
+        Line2D([], [], lw=1.1, ls=dashes[name], label=f"closed form: {label}", **own)
         for name, label in {**pair, **named}.items()
     ]
     if not valid(rows).all():
         dotted = "dotted: the force law does not hold"
-        entries.append(Line2D([], [], color="0.2", lw=0.9, ls=":", label=dotted))
+        entries.append(Line2D([], [], lw=0.9, ls=":", label=dotted, **own))
     return entries
 
 
-def point_entries(rows: pd.DataFrame) -> list[Artist]:
-    """Legend of the markers that some rows need: by which methods, with which forces."""
-    markers = []
-    for law_name in [name for name in LAWS if (rows["force_law"] == name).any()]:
-        own = rows[rows["force_law"] == law_name]
-        name = f"{labels.methods(own)}, {labels.value('force_law', law_name)}"
-        markers.append((name, own[SHAPE].mode()[0], "0.2"))
+def point_entries(rows: pd.DataFrame, variants: Sequence[style.Sample] = ()) -> list[style.Sample]:
+    """Legend of the markers that some rows need: by which methods, with which forces.
+
+    One law needs no entry of its own where the variants of how it was answered have theirs.
+    """
+    names = [name for name in LAWS if (rows["force_law"] == name).any()]
+    found: list[style.Sample] = []
+    if len(names) > 1 or not variants:
+        for law_name in names:
+            own = rows[rows["force_law"] == law_name]
+            label = f"{labels.methods(own)}, {labels.value('force_law', law_name)}"
+            found.append(_marks(own, label))
     if not valid(rows).all():
-        markers.append(("hollow: not usable, see why_not", markers[-1][1], "white"))
-    return [
-        Line2D([], [], ls="", marker=m, mec="0.2", mfc=face, mew=0.8, label=label)
-        for label, m, face in markers
-    ]
+        shape = rows.loc[~valid(rows), SHAPE].iloc[0]
+        found.append(_mark(shape, "white", "hollow: not usable, see why_not"))
+    return found
+
+
+def _marks(rows: pd.DataFrame, label: str) -> style.Sample:
+    """The markers of some rows beside each other; of many the one that most rows have."""
+    shapes = sorted(set(rows[SHAPE]))
+    if len(shapes) > BESIDE:
+        shapes = [rows[SHAPE].mode()[0]]
+    marks = tuple(_mark(one, "0.2", label) for one in shapes)
+    return marks if len(marks) > 1 else marks[0]
+
+
+def _mark(shape: str, face: str, label: str) -> Line2D:
+    return Line2D([], [], ls="", marker=shape, mec="0.2", mfc=face, mew=0.8, label=label)
+
+
+def within(axes: Sequence[Axes], entries: Sequence[Artist]) -> list[Artist]:
+    """The entries of a legend of whose lines or bars a part is in a frame; call it at the end."""
+    seen = {gid for ax in axes for gid in _within(ax)}
+    return [one for one in entries if one.get_gid() in seen]
+
+
+def _within(ax: Axes) -> Iterator[str | None]:
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    for line in ax.lines:
+        x, y = np.asarray(line.get_xydata(), float).T
+        if ((x >= left) & (x <= right) & (y >= low) & (y <= high)).any():
+            yield line.get_gid()
+    for bars in ax.collections:
+        for path in bars.get_paths() if isinstance(bars, LineCollection) else []:
+            x, y = np.asarray(path.vertices, float).T
+            if x.max() >= left and x.min() <= right and y.max() >= low and y.min() <= high:
+                yield bars.get_gid()

@@ -17,7 +17,7 @@ from orchestrator.study import fields
 
 CROSS = "beyond the paper"
 SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "force_law")
-"""What the axes, colours and markers of these figures tell apart, or are meant to lump."""
+"""Columns that the axes, colours and markers of these figures tell apart, or lump on purpose."""
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 
 
@@ -44,7 +44,7 @@ def _held(results: Results) -> pd.DataFrame:
 
 
 def _dem(results: Results) -> pd.DataFrame:
-    """What DEM found of them."""
+    """Their thresholds by DEM under a held flow."""
     dem = by_dem(results.joined("single_grain"))
     return dem[held(dem)] if len(dem) else dem
 
@@ -85,9 +85,12 @@ def _diagram(results: Results, scenes: pd.DataFrame, points: pd.DataFrame, by: s
     low, high = theory.span(scenes)
     shields.prepare(axes, panels, (low / 2, high * 2))
     shields.mark_drag_law(axes, panels)
-    looks: list[style.Sample] = [*references, *shields.line_entries(scenes, dashes)]
+    looks: list[style.Sample] = [
+        *shields.within(axes, references),
+        *shields.line_entries(scenes, dashes),
+    ]
     if len(points):
-        looks += [*_point_entries(points), *variants]
+        looks += [*_point_entries(points, variants), *variants]
     style.legends(figure, _colour_entries(scenes, by, colours), looks)
     return figure
 
@@ -105,8 +108,8 @@ def _cross(ax: Axes, points: pd.DataFrame) -> None:
         ax.plot(own[DEM[0]], own[DEM[1]], "x", color=colour, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
 
 
-def _point_entries(points: pd.DataFrame) -> list[Artist]:
-    entries = shields.point_entries(points)
+def _point_entries(points: pd.DataFrame, variants: list[style.Sample]) -> list[style.Sample]:
+    entries = shields.point_entries(points, variants)
     if _beyond(points).any():
         label = "crossed: diameter beyond the paper’s"
         entries.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
@@ -169,7 +172,7 @@ def accuracy(results: Results) -> Iterator[Figure]:
         shields.shade_transition(ax, rows)
     axes[-1].set_xlabel(labels.RE_AXIS)
     entries = _colour_entries(rows, "alpha_deg", colours)
-    style.legends(figure, entries, [*shields.point_entries(rows), *variants])
+    style.legends(figure, entries, [*shields.point_entries(rows, variants), *variants])
     cases = tuple(sorted(set(dem["case"])))
     yield Figure(
         "accuracy", "DEM over closed form", captions.accuracy(dem), cases, figure, fold=True

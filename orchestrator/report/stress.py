@@ -75,7 +75,7 @@ def choose(results: Results) -> list[Pile]:
 
 
 def kind(results: Results, pile: Pile) -> Kind:
-    """What tells the flow over a pile from others but for its z0: slope, height, own fields."""
+    """The key of the flow over a pile but for its z0: slope, height, own fields."""
     row = results.asked(pile)
     chosen = " ".join(str(row[column]) for column in _own_fields(results))
     return pile.bed.slope_deg, pile.bed.height, chosen
@@ -120,7 +120,7 @@ def _shade_reversed(ax: Axes, x: FloatArray, ustar: FloatArray) -> None:
 
 
 def _draw_grains(ax: Axes, results: Results, pile: Pile) -> None:
-    """What the grains feel: the stress averaged over a length of the bed."""
+    """Draw the stress on the grains, averaged over a length of the bed."""
     grains = results.joined("pile_grain")
     if grains.empty:
         return

@@ -37,7 +37,7 @@ BED = "#d9c9a3"
 Look = dict[str, Any]
 """Properties of an artist."""
 Sample = Artist | tuple[Artist, ...]
-"""What a legend shows: one mark, or some beside each other."""
+"""A sample of a legend: one mark, or some beside each other."""
 
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 MINOR_TICK: Look = {"color": "black", "ms": 2, "mew": 0.6}
@@ -70,7 +70,7 @@ def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
-    """What the colours mean above the panels, all else below them: no data are there."""
+    """Place the legend of colours above the panels, all else below them: no data are there."""
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:

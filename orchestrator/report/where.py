@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import SubFigure
 from matplotlib.ticker import LogLocator
 
@@ -22,9 +23,12 @@ BESIDE = 4.0
 """Bed shown before and behind the forms, h."""
 ABOVE = 2.5
 """Flow shown above the bed, h."""
-HEIGHT = 3.6
-"""Height of a bed's three panels, inches."""
+HEIGHT, BAR = 3.2, 0.6
+"""Heights of a bed's three panels and of the colours below all, inches."""
+COLOURS = "plasma"
 UNMOVED = "0.75"
+NAMES = {"rushil": "hill of RUSHIL", "gaussian": "Gaussian hill", "cosine": "wave of a cosine"}
+"""Shapes whose own name says too little."""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -32,21 +36,24 @@ def draw(results: Results) -> Iterator[Figure]:
     piles = chosen(results)
     if not piles:
         return
-    canvas = style.canvas(HEIGHT * len(piles) + 0.3)
-    parts = canvas.subfigures(len(piles), 1, squeeze=False)[:, 0]
+    heights = [*[HEIGHT] * len(piles), BAR]
+    canvas = style.canvas(sum(heights))
+    *parts, last = canvas.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
     for part, (scene_id, pile) in zip(parts, piles.items(), strict=True):
         _bed(part, results, scene_id, pile)
+    bar = canvas.colorbar(ScalarMappable(cmap=COLOURS), last.subplots(), orientation="horizontal")
+    bar.set_label("$n/N$ by then")
     names = tuple(name.name for pile in piles.values() for name in pile.runs)
     yield Figure("where", "Where grains go", captions.where(), tuple(dict.fromkeys(names)), canvas)
 
 
 def chosen(results: Results) -> dict[str, Pile]:
-    """Piles by their scenes, one for each bed line."""
+    """Piles by their scenes, one for each bed line that is not level."""
     grains = results.joined("pile_grain")
     done = set() if grains.empty else set(grains["scene_id"])
     found: dict[object, tuple[str, Pile]] = {}
     for scene_id, pile in results.plan.piles.items():
-        if scene_id in done and not pile.bed.is_triangle:
+        if scene_id in done and not pile.bed.is_triangle and np.ptp(pile.model.line.z) > 0:
             found.setdefault(pile.model.line, (scene_id, pile))
     return dict(list(found.values())[:MOST])
 
@@ -68,7 +75,7 @@ def _bed(part: SubFigure, results: Results, scene_id: str, pile: Pile) -> None:
 
 def shape(bed: PileBed) -> str:
     """A bed line in a few words."""
-    words = [str(bed.profile or bed.shape), *map(str, bed.obstacles)]
+    words = [str(bed.profile or NAMES.get(bed.shape, bed.shape)), *map(str, bed.obstacles)]
     if bed.forms > 1:
         every = f" every {bed.spacing:g} m" if bed.spacing else ""
         words[0] = f"{bed.forms} × {words[0]}{every}"
@@ -97,7 +104,7 @@ def _map(ax: Axes, results: Results, scene_id: str, h: float) -> None:
     goes = np.isfinite(flow_)
     rank = np.argsort(np.argsort(flow_[goes], kind="stable"), kind="stable")
     share = (rank + 1) / len(rows)
-    dots = ax.scatter(x[goes], flow_[goes], c=share, s=5, cmap="plasma", vmin=0, vmax=1)
+    dots = ax.scatter(x[goes], flow_[goes], c=share, s=5, cmap=COLOURS, vmin=0, vmax=1)
     dots.set_gid("thresholds")
     for at in x[~goes]:
         ax.axvline(at, color=UNMOVED, lw=0.3, zorder=0)
@@ -111,4 +118,3 @@ def _map(ax: Axes, results: Results, scene_id: str, h: float) -> None:
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_formatter("")
     ax.set(xlabel="$x/h$ from the first foot", ylabel=r"goes at $u^\star_0$, m/s")
-    ax.figure.colorbar(dots, ax=ax, location="bottom", aspect=60, label="$n/N$ by then")

@@ -13,8 +13,8 @@ FloatArray = NDArray[np.float64]
 Sieve = tuple[tuple[float, float], ...]
 """Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
 LARGEST_RATIO = 10.0
-"""Of the largest to the smallest grain: neighbour lists reach as far as two of the largest, so that
-their length, and the time of a run, rise with its square."""
+"""Largest ratio of the largest to the smallest grain: neighbour lists reach as far as two of the
+largest, so that their length, and the time of a run, rise with its square."""
 HEAD = ("diameter_m", "fraction")
 """Columns of a file with a sieve table."""
 SUM = 1e-6
@@ -44,7 +44,7 @@ Sizes = LogNormal | Sieve
 
 
 def fault(sizes: Sizes) -> str | None:
-    """What is wrong with a mixture, or nothing."""
+    """A fault of a mixture, if there is one."""
     if isinstance(sizes, LogNormal):
         low, high = sizes.ends
         return None if high / low <= LARGEST_RATIO else _too_wide(high / low)
@@ -72,7 +72,7 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     sizes : LogNormal, sequence of classes, or None
         None of equal grains.
     diameter : float
-        Of equal grains, or the median of a log-normal distribution, m.
+        Diameter of equal grains, or the median of a log-normal distribution, m.
     part : float
         0 ... 1.
     """
@@ -82,7 +82,9 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
         return diameter * float(_cut(sizes, part, power=0))
     diameters, fractions = np.array(sizes).T
     finer = np.cumsum(fractions) - fractions / 2
-    return float(np.exp(np.interp(part, finer, np.log(diameters))))
+    found = np.exp(np.interp(part, finer, np.log(diameters)))
+    # the exponential of a logarithm is not the number itself to the last digit
+    return float(f"{found:.12g}")
 
 
 def largest(sizes: Sizes | None, diameter: float) -> float:

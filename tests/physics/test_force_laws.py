@@ -154,7 +154,7 @@ def test_forces_scale_with_rho_nu_squared_at_a_reynolds_number(
         ("bridged-gravel", 1 / 30, 4e4, ""),
         ("bridged-gravel", 1 / 30, 5e4, "particle Reynolds number (Clift and Gauvin)"),
         ("profile", 1 / 10, 197.0, ""),
-        ("profile", 1 / 10, 1000.0, "roughness ks u*/nu (Cebeci and Chang) 3e+03"),
+        ("profile", 1 / 10, 1000.0, "roughness ks u*/nu (Cebeci and Chang) 3000"),
         ("zeng", 1 / 30, 34.7, ""),
         ("zeng", 1 / 30, 34.8, "not below 200"),
         ("claudin-andreotti", 1 / 30, 1e5, ""),

@@ -38,6 +38,25 @@ def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
     assert apart.varying(table.iloc[[0, 3]], *SHOWN) == []
 
 
+def test_the_method_comes_before_the_fields_that_it_alone_has() -> None:
+    beds = pd.DataFrame(
+        {
+            "alpha_deg": 0.0,
+            "rho_f_kg_m3": [1000.0, 1000.0, 1.2, 1000.0],
+            "stiffness": [np.nan, np.nan, np.nan, 1e3],
+            "method": ["pivot", "peeling", "peeling", "dem"],
+            "update": [np.nan, 0.0, 0.0, 0.0],
+        }
+    )
+    assert apart.varying(beds, "alpha_deg") == ["rho_f_kg_m3", "method"]
+
+
+def test_a_bed_without_obstacles_says_so() -> None:
+    row = pd.Series({"obstacles": None, "spacing": np.nan})
+    assert labels.panel(row, ["obstacles", "spacing"]) == "no obstacles"
+    assert labels.value("obstacles", None) == "none"
+
+
 def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
     asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
     panels, rows, entries = apart.parted(asked, *SHOWN)
@@ -105,7 +124,7 @@ def test_curves_and_points_of_two_layers_are_told_apart(two: Results) -> None:
 def test_rows_of_two_layers_are_told_apart(two: Results) -> None:
     sheet = facts.piles(two)
     assert sheet is not None
-    at = sheet.head.index("and")
+    at = sheet.head.index("other choices")
     assert {row[at] for row in sheet.rows} == {"mobile layers = 1", "mobile layers = 2"}
 
 
@@ -149,14 +168,34 @@ def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
     said = captions.hold_protocol(without)
     assert "Holding protocol" not in said
     assert "pivot" in said
-    entries = [line.get_label() for line in shields.point_entries(without)]
-    assert entries == ["pivot, Eq. 4 (high Re*)"]
+    (entry,) = shields.point_entries(without)
+    assert not isinstance(entry, tuple)
+    assert entry.get_label() == "pivot, Eq. 4 (high Re*)"
+
+
+def test_no_marker_stands_for_a_law_and_for_a_variant(table: pd.DataFrame) -> None:
+    _, rows, variants = apart.parted(table.iloc[:3].assign(usable=True, why_not=""), *SHOWN)
+    rows = rows.assign(answered_method="dem")
+    assert variants
+    assert shields.point_entries(rows, variants) == []
+    both = pd.concat([rows, rows.assign(force_law="low")])
+    assert len(shields.point_entries(both, variants)) == 2
+
+
+def test_legends_leave_out_curves_beyond_the_frame() -> None:
+    ax = style.canvas(2.0).subplots()
+    entries = [*shields.draw_water(ax), *shields.draw_measured(ax)]
+    ax.set(xlim=(10, 100), ylim=(0.01, 0.1))
+    assert shields.within([ax], entries) == entries
+    ax.set(xlim=(10, 100), ylim=(1, 10))
+    assert shields.within([ax], entries) == []
 
 
 @pytest.mark.parametrize(
     ("column", "value", "said"),
     [
         ("alpha_deg", 15.0, "α = 15°"),
+        ("alpha_deg", 10.463, "α = 10.46°"),
         ("z0_over_d", 0.033333333, "z₀ = d/30"),
         ("d_m", 7e-4, "d = 0.7 mm"),
         ("turbulence_model", "RNGkEpsilon", "RNG k-ε"),

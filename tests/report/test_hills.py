@@ -1,10 +1,12 @@
 """Hills that others measured, from their study file to the figure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from orchestrator.physics.hills import measured
-from orchestrator.report import hills
+from orchestrator.report import answer, hills
 from orchestrator.report.results import Results
 from tests import small_study
 
@@ -58,6 +60,25 @@ def test_computed_stands_beside_measured(results: Results) -> None:
     np.testing.assert_allclose(ends, results.tables["flow"]["reattachment_over_h"])
     tops = [np.max(np.asarray(one.get_ydata())) for one in lines if one.get_gid() == "stress"]
     np.testing.assert_allclose(tops, results.tables["flow"]["ustar_largest"])
+
+
+def test_the_page_of_a_measured_hill_begins_with_it(results: Results) -> None:
+    (figure,) = hills.draw(results)
+    assert figure.leads
+    assert figure.canvas
+    said = [text.get_text() for legend in figure.canvas.legends for text in legend.texts]
+    assert said == ["k-ε", "RNG k-ε", "measured end of the reversed flow"]
+    (sentence,) = hills.sentences(results)
+    assert "half length 3 h: measured to 6.5 h; by k-ε to " in sentence
+    assert answer.sentences(results)[0] == sentence
+
+
+def test_a_panel_without_reversed_flow_says_so(results: Results) -> None:
+    flows = results.tables["flow"].assign(reattachment_over_h=np.nan, separation_over_h=np.nan)
+    (figure,) = hills.draw(replace(results, tables={**results.tables, "flow": flows}))
+    assert figure.canvas
+    texts = [text.get_text() for axes in figure.canvas.axes for text in axes.texts]
+    assert texts == ["no reversed flow"]
 
 
 def test_another_hill_is_not_the_experiments() -> None:

@@ -95,6 +95,12 @@ PROBE = """<script>addEventListener("load", () => {
   const figure = document.querySelector("figure svg").getBoundingClientRect();
   document.documentElement.dataset.top = Math.round(figure.top);
   document.documentElement.dataset.height = document.documentElement.scrollHeight;
+  const folds = () => document.querySelectorAll("figcaption > details:not([open])").length;
+  const closed = folds();
+  dispatchEvent(new Event("beforeprint"));
+  document.documentElement.dataset.printed = `${closed} ${folds()}`;
+  dispatchEvent(new Event("afterprint"));
+  document.documentElement.dataset.after = folds() === closed;
 });</script>"""
 
 
@@ -116,5 +122,9 @@ def test_in_a_browser_the_slider_moves_grains_and_a_point_answers(
     tip = dom[dom.index('<div class="tip"') :]
     assert "τ_c = " in tip[: tip.index("<script")]
     assert "hidden" not in tip[: tip.index(">")]
+    closed, printed = map(int, dom.split('data-printed="')[1].split('"')[0].split())
+    assert closed == html.count("<figcaption>")
+    assert printed == 0
+    assert 'data-after="true"' in dom
     top = int(dom.split('data-top="')[1].split('"')[0])
     assert top < 900

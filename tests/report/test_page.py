@@ -129,7 +129,7 @@ def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
     for row in results.tables["pile_threshold"].itertuples():
         assert f"{row.shields:.4f}" in parsed.text
     assert "by Eq. 2 or Eq. 4 where neither holds" in parsed.text
-    assert "What this does not say" in parsed.text
+    assert "Limits of these results" in parsed.text
     for said in ("liggghts", "openfoam", "matplotlib", "pile.foam", "./Allrun", "columns.csv"):
         assert said in parsed.text
     for kind in ("cells", "flow", "pile"):
@@ -213,4 +213,5 @@ def test_symbols_have_an_index_and_names_of_columns_none() -> None:
     typeset = page_module.typeset
     assert typeset("τ_c of ρ_sol") == "τ<sub>c</sub> of ρ<sub>sol</sub>"
     assert typeset("column frozen_bed") == "column frozen_bed"
+    assert typeset("why_not; Re_p, U_e") == "why_not; Re<sub>p</sub>, U<sub>e</sub>"
     assert typeset("`--tolerance 0` runs") == "<code>--tolerance 0</code> runs"

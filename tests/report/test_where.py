@@ -1,9 +1,12 @@
 """Beds of other shapes from their study file to the map of their grains' thresholds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from orchestrator.report import where
+from orchestrator.report.pictures import bed
 from orchestrator.report.results import Results
 from tests import small_study
 
@@ -54,6 +57,18 @@ def test_the_map_shows_every_grain_at_its_place(results: Results) -> None:
     goes = grains[grains["ustar0_m_s"].notna()]
     np.testing.assert_allclose(shown[:, 0], goes["x_m"] / 0.01)
     np.testing.assert_allclose(shown[:, 1], goes["ustar0_m_s"])
+
+
+def test_the_picture_of_a_long_train_shows_single_grains(results: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    assert bed._part(pile) == ""
+    five = pile.scene.model_copy(update={"bed": pile.bed.model_copy(update={"forms": 20})})
+    train = replace(pile, scene=five)
+    assert float(train.line.toe[0]) > bed.MOST * bed.LONG
+    left, right, *_ = bed.window(train)
+    assert right - left == pytest.approx(bed.LONG)
+    assert left < float(train.line.crest[0]) < right
+    assert "of the first form" in bed._part(train)
 
 
 def test_a_current_a_metre_above_the_bed_follows_from_the_log_law(results: Results) -> None:

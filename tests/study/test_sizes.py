@@ -35,6 +35,12 @@ def test_roughness_is_a_part_of_the_percentile_that_it_names() -> None:
     assert found > 1.3e-4
 
 
+def test_a_median_in_the_middle_of_a_class_is_that_class() -> None:
+    """Not its logarithm's exponential: d = 1 mm would be two diameters in a legend."""
+    classes = ((5e-4, 0.15), (7e-4, 0.2), (1e-3, 0.3), (1.4e-3, 0.2), (2e-3, 0.15))
+    assert sizes.percentile(classes, 1.0, 0.5) == 1e-3
+
+
 @pytest.mark.parametrize("mixture", [SIEVE, LogNormal(sigma_g=1.4, smallest=0.5, largest=2.0)])
 def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes) -> None:
     diameter = 1e-3

@@ -32,6 +32,8 @@ FRACTION = 0.3
 """n/N of the state that is shown first."""
 LONG = 100.0
 """Length of a face, d, beyond which its upper end is shown alone: grains must be seen."""
+MOST = 4.0
+"""Length of a whole bed over that: the faces of a train of short forms are many."""
 SHIFT = 0.02
 """Grains that have moved by less since they were last drawn stay, d."""
 
@@ -119,7 +121,7 @@ def draw(results: Results) -> Iterator[Figure]:
             f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
             f"{labels.plain('alpha_deg', pile.bed.slope_deg)}, "
             f"{labels.plain('d_m', pile.scene.grain.diameter)}",
-            captions.bed(results, pile),
+            captions.bed(results, pile) + _part(pile),
             tuple(one.name for one in reversed(pile.runs)),
             None,
             _svg(steps, shown, results.cases).encode(),
@@ -144,7 +146,7 @@ def chosen(results: Results) -> Iterator[Pile]:
 
 
 def data(steps: Steps, shown: int) -> dict[str, Any]:
-    """What a slider through the load steps needs: of each, the mobile grains whose place is new.
+    """Data for a slider through the load steps: the mobile grains that are elsewhere after each.
 
     ``frames`` has three numbers for each such grain: its number, x and -z; null if it has left.
     """
@@ -186,15 +188,34 @@ def _triple(number: int, place: FloatArray) -> tuple[int, float | None, float | 
 
 
 def window(pile: Pile) -> Window:
-    """What is shown: the whole pile, or of a long one the upper end of its face."""
+    """The whole pile, or the upper end of a long face."""
     (x, z), toe = pile.line.crest, float(pile.line.toe[0])
-    if z <= 0:  # a level bed has no crest
+    if _is_level(pile):
         left = pile.line.x[1] - 2
         return left, min(pile.line.x[-2] + 2, left + LONG), -4.0, 6.0
     beside = 0.06 * toe
-    if x <= LONG:
+    if _is_short(pile):
         return -beside, toe + beside, -2.0, float(z) + max(0.5 * z, 6.0)
     return float(x) - 0.7 * LONG, float(x) + 0.3 * LONG, float(z) - 0.2 * LONG, float(z) + 12.0
+
+
+def _part(pile: Pile) -> str:
+    """A sentence for the caption where the picture leaves out a part of the bed."""
+    if _is_level(pile):
+        _, right, *_ = window(pile)
+        return f" Shown: {LONG:g} d of the bed." if right < pile.line.x[-2] else ""
+    of = " of the first form" if pile.bed.forms > 1 else ""
+    return "" if _is_short(pile) else f" Shown: the upper end of the windward face{of}."
+
+
+def _is_level(pile: Pile) -> bool:
+    """A level bed has no crest."""
+    return float(pile.line.crest[1]) <= 0
+
+
+def _is_short(pile: Pile) -> bool:
+    """Whether single grains are seen in a picture of all forms."""
+    return float(pile.line.crest[0]) <= LONG and float(pile.line.toe[0]) <= MOST * LONG
 
 
 def _svg(steps: Steps, shown: int, cases: Path) -> str:

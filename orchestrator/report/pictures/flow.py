@@ -22,19 +22,26 @@ FloatArray = NDArray[np.float64]
 
 BEFORE, BEHIND, ABOVE = 2.0, 8.0, 3.0
 """Flow shown before the windward toe, behind the lee toe, and above the flat bed, h."""
+MOST = 6
+"""Panels of a figure."""
 COLUMNS = 1000
 SMOOTHED = 6.0
 """Standard deviation of the smoothing of streamlines along x, columns."""
 
 
 def draw(results: Results) -> Iterator[Figure]:
-    """One figure with a panel for each slope and height, at its least z0."""
+    """A panel for each slope and height, at its least z0; six in a figure."""
     piles = chosen(results)
-    if not piles:
-        return
-    names = tuple(pile.flow.name for pile in piles)
-    canvas = _frame(results, piles)
-    yield Figure("flow", "Flow over the pile", captions.flow(piles), names, canvas)
+    for number, start in enumerate(range(0, len(piles), MOST)):
+        some = piles[start : start + MOST]
+        yield Figure(
+            "flow" + (f"-{number + 1}" if number else ""),
+            "Flow over the pile" + (f", more panels ({number})" if number else ""),
+            captions.flow(some),
+            tuple(pile.flow.name for pile in some),
+            _frame(results, some),
+            fold=number > 0,
+        )
 
 
 def chosen(results: Results) -> list[Pile]:
