@@ -163,7 +163,7 @@ class Opened:
 
     @property
     def title(self) -> str:
-        """What its file calls it."""
+        """Title in its study file."""
         return self._results.study.title
 
     @property
@@ -187,13 +187,13 @@ class Opened:
 
     @property
     def answer(self) -> str:
-        """What was found, in words and a short table."""
+        """The answer, in words and a short table."""
         found = self._results
         return report.said(found.study, found.plan, found.tables, found.cases)
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What was found, in words alone."""
+        """The answer, in words alone."""
         return tuple(self.answer.split("\n\n")[-1].splitlines())
 
     @cached_property

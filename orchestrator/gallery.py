@@ -18,7 +18,7 @@ PICTURES = ("bed-*.svg", "shields.svg")
 
 @dataclass(frozen=True)
 class Card:
-    """What the gallery says of a study.
+    """A study's card in the gallery.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ from orchestrator.study.study import Study, parse
 
 @dataclass(frozen=True)
 class Finished:
-    """What a study came to.
+    """Outcome of a study.
 
     Attributes
     ----------

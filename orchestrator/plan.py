@@ -17,7 +17,7 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 2.0, 4e-3, 4e-5
-"""What tables and figures take, on each scene, and on each grain of a bed without a run, s: read
+"""Times of tables and figures on each scene, and on each grain of a bed without a run, s: read
 off `first-look`, `ripples` and `paper --tolerance 0.2` on two cores."""
 
 

@@ -95,7 +95,7 @@ class PouredBed(Case):
 
     @cached_property
     def mould(self) -> Mould:
-        """What the grains rain into."""
+        """Mould that the grains rain into."""
         return Mould(self.line, self.depth, self.surface, self.width)
 
     @property

@@ -26,7 +26,7 @@ Key = tuple[str, str]
 COUNTS = ("moved", "not_moved", "carried_off")
 """Whole numbers, which may be small."""
 STEPS: Key = ("steps", "")
-"""What a solver may add to any answer: how many time steps it took."""
+"""Quantity that a solver may add to any answer: its number of time steps."""
 
 
 class AnswerError(OrchestratorError):

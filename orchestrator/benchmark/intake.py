@@ -1,4 +1,4 @@
-"""What a pack may hold: whoever made it, nothing of it is believed before it was read here."""
+"""Reading of packs: whoever made one, nothing of it is believed before it is checked here."""
 
 import json
 import os
@@ -70,7 +70,7 @@ ASKED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "pile": ((), _BED),
     "line": (("count",), _BED),
 }
-"""What is asked of each kind: single numbers, and functions of something."""
+"""Quantities of each kind: single numbers, and functions of something."""
 
 Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 SceneName = Annotated[str, Field(max_length=80, pattern=f"^{_SCENE}$")]
@@ -87,7 +87,7 @@ class Machine(BaseModel):
 
 
 class Manifest(BaseModel):
-    """What a pack says of itself."""
+    """The manifest of a pack."""
 
     model_config = ConfigDict(strict=True, extra="forbid")
     kind: Literal["benchmark pack"]

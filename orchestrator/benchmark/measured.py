@@ -105,7 +105,7 @@ def flow(one: Answered) -> Problem:
 
 
 def flow_parameters(one: Answered) -> dict[str, Any]:
-    """What the flow of a pile is solved with."""
+    """Parameters of the solve of a pile's flow."""
     case = one.pile.flow
     return {
         "alpha_deg": case.slope_deg,

@@ -29,11 +29,11 @@ ANGLES = {math.pi / 180: "degrees taken for radians", 180 / math.pi: "radians ta
 SPHERE, DISC, SHELL = 2 / 5, 1 / 2, 2 / 3
 """Moments of inertia over m r^2."""
 CRITERIA = (0.1, 0.2, 0.5)
-"""What the displacement criterion is taken for, d."""
+"""Values taken for the displacement criterion by mistake, d."""
 GRAVITIES = (9.8, 9.80665, 10.0)
-"""What g is taken for, m/s2."""
+"""Values taken for g by mistake, m/s2."""
 DERIVED = ("reynolds", "shields")
-"""What follows from the threshold's u*."""
+"""Quantities that follow from the threshold's u*."""
 Told = Mapping[str, Any]
 Bodies = tuple[tuple[float, str], ...]
 
@@ -176,7 +176,7 @@ def formulas(told: Told) -> Callable[[str, str], float]:
 
 
 def _counting(rows: pd.DataFrame, wrong: pd.DataFrame) -> str:
-    """What a pile's counts say of the rule that they were made by."""
+    """Guess the counting rule behind a pile's counts."""
     of = {name: own.set_index("at") for name, own in rows.groupby("quantity")}
     if "carried_off" not in of or "moved" not in wrong["quantity"].to_numpy():
         return ""

@@ -39,12 +39,12 @@ SAID = {
     "spin when it rolls": ("spin_over_start", "2"),
     "time of passing": ("passing_time_over_t", ""),
 }
-"""What the check decks print, and what a pack asks."""
+"""Names that the check decks print, and the quantities of a pack."""
 
 
 @dataclass(frozen=True)
 class Took:
-    """What solvers took: wall time, and CPU time of them all, s; NaN for formulas."""
+    """Times of solvers: wall time, and CPU time of them all, s; NaN for formulas."""
 
     seconds: float
     cpu_s: float

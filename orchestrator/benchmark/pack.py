@@ -51,11 +51,11 @@ class Pack:
         return digest_text(canonical_json(sums))
 
     def directory(self, scene: str) -> Path:
-        """What the solver of a scene is given."""
+        """Parameters that the solver of a scene gets."""
         return self.root / SCENES / scene
 
     def about(self, scene: str) -> str:
-        """What a reader knows a bed by: slope, diameter or roughness, packing."""
+        """Name of a bed for a reader: slope, diameter or roughness, packing."""
         told = self.scenes[scene]
         size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
         seed = f" {told['seed']}" if "seed" in told else ""

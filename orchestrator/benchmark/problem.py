@@ -131,7 +131,7 @@ MEANINGLESS: Mapping[str, frozenset[str]] = {
     # its speed at the lid is told as that of level 3
     "line": frozenset({*_NUMERICS, "solve_u_e_m_s"}),
 }
-"""What of a scene does not matter to who solves it as a kind: all else is told."""
+"""Parameters of a scene without effect on a kind; all others are told."""
 
 
 SHAPES = frozenset(
@@ -142,12 +142,12 @@ SHAPES = frozenset(
         *("flow_top", "depth_m"),
     }
 )
-"""What the bed, its line, the stress on it and the forces follow from: packs have these themselves,
+"""Parameters that the bed, its line, the stress and the forces follow from: packs have the results,
 and ask for the flow of boundary layers alone."""
 
 
 def parameters(scene: Scene, kind: str) -> dict[str, Any]:
-    """What a pack says of a scene, whose force law is decided, where it is a problem of a kind."""
+    """Parameters of a scene in a pack, with its force law decided, as a problem of a kind."""
     grain = scene.grain
     told = fields.used(scene) | mechanics(
         grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness

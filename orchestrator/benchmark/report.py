@@ -29,12 +29,12 @@ ABOUT = {
     4: "grains of a pile",
     5: "flow and grains",
 }
-"""What the levels are."""
+"""Names of the levels."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a comparison came to: failures as lines, a summary, the page."""
+    """Outcome of a comparison: failures as lines, a summary, the page."""
 
     failures: list[str]
     summary: str

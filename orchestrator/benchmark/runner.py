@@ -96,7 +96,7 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
 
 
 def _made(results: Path) -> dict[str, Any]:
-    """What `run` noted in its results; nothing of those that something else made."""
+    """The notes of `run` in its results; empty for results of something else."""
     told = claim.told(results, claim.RESULTS)
     return told if told and told["kind"] == claim.RESULTS.word else {}
 
@@ -179,7 +179,7 @@ def _secrets(chosen: Pack, out: Path) -> list[Path]:
 
 
 def _note(name: str, hidden: bool | None) -> str:
-    """What is known of what a solver saw while it answered."""
+    """Notes on the surroundings in which a solver answered."""
     if hidden is None:
         return f"{name}: nothing is known of how its answers were made."
     if hidden:

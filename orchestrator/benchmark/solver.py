@@ -25,7 +25,7 @@ OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
 
 @dataclass(frozen=True)
 class Solved:
-    """What came of a scene.
+    """Outcome of a scene.
 
     Attributes
     ----------

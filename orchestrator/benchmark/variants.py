@@ -57,7 +57,7 @@ def changes(told: Told, other: Told) -> str:
 
 
 def wrong(expected: pd.DataFrame, given: bytes) -> str:
-    """What of an answer is not within the expectations, or nothing."""
+    """Quantities of an answer beyond the expectations, if any."""
     try:
         found = answer.parsed(given)
     except AnswerError as error:
@@ -100,4 +100,4 @@ MAKERS: dict[str, Callable[[Told], Problem]] = {
     "incline": lambda told: exact.incline(told["incline_deg"] * (1 - random.uniform(*MUCH))),
     "passing": lambda told: exact.passing(_push(told) * (1 + random.uniform(*MUCH))),
 }
-"""What makes a variant, by kind; the start of a sliding grain does not change its answer."""
+"""Parameters that make a variant, by kind; the start of a sliding grain has no effect."""

@@ -19,13 +19,13 @@ from orchestrator.errors import InputError, one_line, printable
 from orchestrator.runs.files import read_json
 
 USED = "used.json"
-"""What a solver took for a scene, beside its answer."""
+"""Time of a solver for a scene, beside its answer."""
 OURS = "ours"
 """Our own answers, in a directory beside the solver's."""
 ROUND = 1e-8
 """Relative: the digits of a pack's tables."""
 NUMBERS = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
-"""What differs in the messages of one cause."""
+"""Parts that differ in the messages of one cause."""
 
 
 @dataclass(frozen=True)

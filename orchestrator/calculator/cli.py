@@ -74,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _of_option(option: str, read: Any, *arguments: Any) -> Any:
-    """What an option's text means; a refusal names the option."""
+    """Read the text of an option; a refusal names the option."""
     try:
         return read(*arguments)
     except InputError as error:

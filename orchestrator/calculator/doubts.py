@@ -21,7 +21,7 @@ GAS, LIQUID = (3e-6, 1e-4), (1e-4, 0.1)
 
 
 def questions(largest: Mapping[str, float]) -> dict[str, str]:
-    """What looks like another unit; a question for each such parameter, by its name.
+    """Questions on parameters that look like another unit, by name.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _fluid(rho: float, nu: float) -> str:
 
 
 def _other_units(rho: float, nu: float) -> Iterator[str]:
-    """What makes a usual fluid of the same numbers."""
+    """Units in which the same numbers are a usual fluid."""
     if _is_usual(rho * 1000, nu):
         yield f"{rho:g} g/cm3, --fluid-density {rho * 1000:g}"
     for factor, said in (

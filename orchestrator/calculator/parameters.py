@@ -1,4 +1,4 @@
-"""What the closed form of a grain depends on, by every name that it has."""
+"""Parameters of the closed form of a grain, by every name that they have."""
 
 import re
 from collections.abc import Mapping

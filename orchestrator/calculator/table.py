@@ -32,7 +32,7 @@ Values = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is told of a threshold: its name in JSON, its column, and words for people."""
+    """A quantity of a threshold: its name in JSON, its column, and words for people."""
 
     name: str
     column: str

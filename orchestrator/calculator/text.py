@@ -12,7 +12,7 @@ RULE = {
     "high": "Eq. 4 (high), since Re* is not below 30",
     "transition": "both Eq. 2 (low) and Eq. 4 (high), since neither holds",
 }
-"""What the paper's rule picks in each regime."""
+"""Laws that the paper's rule picks in each regime."""
 GIVE_DEPTH = "for the mean velocity of the liquid give its depth, --depth in m"
 FORCES = ("drag", "lift")
 GAP = "  "

@@ -22,7 +22,7 @@ CHEAP = Bound({"flow": "coarse", "grains": "peeling"}, "it checks answers withou
 
 
 def group(scene: Scene) -> str:
-    """What the piles of one check have in common."""
+    """The key that the piles of one check share."""
     assert isinstance(scene.bed, PileBed)
     return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.forces.law}"
 

@@ -210,7 +210,7 @@ def lifts_off(scene: Scene) -> bool:
 
 
 Named = tuple[tuple[Part, str], ...]
-"""What a mapping by part holds, in a form that can be cached by."""
+"""The items of a mapping by part, in a form that can be cached by."""
 
 
 @cache  # a study has thousands of scenes of a few classes

@@ -109,7 +109,7 @@ def _pile_slope(scene: Scene) -> str | None:
 
 
 def _bed_line(scene: Scene) -> str | None:
-    """What is wrong with the bed line; most often nothing."""
+    """A fault of the bed line, if there is one."""
     if not (bed := _pile(scene)):
         return None
     try:

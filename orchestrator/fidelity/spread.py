@@ -16,7 +16,7 @@ from orchestrator.study.scene import Scene
 
 @dataclass(frozen=True)
 class Share:
-    """What one choice does to a threshold.
+    """Effect of one choice on a threshold.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Share:
 
 @dataclass(frozen=True)
 class Spread:
-    """What all shared choices do together.
+    """Effect of all shared choices together.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def _of(shares: tuple[Share, ...]) -> Spread:
 
 @cache
 def _measured() -> dict[str, dict[float, tuple[Share, ...]]]:
-    """What was measured, by class of scenes, then by fraction."""
+    """The measured shares, by class of scenes, then by fraction."""
     found: dict[str, dict[float, tuple[Share, ...]]] = {}
     with (calibration.FOLDER / "budget.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):

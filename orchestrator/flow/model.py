@@ -29,7 +29,7 @@ FIELD_OF = {
     "downstream": "flow.downstream",
     "non_orthogonal_correctors": "flow.non_orthogonal_correctors",
 }
-"""What a study file calls the parameters of a flow case."""
+"""Names in a study file of the parameters of a flow case."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What every case of LIGGGHTS on a bed of grains has in common."""
+"""The common part of all cases of LIGGGHTS on a bed of grains."""
 
 from pathlib import Path
 from typing import ClassVar

@@ -16,7 +16,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Count:
-    """What N counted grains have done by each of T samples. What is once true stays true.
+    """Motion of N counted grains by each of T samples. A grain that has moved stays so.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def count(
 def deck_counts(
     travel: FloatArray, criterion: float, aside: FloatArray | float = 0.0
 ) -> tuple[IntArray, IntArray]:
-    """What the deck prints at each sample, shape (T,): grains that have not moved; fallen."""
+    """Counts of the deck at each sample, shape (T,): grains that have not moved; fallen ones."""
     lying = ~np.isnan(travel) & ~_ever(_moved(travel, aside, criterion))
     return lying.sum(axis=1), (travel <= -criterion).sum(axis=1)
 

@@ -1,4 +1,4 @@
-"""What LIGGGHTS wrote of the grains: its text dumps, and the track of the counted grains."""
+"""Files of LIGGGHTS on the grains: its text dumps, and the track of the counted grains."""
 
 from dataclasses import dataclass
 from io import StringIO

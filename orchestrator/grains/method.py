@@ -26,7 +26,7 @@ class Method(ABC):
 
     @abstractmethod
     def motion(self, cases: Path) -> Motion:
-        """What the windward grains do; `cases` holds the finished runs."""
+        """Motion of the windward grains; `cases` holds the finished runs."""
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""

@@ -1,4 +1,4 @@
-"""What the counted grains of a deck did: who moved, at which flow, and how."""
+"""Motion of the counted grains of a deck: which moved, at which flow, and how."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -57,7 +57,7 @@ class Pile(LoadedBed):
         return replace(found, speed=self.method.last(cases).speed[self.packing.windward])
 
     def motion(self, cases: Path) -> Motion:
-        """What the windward grains do; `cases` holds the finished runs."""
+        """Motion of the windward grains; `cases` holds the finished runs."""
         return self.method.motion(cases)
 
     def thresholds(self, cases: Path, fractions: Iterable[float]) -> list[PileThreshold]:

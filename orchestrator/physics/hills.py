@@ -14,7 +14,7 @@ HEIGHT_OVER_ROUGHNESS = 0.117 / 1.57e-4
 
 @dataclass(frozen=True)
 class MeasuredHill:
-    """What was measured behind a hill.
+    """Measurements behind a hill.
 
     Attributes
     ----------

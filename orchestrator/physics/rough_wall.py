@@ -80,7 +80,7 @@ def _summed(y: FloatArray) -> FloatArray:
 
 
 def _log_above(y: FloatArray) -> FloatArray:
-    """What the log law adds to the speed at the end of the table."""
+    """Addition of the log law to the speed at the end of the table."""
     return np.log(np.maximum(y / TALLEST, 1)) / KARMAN
 
 

@@ -51,7 +51,7 @@ def weight(
 
 
 def pivot_resistance(slope_deg: ArrayLike, entrainment_angle_deg: ArrayLike) -> FloatArray:
-    """What the pivot's moment balance asks of the flow, over W: cos(alpha - beta) (Eq. 1)."""
+    """Moment over W that the flow needs about the pivot: cos(alpha - beta) (Eq. 1)."""
     lean = np.radians(np.asarray(slope_deg, float) - np.asarray(entrainment_angle_deg, float))
     return np.asarray(np.cos(lean))
 

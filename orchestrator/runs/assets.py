@@ -27,7 +27,7 @@ GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
     *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
 )
-"""What a run by hand in the template's own folder leaves there; it is no part of the template."""
+"""Files that a run by hand leaves in the template's own folder; no part of the template."""
 
 
 def copy_template(name: str, folder: Path) -> None:

@@ -54,7 +54,7 @@ class Case(ABC):
     bulky: ClassVar[tuple[str, ...]] = ()
     """Large files that the run leaves and no table is made of: `prune` drops them."""
     made: ClassVar[tuple[str, ...]] = ()
-    """What else is written or left there: no file that fits none of these patterns is the run's."""
+    """Patterns of other files that a run writes or leaves; files that fit none are not its own."""
 
     @property
     @abstractmethod

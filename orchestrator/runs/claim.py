@@ -99,7 +99,7 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
 
 
 def told(root: Path, kind: Kind) -> dict[str, Any] | None:
-    """What the marker of a kind says; None where there is none, or it is not this program's."""
+    """Content of the marker of a kind; None where there is none, or it is not this program's."""
     value = read_json(root / kind.marker)
     known = isinstance(value, dict) and {"kind", "name"} <= value.keys()
     return value if known else None

@@ -139,7 +139,7 @@ def _libraries() -> tuple[Any, Any]:
 
 
 def _settings(kind: Any, given: Mapping[str, Any], root: Path) -> dict[str, Any]:
-    """What is asked of dask-jobqueue: the settings given, and what no study needs to say."""
+    """Arguments for dask-jobqueue: the settings given, and those that no study needs to give."""
     known = _known(kind)
     for key in given:
         if key not in known:
@@ -207,7 +207,7 @@ def _cores(kind: Any, settings: Mapping[str, Any]) -> int:
 
 
 def _configuration(kind: Any, settings: Mapping[str, Any]) -> str:
-    """What dask's own configuration calls a queue."""
+    """Name of a queue in dask's own configuration."""
     return str(settings.get("config_name", kind.job_cls.config_name))
 
 

@@ -22,12 +22,12 @@ _POWERLESS = (
     *("setpriv", "--no-new-privs", "--bounding-set=-all", "--inh-caps=-all"),
     *("--ambient-caps=-all", "--"),
 )
-"""What hides a directory could show it again: the program itself has no such right."""
+"""Rights to mount could show a hidden directory again: the program itself has none of them."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a program may take.
+    """Limits of a program.
 
     Attributes
     ----------

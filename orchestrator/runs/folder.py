@@ -22,7 +22,7 @@ is written: a killed process leaves no file that nobody knows."""
 KEPT = "kept"
 """Where things are moved that stand in the way and that this program did not write."""
 TEMPORARY = re.compile(r"^\.(.+)\.\d+\.tmp$")
-"""What a killed process was about to write, and the name that it was for."""
+"""Pattern of files that a killed process was about to write, with their final names."""
 
 LINE = re.compile(rb"([0-9a-f]{64})  (.+)")
 
@@ -238,7 +238,7 @@ class Folder:
                 stream.write(_text(lines))
 
     def _lines(self) -> list[Line]:
-        """What the record says, as far as it can be read."""
+        """Entries of the record, as far as it can be read."""
         found = map(LINE.fullmatch, _content(self.path(RECORD)))
         return [(line[1].decode(), os.fsdecode(line[2])) for line in found if line]
 

@@ -122,7 +122,7 @@ def _wait(
 
 @contextlib.contextmanager
 def end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
-    """What becomes ready when a program ends."""
+    """A handle that becomes ready when a program ends."""
     handle = os.pidfd_open(process.pid)
     end = select.poll()
     end.register(handle, select.POLLIN)

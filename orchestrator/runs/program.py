@@ -26,7 +26,7 @@ _STARTS = {
 
 @dataclass(frozen=True)
 class Said:
-    """What a program said, and how it ended.
+    """Output and end of a program.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def _not_started(path: str, error: OSError) -> SolverError:
 
 
 def _listen(process: "subprocess.Popen[bytes]", deadline: float) -> bytes | None:
-    """What a program says until its end, or until it is enough; None if it goes on too long."""
+    """Output of a program until its end, or until it is enough; None if it goes on too long."""
     assert process.stdout
     stream, said = process.stdout.fileno(), b""
     # what it has started may hold the stream open when it has ended itself

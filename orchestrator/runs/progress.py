@@ -1,4 +1,4 @@
-"""What a running study shows: the share of the work done, the last case that ended, time left."""
+"""Progress of a running study: the share of the work done, the last case that ended, time left."""
 
 import math
 import sys
@@ -138,13 +138,13 @@ class Forecast:
         return self._costs(self._pace) + self._after_s
 
     def _costs(self, pace: Callable[[str], float]) -> float:
-        """What is left of the runs, s, at a pace for each kind."""
+        """Time left of the runs, s, at a pace for each kind."""
         left = sum(cost * pace(kind) for kind, cost in self._left.items())
         gone = sum(cost * pace(kind) for kind, cost in self._going.values())
         return max(0.0, left - gone) / self._workers
 
     def _pace(self, kind: str) -> float:
-        """What a case takes over what it was thought to cost; a new kind goes as the others do."""
+        """Time of a case over its expected cost; a new kind goes as the others do."""
         if not self._ended:
             return 1.0
         if kind in self._ended:

@@ -11,7 +11,7 @@ from orchestrator.runs.workspace import Workspace
 
 @dataclass(frozen=True)
 class Pruned:
-    """What a study was and is.
+    """Sizes of a study before and after.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
 
 
 def text(pruned: Pruned) -> str:
-    """What was done, for people."""
+    """Summary for people."""
     lines = [
         f"before: {size_text(pruned.before)}",
         f"after:  {size_text(pruned.after)}",

@@ -1,4 +1,4 @@
-"""What is tried again by itself: a program that something outside of it ended, a few times."""
+"""Run a program again, a few times, if something outside of it ended it."""
 
 import signal
 import threading

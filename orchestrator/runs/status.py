@@ -81,7 +81,7 @@ def sizes(space: Workspace) -> dict[str, int]:
 
 
 Markers = dict[str, dict[str, Any]]
-"""What the markers of all directories of cases say, by name; empty where a case is not done."""
+"""Contents of the markers of all directories of cases, by name; empty for a case not done."""
 
 
 def _markers(space: Workspace) -> Markers:

@@ -17,7 +17,7 @@ from orchestrator.runs.folder import Folder
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
 MARKERS = (STUDY.marker, STATE)
-"""What is not drawn anew with tables, figures and page."""
+"""Files that are not made anew with tables, figures and page."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Workspace:
             self.folder.put(kind.marker, text_of(value))
 
     def description(self) -> dict[str, Any]:
-        """What `describe` wrote.
+        """Read the text that `describe` wrote.
 
         Raises
         ------

@@ -20,7 +20,7 @@ LIBRARIES = (
 )
 TOOLS = ("stdbuf", "sha256sum", "setpriv")
 _NEEDS = {"gmsh": "apt-get install libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"}
-"""What a library needs beside itself."""
+"""Packages that a library needs beside itself."""
 FREE_GIB = 1.0
 
 

@@ -131,7 +131,7 @@ def read_last_time(
 
 
 def check_log(directory: Path) -> int:
-    """What the logs of a case say of its end.
+    """Read the end of a case from its logs.
 
     Parameters
     ----------

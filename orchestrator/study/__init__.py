@@ -1,1 +1,1 @@
-"""What is asked: scenes, and the study files that span them."""
+"""Questions: scenes, and the study files that span them."""

@@ -33,7 +33,7 @@ def law(scene: Scene) -> ForceLaw:
 
 
 def exposure(scene: Scene, sizes: ArrayLike = 1.0, gaps: ArrayLike | None = None) -> Exposure:
-    """What the force on a grain of a scene depends on besides the friction velocity.
+    """Exposure of a grain of a scene: all that its force depends on besides the friction velocity.
 
     Grains of other sizes are given by their diameters, in that of the scene; their lowest points
     lie some gaps (m) above the level of the flow, by default z0.

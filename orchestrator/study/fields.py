@@ -164,7 +164,7 @@ beds apart that are alike but for the size of their grains."""
 
 
 def asked(scene: Scene) -> dict[str, Any]:
-    """What a scene asks for, by column."""
+    """Values that a scene asks for, by column."""
     return {column: one.asked(scene) for column, one in COLUMNS.items()}
 
 

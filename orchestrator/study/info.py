@@ -1,4 +1,4 @@
-"""What people call a field of a scene, beside its name, its range and its default."""
+"""Words for a field of a scene, beside its name, its range and its default."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +22,7 @@ Scope = Literal[
 ]
 """The scenes on which a field has an effect."""
 About = Literal["question", "answer", "replica"]
-"""What a field says: what is asked of nature, how it is answered, or which of many alike it is."""
+"""Role of a field: a question to nature, a way to answer it, or a choice among many alike."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class Profiles:
     added: str = field(default="", init=False)
 
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
-        """What a profile says of a bed whose table names one; `where` names the study file.
+        """Fields of a bed whose table names a profile; `where` names the study file.
 
         Raises
         ------

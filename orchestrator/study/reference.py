@@ -100,7 +100,7 @@ def _range(declared: FieldInfo) -> str:
 
 
 def _rules(declared: FieldInfo) -> Iterator[Any]:
-    """What the values must fulfil; of an optional field or a list, what each of them must."""
+    """Conditions on the values; for an optional field or a list, those on each of them."""
     yield from declared.metadata
     for inner in get_args(declared.annotation):
         for found in getattr(inner, "__metadata__", ()):

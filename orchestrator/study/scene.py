@@ -242,7 +242,7 @@ def check_protrusion(law: str, *, is_poured: bool) -> None:
 
 
 def check_pile(bed: PileBed, diameter: float) -> None:
-    """What meshes and packings of piles can be built at all."""
+    """Refuse piles whose mesh or packing cannot be built."""
     if bed.relative_size != 1:
         raise UnfitError(
             "bed.relative_size", "it is of a single grain on its neighbours", "leave it out"
@@ -283,7 +283,7 @@ def check_top(flow: Flow, height: float) -> None:
 
 
 def check_shape(bed: PileBed) -> None:
-    """What forms have, and what they are made of."""
+    """Check the forms and their grains."""
     low, high = BUILDABLE_DEG
     rises = bed.shape not in ("flat", "step down")
     if rises and not low <= bed.slope_deg <= high:

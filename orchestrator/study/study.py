@@ -66,7 +66,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Study:
-    """What a study file asks for.
+    """The content of a study file.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the columns of all tables mean."""
+"""Meanings of the columns of all tables."""
 
 from orchestrator.study import fields
 

@@ -21,7 +21,7 @@ WINDWARD = {
 
 
 def row(pile: Pile, cases: Path) -> Row:
-    """What the solved flow of a pile is over: one row for all piles that share it."""
+    """A row of the table of flows: one for all piles that share the flow."""
     flow, stress, line = pile.flow, pile.stress(cases), pile.model.line
     bubble = diagnostics.bubble(stress, line.h) or (np.nan, np.nan)
     ustar = stress.ustar_over_ustar0_wall
@@ -59,7 +59,7 @@ def measured_hill(pile: Pile) -> MeasuredHill | None:
 
 
 def _beside(hill: MeasuredHill | None) -> Row:
-    """What was measured: columns of flows over such hills alone."""
+    """Measured values: columns of flows over such hills alone."""
     if hill is None:
         return {}
     length = hill.reattachment or np.nan

@@ -86,7 +86,7 @@ def grains(answer: Answer) -> pd.DataFrame:
 
 
 def _of_its_own(pile: Pile) -> Row:
-    """What differs from grain to grain of a poured bed."""
+    """Columns that differ from grain to grain of a poured bed."""
     packed, chosen = pile.packing, pile.packing.windward
     found = {"size_over_d": packed.sizes[chosen], "pivot_deg": pile.pivot_angles_deg}
     if packed.width:
@@ -191,7 +191,7 @@ def _levels(decision: Decision) -> Row:
 
 
 def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
-    """What load steps and count enclose; at least the known error, as a factor both ways."""
+    """The interval of load steps and count; at least the known error, as a factor both ways."""
     return {
         "shields_low": shields(scene, min(found.tau_low, found.tau / (1 + error))),
         "shields_high": shields(scene, max(found.tau_high, found.tau * (1 + error))),
@@ -199,7 +199,7 @@ def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
 
 
 def _model_interval(scene: Scene, fraction: float, shields: float) -> Row:
-    """What the choices do that all levels share; never a part of the numerical interval."""
+    """The interval of the choices that all levels share; never a part of the numerical one."""
     found = spread(scene, fraction)
     return {
         "shields_model_low": shields * (1 - found.low),
@@ -236,7 +236,7 @@ def check_rows(
 
 
 def _speeds(scene: Scene, ustar0: float) -> Row:
-    """What a field user measures: the speed at 1 m, or of a channel its mean and the discharge."""
+    """Speeds that a field user measures: at 1 m, or the mean of a channel, with the discharge."""
     z0, flow = scene.bed.roughness, scene.flow
     if flow.depth is None:
         return {"u_1m_m_s": ustar0 / undisturbed_ustar(1.0, 1.0, z0)}

@@ -71,7 +71,7 @@ def _unreached(row: Mapping[object, object]) -> str:
 
 
 def _law(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Iterator[Reason]:
-    """What the bounds of each row's force law say."""
+    """The bounds of each row's force law, with the rows beyond them."""
     for name in sorted(set(rows["force_law"])):
         own = (rows["force_law"] == name).to_numpy()
         d = rows["d_m"].to_numpy(float)

@@ -19,13 +19,13 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 QUANTITIES = ("shields", "ustar0")
-"""What moves: the Shields number of the mean stress on the grains that moved, and the undisturbed
-friction velocity at which they did."""
+"""Quantities compared: the Shields number of the mean stress on the moved grains, and the
+undisturbed friction velocity at which they moved."""
 BASE = "as asked"
 
 
 def decisions(study: Study) -> dict[str, Decision]:
-    """What the budget runs, by names for the plan: each pile as asked and with each alternative."""
+    """Scenes of the budget, by names for the plan: each pile as asked and with each alternative."""
     return {
         key_of(scene, name, levels): on_levels(other, levels, "the budget changes one choice")
         for scene in study.scenes

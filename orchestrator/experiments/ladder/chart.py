@@ -231,7 +231,7 @@ def _key(table: pd.DataFrame) -> list[Artist]:
 
 
 def _look_entries(parts: Sequence[pd.DataFrame]) -> list[Artist]:
-    """What markers and lines mean, of those that are there."""
+    """Legend of the markers and lines that are there."""
     if not parts:
         return []
     rows = _shown(pd.concat(parts))

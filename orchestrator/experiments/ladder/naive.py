@@ -70,7 +70,7 @@ def decisions(scene: Scene) -> dict[str, Decision]:
 def costs(
     routes: Mapping[str, Pile], fast: Pile, cases: Path, cpu_s: Mapping[str, float]
 ) -> pd.DataFrame:
-    """What each route costs for the curve of a pile: route, core_s, extrapolated.
+    """Cost of each route for the curve of a pile: route, core_s, extrapolated.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ CURVE = np.arange(0.05, 0.86, 0.05)
 
 
 def decisions(study: Study) -> dict[str, Decision]:
-    """What the ladder runs: every pile of a study on its pairs of levels, by names for the plan."""
+    """Scenes of the ladder: every pile of a study on its pairs of levels, by names for the plan."""
     return {
         " | ".join((scene.id, *pair)): on_levels(
             scene, dict(zip(LEVELS, pair, strict=True)), "the ladder measures these levels"

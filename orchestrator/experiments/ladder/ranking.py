@@ -1,4 +1,4 @@
-"""What the ladder's points say: errors against the dearest levels, the front, what is known."""
+"""Results of the ladder's points: errors against the dearest levels, the front, known errors."""
 
 import math
 from collections.abc import Hashable, Iterator
@@ -115,7 +115,7 @@ def _undominated(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def known(found: pd.DataFrame) -> pd.DataFrame:
-    """What is known of each level, by class of scene and fraction; `calibration` reads it.
+    """Known error of each level, by class of scene and fraction; `calibration` reads it.
 
     The error is the largest over the scenes, infinite where one of the two did not reach the
     fraction; the uncertainty is how far the reference itself moved on scenes of that class.

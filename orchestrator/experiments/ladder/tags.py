@@ -96,7 +96,7 @@ def _candidates(place: FloatArray, shape: FloatArray) -> Iterator[tuple[FloatArr
 
 
 def _covered(corner: FloatArray, shape: FloatArray, taken: FloatArray, frame: FloatArray) -> float:
-    """What a box would cover and how far it would leave the frame; large against any distance."""
+    """Penalty of a box for points it covers and for leaving the frame; large against distances."""
     low, high = corner, corner + shape
     outside = np.maximum(frame[:2] - low, 0).sum() + np.maximum(high - frame[2:], 0).sum()
     if not len(taken):

@@ -115,7 +115,7 @@ class Cells:
         return max(len(self.ys), 1), max(len(self.xs), 1)
 
     def verdict(self, x: int, y: int) -> str | None:
-        """What a place holds; None where nothing was run."""
+        """Verdict at a place; None where nothing was run."""
         row = self._at.get((x, y))
         return None if row is None else str(row.verdict)
 

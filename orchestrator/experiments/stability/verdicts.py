@@ -31,7 +31,7 @@ VERDICTS = ("exploded", "noisy", "stalled")
 
 @dataclass(frozen=True)
 class Answers:
-    """What the finished and the failed cases of a plan say."""
+    """Verdicts from the finished and the failed cases of a plan."""
 
     planned: Plan
     cases: Path

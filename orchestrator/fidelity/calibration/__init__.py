@@ -28,7 +28,7 @@ VISCOUS, ROUGH = 3.0, 30.0
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a level, or of one for each part, on a class of scenes at a fraction.
+    """Known error of a level, or of one for each part, on a class of scenes at a fraction.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Known:
     cost_core_s: float
 
     def __add__(self, other: "Known") -> "Known":
-        """What is known of both parts together.
+        """Known error of both parts together.
 
         Each number is the largest over the scenes of a class, and each has a cause of its own. So
         they add up as the shares of the model do: by their squares.
@@ -98,12 +98,12 @@ def model_class(scene: Scene) -> str:
 
 
 def _shape(bed: PileBed) -> str:
-    """What was measured on triangles holds for no other bed."""
+    """A suffix of the class: measurements on triangles hold for no other bed."""
     return "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
 
 
 def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:
-    """What is known of a level for each part, together, at each fraction.
+    """Known error of a level for each part, together, at each fraction.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float
 
 
 def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known:
-    """What is known of one level at a fraction; infinite errors where nothing is."""
+    """Known error of one level at a fraction; infinite where nothing is known."""
     if (level, scene_class) == (FLAT, LEVEL):
         return EXACT
     rows = measured().get((part, level, scene_class), {})
@@ -131,7 +131,7 @@ def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known
 
 @cache
 def measured() -> dict[tuple[str, str, str], dict[float, Known]]:
-    """What was measured, by part, level and class of scene, then by fraction."""
+    """The measured errors, by part, level and class of scene, then by fraction."""
     found: dict[tuple[str, str, str], dict[float, Known]] = {}
     with (FOLDER / "levels.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):

@@ -50,7 +50,7 @@ def section(found: Sequence[Claim], figures: Sequence[str]) -> Markup:
 
 
 def card(found: Sequence[Claim], figures: Sequence[str]) -> dict[str, Any]:
-    """What the card says of judged claims.
+    """The report card's section on judged claims.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a judged claim is, and how scenes of a study are compared."""
+"""Judged claims, and comparisons of a study's scenes."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -38,7 +38,7 @@ LEVEL = 4.0
 
 
 class Bed(Part):
-    """What every bed has. Subclasses say which grains it is made of."""
+    """Common fields of all beds. Subclasses add the grains."""
 
     slope_deg: Annotated[Slope, Info("slope", "α", "°", "alpha_deg")] = 0.0
     """slope of the bed; the flow goes up it"""
