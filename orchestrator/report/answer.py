@@ -1,6 +1,6 @@
 """The answer of a study in few words: sentences, and a short table of its thresholds."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pandas as pd
@@ -17,6 +17,8 @@ from orchestrator.study.closed_form import closed_form
 
 GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: a gas has a wind."""
+TOLD = 3
+"""Fields beside slope and diameter that a sentence tells of a pile."""
 FEW = 12
 """Piles that have a row each; of more, a row tells the range of many."""
 
@@ -27,7 +29,8 @@ def sentences(results: Results) -> list[str]:
     if len(piles):
         found = list(hills.sentences(results))
         if valid(piles).any() or not found:
-            found += [_of_pile(row, results) for row in _ends(piles)]
+            telling = varying(piles, "alpha_deg", "d_m", "fraction")[:TOLD]
+            found += [_of_pile(row, results, telling) for row in _ends(piles)]
         worth = _worth(piles, results.study.tolerance)
         return [*found, *_warnings(piles), *_frozen(piles), *_chosen(results), *worth]
     single = results.joined("single_grain")
@@ -49,10 +52,11 @@ def _ends(piles: pd.DataFrame) -> list[pd.Series]:
     )
 
 
-def _of_pile(row: pd.Series, results: Results) -> str:
+def _of_pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     ratio = f"{row['shields'] / single:.2g} times the stress of a single one"
-    pile = f"{_slope(row['alpha_deg'])}, d = {labels.millimetres(row['d_m'])}"
+    others = [labels.plain(one, row[one]) for one in telling if labels.is_told(one, row[one])]
+    pile = ", ".join([_slope(row["alpha_deg"]), f"d = {labels.millimetres(row['d_m'])}", *others])
     return (
         f"{pile}: {row['fraction']:.0%} of the exposed grains move at {ratio}, τ_c = "
         f"{row['shields']:.3g}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."

@@ -102,7 +102,9 @@ def _references(scenes: pd.DataFrame, by: str) -> str:
             f"Dashed: the curve of {reference.SLOPED} for horizontal beds in air, times "
             "√(cos α + sin α/tan φ) on u*. "
         )
-        return sloped if air else f"{_water()} They are for horizontal beds."
+        wet = not air or not reference.in_gas(scenes).all()
+        water = f"{_water()} They are for horizontal beds."
+        return (sloped if air else "") + (water if wet else "")
     brown = (
         " Brown: curves for grains in air, of this study’s grains and gas over the same diameters "
         f"({', '.join(air)}; the latter two include cohesion, Bagnold’s holds for Re* > "

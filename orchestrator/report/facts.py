@@ -243,13 +243,13 @@ def _upstream(curve: pd.DataFrame) -> Iterator[str]:
     if piles["carried_off"]:
         yield (
             f"Piles in which lift carried grains off before they moved downstream: "
-            f"{piles['carried_off']}, up to {grains['carried_off']} grains of one. They count as "
+            f"{piles['carried_off']}, at most {grains['carried_off']} in one. They count as "
             "moved; there the threshold is that of lift-off (share_carried_off)."
         )
     if piles["fallen_upstream"]:
         yield (
-            f"Piles in which grains fell upstream: {piles['fallen_upstream']}, up to "
-            f"{grains['fallen_upstream']} grains of one; such a grain has moved only if it also "
+            f"Piles in which grains fell upstream: {piles['fallen_upstream']}, at most "
+            f"{grains['fallen_upstream']} in one. Such a grain has moved only if it also "
             "passed the marker or was carried off."
         )
 

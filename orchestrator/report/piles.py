@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from orchestrator.report import captions, labels, laws, shields, style, theory
+from orchestrator.report import captions, labels, laws, reference, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results, split
@@ -182,4 +182,5 @@ def _panel(
                 ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
         shields.draw_points(ax, points, colour, TAU)
     in_air = shields.draw_sloped_air(ax, piles, style.AIR)
-    return in_air or [*shields.draw_water(ax), *shields.draw_measured(ax)]
+    wet = not in_air or not reference.in_gas(piles).all()
+    return [*in_air, *(shields.draw_water(ax) + shields.draw_measured(ax) if wet else [])]

@@ -46,6 +46,11 @@ def water_band(reynolds: FloatArray) -> Band:
     return Band(reynolds, low, high)
 
 
+def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
+    """Which scenes may be compared with curves for air."""
+    return scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]
+
+
 def air_lines(
     scenes: pd.DataFrame, slope_deg: float = 0.0
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -54,7 +59,7 @@ def air_lines(
     The slope's factor of physics is on u*. Of several gases it is that of the least viscosity;
     empty where there is none.
     """
-    scenes = scenes[scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]]
+    scenes = scenes[in_gas(scenes)]
     if scenes.empty:
         return {}
     one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -310,6 +311,22 @@ def test_piles_in_water_are_held_against_the_shields_curve(results: Results) -> 
     (ax,) = drawn(piles.extended(wet))["extended-shields-d30"]
     assert marked(ax, shields.WATER)
     assert marked(ax, shields.MEASURED)
+
+
+def test_piles_in_water_and_in_air_in_one_panel_have_both_references(results: Results) -> None:
+    heap = only(results, "pile")
+    wet: dict[str, Any] = {"scene_id": "wet", "rho_f_kg_m3": 1e3, "nu_m2_s": 1e-6}
+    both: dict[str, pd.DataFrame] = {}
+    for name in ("scenes", "pile_threshold"):
+        own: pd.DataFrame = heap.tables[name]
+        other = own.assign(**{column: wet[column] for column in wet if column in own})
+        both[name] = pd.concat([own, other])
+    (figure,) = piles.extended(replace(heap, tables={**heap.tables, **both}))
+    (ax,) = drawn([figure])[figure.name]
+    assert marked(ax, "air: Shao & Lu 2000")
+    assert marked(ax, shields.WATER)
+    assert "Shao & Lu" in figure.caption
+    assert "curves for water" in figure.caption
 
 
 def test_a_curve_that_the_legend_names_is_within_the_frame(results: Results) -> None:
