@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from orchestrator.study.closed_form import closed_form
+from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import LEAST_WIDTH, Scene
 from orchestrator.study.sizes import largest
-from orchestrator.study.study import PARTS, make_scene
+from orchestrator.study.study import make_scene
 
 Part = Literal["flow", "grains"]
 Levels = Mapping[Part, str]

@@ -17,23 +17,18 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from orchestrator.errors import InputError, unknown_key
+from orchestrator.errors import InputError
 from orchestrator.runs import assets
 from orchestrator.runs.files import opened
-from orchestrator.study import fields, sizes
+from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
-from orchestrator.study.parts import PileBed, UnfitError
+from orchestrator.study.fields import PARTS
+from orchestrator.study.parts import UnfitError
 from orchestrator.study.profiles import Profiles
-from orchestrator.study.renamed import RENAMED
+from orchestrator.study.refusals import GROUP_KEYS, TOP_KEYS, check_keys, explained
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.sizes import Sizes
 
-PARTS = tuple(Scene.model_fields)
-GROUP_KEYS = (*PARTS, "axes", "name", "seeds")
-TOP_KEYS = (
-    *(*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group", "profiles"),
-    "seeds",
-)
 TIME_LIMIT_S = 3600.0
 LONGEST_S = 1e8
 """Three years."""
@@ -169,7 +164,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError("tables or lists are nested too deeply", where=where) from None
     except ValueError as error:
         raise InputError(f"not TOML: {error}", where=where) from None
-    _known(data, TOP_KEYS, where)
+    check_keys(data, TOP_KEYS, where)
     limit = data.get("time_limit", TIME_LIMIT_S)
     check_time(limit, f"{where}: time_limit")
     title = data.get("title", name)
@@ -224,7 +219,7 @@ def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator
         )
     for number, item in enumerate(listed, 1):
         place = f"{where}: group {number}" if "group" in data else where
-        _known(item, GROUP_KEYS, place)
+        check_keys(item, GROUP_KEYS, place)
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
         if seeds := _seeds(item.get("seeds", data.get("seeds", 0)), f"{place}: seeds"):
             merged["axes"] = {**merged["axes"], "bed.seed": seeds}
@@ -337,7 +332,7 @@ def make_scene(
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
-        raise _explained(error, where) from None
+        raise explained(error, where) from None
 
 
 def _mixture(grain: dict[str, Any]) -> tuple[Sizes | None, dict[str, Any]]:
@@ -358,47 +353,3 @@ def _of_the_bed(diameter: Any, relative_size: Any) -> float:
     # the model will refuse a size that is none
     is_size = isinstance(relative_size, int | float) and 1e-3 < relative_size < 1e3
     return float(diameter / relative_size) if is_size else float(diameter)
-
-
-def _explained(error: ValidationError, where: str) -> InputError:
-    # a misspelt key says more than the field that is missing because of it
-    first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-    cause = first.get("ctx", {}).get("error")
-    if isinstance(cause, UnfitError):
-        return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
-    path = [str(step) for step in first["loc"]]
-    is_grain = path[:2] == ["bed", "grain"]
-    if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):
-        del path[1]  # the branch of the union, not a key of the file
-    field = ".".join(path)
-    given = first.get("input")
-    if first["type"] == "extra_forbidden" and field in RENAMED:
-        new = RENAMED[field]
-        return InputError("a former name", where=f"{where}: {field}", remedy=f"write {new}")
-    if first["type"] == "extra_forbidden" and is_grain and path[1] in PileBed.model_fields:
-        what, remedy = "unknown key of a bed of one grain", 'a pile has it: write kind = "pile"'
-        return InputError(what, where=f"{where}: {field}", remedy=remedy)
-    if first["type"] == "extra_forbidden":
-        known = list(fields.PARTS[path[0]].model_fields) if path[1:] else list(PARTS)
-        return unknown_key(path[-1], known, f"{where}: {field}", _elsewhere(path[0]))
-    if first["type"] == "missing":
-        return InputError("is missing", where=f"{where}: {field}", remedy="add it to the file")
-    return InputError(
-        f"{given!r} is not accepted",
-        where=f"{where}: {field}",
-        remedy=first["msg"].lower().replace("input should", "it should"),
-    )
-
-
-def _elsewhere(here: str) -> list[tuple[str, str]]:
-    """The keys of all tables but one, with how a message writes them."""
-    others = ((part, one.model_fields) for part, one in fields.PARTS.items() if part != here)
-    found = [(name, f"{part}.{name}") for part, names in others for name in names]
-    alone = (key for key in TOP_KEYS if key not in PARTS)
-    return [*found, *((key, f"{key}, above the first table") for key in alone)]
-
-
-def _known(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise unknown_key(key, known, f"{where}: {key}", _elsewhere(""))

@@ -14,8 +14,9 @@ from typing import Any, Literal
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.study.closed_form import resolved
+from orchestrator.study.fields import PARTS
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import PARTS, make_scene
+from orchestrator.study.study import make_scene
 
 FOLDER = Path(__file__).parent / "maps"
 Judge = Literal["pile", "grain"]
