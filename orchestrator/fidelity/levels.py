@@ -76,11 +76,16 @@ class Level:
     def takes(self, scene: Scene) -> bool:
         """Whether it is a way to answer a pile of this packing."""
         assert isinstance(scene.bed, PileBed)
-        return (STRIP if scene.bed.width else scene.bed.packing) not in self.not_on
+        return packing(scene.bed) not in self.not_on
 
     def fields(self, scene: Scene) -> Fields:
         """The fields that it sets in a scene."""
         return self.sets(scene) if callable(self.sets) else self.sets
+
+
+def packing(bed: PileBed) -> str:
+    """The packing of a pile as levels tell them apart, with `STRIP` for a bed in space."""
+    return STRIP if bed.width else bed.packing
 
 
 def changed(scene: Scene, fields: Fields) -> Scene:

@@ -16,7 +16,7 @@ from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.fidelity import calibration, spread
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import FLAT, LEVELS, STRIP, Level, Part, level
+from orchestrator.fidelity.levels import FLAT, LEVELS, Level, Part, level, packing
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.study.parts import PileBed
@@ -135,8 +135,7 @@ def _point(decision: Decision, pile: Pile, cases: Path, cpu_s: Mapping[str, floa
         "scene_id": scene.id,
         "scene": label(scene),
         **point(scene),
-        "packing": (STRIP if scene.bed.width else scene.bed.packing)
-        + (", level bed" if pile.bed.is_level else ""),
+        "packing": packing(scene.bed) + (", level bed" if pile.bed.is_level else ""),
         "asked": scene.protocol.method,
         **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
         "count": motion.count,

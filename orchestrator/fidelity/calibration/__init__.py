@@ -12,7 +12,7 @@ from functools import cache, reduce
 from operator import add
 from pathlib import Path
 
-from orchestrator.fidelity.levels import FLAT, STRIP, Levels, Part
+from orchestrator.fidelity.levels import FLAT, Levels, Part, packing
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -81,11 +81,10 @@ def scene_class(part: Part, scene: Scene) -> str:
         return LEVEL
     if part == "flow":
         return scene.forces.stress + ending
-    packing: str = scene.bed.packing
-    if packing == "disordered":
+    if scene.bed.packing == "disordered":
         size = next(size for size in DISORDERS if scene.bed.disorder <= size)
-        packing = f"disordered up to {size:g} d"
-    return (STRIP if scene.bed.width else packing) + ending
+        return f"disordered up to {size:g} d{ending}"
+    return packing(scene.bed) + ending
 
 
 def model_class(scene: Scene) -> str:
