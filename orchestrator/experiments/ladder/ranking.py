@@ -134,27 +134,27 @@ def known(found: pd.DataFrame) -> pd.DataFrame:
 def _known(part: Part, name: str, table: pd.DataFrame, dearest: str, again: str) -> Iterator[Row]:
     for scene_class, alike in table.groupby(f"class_{part}", sort=True):
         by_level = {level: rows.set_index("scene_id") for level, rows in alike.groupby(name)}
-        # a flow that is finer still is run on small piles alone; other grains on every one
-        unsure = None if part == "flow" else alike.iloc[:0]
         # without the reference nothing is known of the others
         for level, rows in by_level.items() if dearest in by_level else ():
             for column in _columns(table, TAU):
+                # a flow that is finer still is run on small piles alone; other grains on every one
+                uncertainty = 0.0 if part == "flow" else math.inf
+                if again in by_level:
+                    uncertainty = _shift(by_level[again], by_level[dearest], column)
                 yield {
                     "part": part,
                     "level": level,
                     "scene_class": scene_class,
                     "fraction": float(column[len(TAU) :]),
                     "error": _shift(rows, by_level[dearest], column),
-                    "uncertainty": _shift(by_level.get(again, unsure), by_level[dearest], column),
+                    "uncertainty": uncertainty,
                     "cost_core_s": float(rows[f"{part}_s"].mean()),
                     "scenes": len(rows),
                 }
 
 
-def _shift(own: pd.DataFrame | None, reference: pd.DataFrame, column: str) -> float:
+def _shift(own: pd.DataFrame, reference: pd.DataFrame, column: str) -> float:
     """The largest relative difference over the scenes that both have; infinite if there is none."""
-    if own is None:
-        return 0.0
     both = own.index.intersection(reference.index)
     if both.empty:
         return math.inf
