@@ -17,12 +17,8 @@ from orchestrator.flow import diagnostics
 from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.grid import NEAR, Grid, along, extended, growth_far
 from orchestrator.flow.mesh import write_line, write_mesh
-from orchestrator.flow.stress import (
-    WallStress,
-    approach_ustar,
-    read_openfoam,
-    undisturbed_ustar,
-)
+from orchestrator.flow.solved import SolvedFlow
+from orchestrator.flow.stress import WallStress, undisturbed_ustar
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
@@ -295,21 +291,22 @@ class FlowCase(Case):
             `Stalled` where that is how it ended.
         """
         openfoam.check_log(directory)
-        stress = read_openfoam(directory)
+        solved = SolvedFlow(directory)
+        stress = solved.stress()
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
         found = diagnostics.of(
             stress,
-            approach=approach_ustar(directory),
+            approach=solved.approach_ustar(),
             slope_deg=self.slope_deg,
             height=self.height_m,
             roughness=self.roughness_m,
             reynolds=self.ustar0_m_s / self.viscosity_m2_s,
         )
-        diagnostics.to_csv({**found, **self.of_the_top(directory)}, directory / DIAGNOSTICS)
+        diagnostics.to_csv({**found, **self.of_the_top(solved)}, directory / DIAGNOSTICS)
         self._check_approach(found["approach_ustar_over_log_law"], directory)
 
-    def of_the_top(self, directory: Path) -> dict[str, Diagnostic]:
+    def of_the_top(self, solved: SolvedFlow) -> dict[str, Diagnostic]:
         """Diagnostics of what is above the flow."""
         return {}
 

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from orchestrator.flow.case import FlowCase, set_values
 from orchestrator.flow.diagnostics import Diagnostic
-from orchestrator.flow.stress import approach_ustar
+from orchestrator.flow.solved import SolvedFlow
 from orchestrator.physics.log_law import depth_mean_speed
-from orchestrator.solvers.openfoam import read_last_time
 
 MEAN_SPEED_ERROR = 0.1
 """Largest relative difference of the column's mean speed, before the inlet, from the log law's."""
@@ -39,26 +36,15 @@ class ChannelFlow(FlowCase):
         set_values(directory / "parameters", top="closed" if self.closed else "open")
         set_values(directory / "parameters.geo", closed=int(self.closed))
 
-    def of_the_top(self, directory: Path) -> dict[str, Diagnostic]:
+    def of_the_top(self, solved: SolvedFlow) -> dict[str, Diagnostic]:
         """The mean speed in the column before the inlet over that of the log law."""
-        ustar = approach_ustar(directory) * self.ustar0_m_s
+        ustar = solved.approach_ustar() * self.ustar0_m_s
         law = mean_speed(ustar, self.depth_m, self.roughness_m, closed=self.closed)
         low, high = 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR
         name = "mean_speed_over_log_law"
-        return {name: Diagnostic(name, _column_speed(directory) / law, low, high)}
+        return {name: Diagnostic(name, solved.column_speed() / law, low, high)}
 
 
 def mean_speed(ustar: float, depth_m: float, roughness_m: float, *, closed: bool) -> float:
     """Mean speed (m/s) over the depth (m) by the log law; a closed channel has one on each wall."""
     return float(depth_mean_speed(ustar, depth_m / (2 if closed else 1), roughness_m))
-
-
-def _column_speed(directory: Path) -> float:
-    """Mean speed in the column before the inlet, m/s."""
-    _, air = read_last_time(directory, "bed", ["U"])
-    corners = np.asarray(air.points, dtype=np.float64)[air.cell_connectivity.reshape(-1, 8)]
-    x = corners[:, :, 0].mean(axis=1)
-    column = x < x.min() + 1e-6 * np.ptp(x)
-    height = np.ptp(corners[column, :, 2], axis=1)
-    speed = np.asarray(air.cell_data["U"], dtype=np.float64)[column, 0]
-    return float(np.average(speed, weights=height))

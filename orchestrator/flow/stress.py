@@ -5,18 +5,14 @@ import io
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from orchestrator.errors import InputError, SolverError
+from orchestrator.errors import InputError
 from orchestrator.physics.log_law import log_law_ustar
 from orchestrator.runs.files import write_durably
-from orchestrator.solvers.openfoam import read_last_time, read_numbers
-
-if TYPE_CHECKING:
-    import pyvista
 
 _DERIVED = "ustar_over_ustar0_wall"
 
@@ -179,108 +175,3 @@ class WallStress:
             raise InputError("not a table of the stress on a bed", where=str(path))
         table = np.loadtxt(lines[1:], delimiter=",", ndmin=2)
         return cls(**dict(zip(names, table.T[: len(names)].copy(), strict=True)))
-
-
-def read_openfoam(directory: Path) -> WallStress:
-    """Stress along the bed of a finished OpenFOAM case.
-
-    u*_0 is that of the column before the inlet, in which the approaching flow develops on the rows
-    of the mesh: it is `approach_ustar` times the one of the log law. The numbers have seven digits,
-    which is what VTK hands on.
-
-    Parameters
-    ----------
-    directory : Path
-        A case that `Allrun` has run in; its `parameters` give U_e and z0.
-
-    Raises
-    ------
-    SolverError
-        If the case holds no results, or nothing flows in the column.
-    """
-    z0 = read_numbers(directory / "parameters")["roughnessLength"]
-    bed, air = read_last_time(directory, "bed", ["U", "wallShearStress"])
-    faces = _Faces.of(bed)
-    z_e, u_t = _first_cells(air, faces)
-    stress = np.asarray(bed.cell_data["wallShearStress"], dtype=np.float64)[faces.order]
-    # OpenFOAM's is the stress of the bed on the flow
-    tau = -_along(stress, faces.tangents)
-    if not tau[0] > 0:
-        raise SolverError("no flow in the column before the inlet", where=str(directory))
-    ustar0, own = float(np.sqrt(tau[0])), slice(1, None)
-    return WallStress(
-        s_m=faces.s_m[own],
-        x_m=faces.centres[own, 0],
-        z_m=faces.centres[own, 2],
-        length_m=faces.lengths[own],
-        z_e_m=z_e[own],
-        tau_wall=tau[own] / ustar0**2,
-        ustar_over_ustar0_eq10=log_law_ustar(u_t, z_e, z0)[own] / ustar0,
-        ustar_over_ustar0_eq10_printed=log_law_ustar(u_t, z_e, z0, printed=True)[own] / ustar0,
-    )
-
-
-def approach_ustar(directory: Path) -> float:
-    """Friction velocity in the column before the inlet over that of the log law.
-
-    It is 1 but for what the rows of the mesh do to the log law.
-    """
-    numbers = read_numbers(directory / "parameters")
-    heights = numbers["speedHeight"], numbers["roughnessLength"]
-    bed, _ = read_last_time(directory, "bed", ["wallShearStress"])
-    first = int(np.argmin(bed.cell_centers().points[:, 0]))
-    tau = -float(bed.cell_data["wallShearStress"][first, 0])
-    return float(np.sqrt(max(tau, 0.0))) / undisturbed_ustar(numbers["freeStream"], *heights)
-
-
-@dataclass(frozen=True)
-class _Faces:
-    """Geometry of the faces of the bed, ordered downstream; vectors of shape (F, 3)."""
-
-    order: NDArray[np.intp]
-    centres: Array
-    tangents: Array
-    lengths: Array
-    s_m: Array
-
-    @classmethod
-    def of(cls, bed: "pyvista.PolyData") -> "_Faces":
-        corners = np.asarray(bed.points, dtype=np.float64)[bed.regular_faces]
-        order = np.argsort(corners[:, :, 0].mean(axis=1))
-        corners = np.take_along_axis(
-            corners[order], np.argsort(corners[order, :, 0], axis=1)[:, :, None], axis=1
-        )
-        starts, ends = corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
-        lengths = np.linalg.norm(ends - starts, axis=1)
-        toe = int(np.argmin(np.abs(starts[:, 0])))
-        s_end = np.cumsum(lengths) - lengths[:toe].sum()
-        return cls(
-            order=order,
-            centres=(starts + ends) / 2.0,
-            tangents=(ends - starts) / lengths[:, None],
-            lengths=lengths,
-            s_m=s_end - lengths / 2.0,
-        )
-
-    @property
-    def normals(self) -> Array:
-        """Unit normals into the flow."""
-        tangents = self.tangents
-        return np.stack([-tangents[:, 2], np.zeros(len(tangents)), tangents[:, 0]], axis=1)
-
-
-def _first_cells(air: "pyvista.UnstructuredGrid", faces: _Faces) -> tuple[Array, Array]:
-    """Distance from the bed, and speed along it, of the centre of the cell on each face."""
-    just_above = faces.centres + 1e-2 * faces.lengths.min() * faces.normals
-    found = np.atleast_1d(air.find_containing_cell(just_above))
-    if (found < 0).any():
-        raise SolverError("a face of the bed has no cell above it", remedy="mesh the case again")
-    hexahedra = air.cell_connectivity.reshape(-1, 8)
-    corners = np.asarray(air.points, dtype=np.float64)[hexahedra[found]]
-    heights = _along(corners.mean(axis=1) - faces.centres, faces.normals)
-    speeds = _along(np.asarray(air.cell_data["U"], dtype=np.float64)[found], faces.tangents)
-    return heights, speeds
-
-
-def _along(vectors: Array, directions: Array) -> Array:
-    return np.asarray(np.einsum("fi,fi->f", vectors, directions))

@@ -18,7 +18,8 @@ from orchestrator.bed.shapes import between_flats
 from orchestrator.errors import Exploded, InputError, SolverError, Stalled
 from orchestrator.flow import diagnostics
 from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
-from orchestrator.flow.stress import WallStress, approach_ustar, read_openfoam
+from orchestrator.flow.solved import SolvedFlow
+from orchestrator.flow.stress import WallStress
 from orchestrator.runs import case, process
 from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Turbulence
@@ -41,7 +42,7 @@ def windward_mean(directory: Path, flow: FlowCase) -> float:
 def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     directory = solve(PILE)
     assert case.is_done(PILE, directory.parent)
-    kept, read = WallStress.from_csv(directory / WALL_STRESS), read_openfoam(directory)
+    kept, read = WallStress.from_csv(directory / WALL_STRESS), SolvedFlow(directory).stress()
     np.testing.assert_array_equal(kept.tau_wall, read.tau_wall)
     assert (directory / "parameters").read_text().count("//") == 13
     sums = (directory / "results.sha256").read_text()
@@ -101,10 +102,10 @@ def test_a_flat_bed_keeps_the_friction_velocity(
         PILE, slope_deg=0.0, roughness_m=roughness, first_cell_m=first_cell, cells_per_face=40
     )
     directory = solved_flat(flow, tmp_path)
-    stress = read_openfoam(directory)
+    stress = SolvedFlow(directory).stress()
     assert np.ptp(stress.x_m[np.abs(stress.x_m) < 0.8]) > 60 * flow.height_m
     np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.002)
-    assert approach_ustar(directory) == pytest.approx(1, abs=0.015)
+    assert SolvedFlow(directory).approach_ustar() == pytest.approx(1, abs=0.015)
     np.testing.assert_allclose(stress.ustar_over_ustar0_eq10, 1.0, atol=0.02)
     printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
     z_over_z0 = first_cell / 2.0 / roughness
@@ -164,7 +165,7 @@ def test_a_copy_run_by_hand_gives_the_same_bytes(solve: Solve, tmp_path: Path) -
 def test_the_template_runs_as_it_lies(template: Path) -> None:
     assert allrun(template).returncode == 0
     assert openfoam.check_log(template) > 10
-    assert read_openfoam(template).tau_wall.max() > 2.0
+    assert SolvedFlow(template).stress().tau_wall.max() > 2.0
     left = {path.name for path in template.iterdir()}
     subprocess.run([template / "Allclean"], check=True)
     gone = left - {path.name for path in template.iterdir()}
@@ -318,9 +319,9 @@ def test_other_models_of_turbulence_keep_a_flat_beds_friction_velocity(
     """Their log law is another than k-epsilon's, whose constants are those of the lid."""
     flat = replace(PILE, slope_deg=0.0, turbulence_model=model)
     directory = solved_flat(flat, tmp_path)
-    stress = read_openfoam(directory)
+    stress = SolvedFlow(directory).stress()
     np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.01)
-    assert 0.01 < abs(approach_ustar(directory) - 1) < diagnostics.APPROACH_ERROR
+    assert 0.01 < abs(SolvedFlow(directory).approach_ustar() - 1) < diagnostics.APPROACH_ERROR
 
 
 def test_upwind_convection_gives_a_windward_stress_that_is_too_high(solve: Solve) -> None:

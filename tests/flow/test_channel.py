@@ -11,7 +11,8 @@ from orchestrator import plan, tables
 from orchestrator.errors import InputError
 from orchestrator.flow.case import WALL_STRESS, set_values
 from orchestrator.flow.channel import ChannelFlow, mean_speed
-from orchestrator.flow.stress import WallStress, approach_ustar, read_openfoam
+from orchestrator.flow.solved import SolvedFlow
+from orchestrator.flow.stress import WallStress
 from orchestrator.runs import case
 from orchestrator.study import study
 from tests.flow.conftest import PILE, Solve, allrun
@@ -38,10 +39,10 @@ def test_over_a_flat_bed_the_stress_balances_the_slope(tmp_path: Path, closed: b
     flow = replace(OPEN, slope_deg=0.0, closed=closed, upstream=20.0, downstream=20.0)
     directory = case.prepare(flow, tmp_path)
     allrun(directory)  # to the last iteration: the residual of Uz is that of noise
-    assert approach_ustar(directory) == pytest.approx(1, abs=2e-3)
-    stress = read_openfoam(directory)
+    assert SolvedFlow(directory).approach_ustar() == pytest.approx(1, abs=2e-3)
+    stress = SolvedFlow(directory).stress()
     np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1, atol=2e-3)
-    (found,) = flow.of_the_top(directory).values()
+    (found,) = flow.of_the_top(SolvedFlow(directory)).values()
     # k-epsilon is slow to mix below a surface: above the log law
     assert 1 < found.value < 1.1
 
@@ -49,8 +50,8 @@ def test_over_a_flat_bed_the_stress_balances_the_slope(tmp_path: Path, closed: b
 def test_the_template_runs_as_a_channel(template: Path) -> None:
     set_values(template / "parameters", top="open")
     assert allrun(template).returncode == 0
-    assert approach_ustar(template) == pytest.approx(1, abs=0.02)
-    assert read_openfoam(template).tau_wall.max() > 2
+    assert SolvedFlow(template).approach_ustar() == pytest.approx(1, abs=0.02)
+    assert SolvedFlow(template).stress().tau_wall.max() > 2
 
 
 def test_shallow_water_is_faster_over_a_form(solve: Solve) -> None:

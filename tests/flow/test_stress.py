@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError, SolverError
-from orchestrator.flow.stress import WallStress, read_openfoam, undisturbed_ustar
+from orchestrator.flow.solved import SolvedFlow
+from orchestrator.flow.stress import WallStress, undisturbed_ustar
 
 FloatArray = NDArray[np.float64]
 
@@ -135,7 +136,7 @@ def test_undisturbed_friction_velocity_gives_the_speed_at_the_lid() -> None:
 
 def test_a_case_that_has_not_run_has_no_stress(template: Path) -> None:
     with pytest.raises(SolverError, match=r"no results \(run \./Allrun there\)"):
-        read_openfoam(template)
+        SolvedFlow(template).stress()
 
 
 def test_vtk_is_not_loaded_before_it_is_needed() -> None:
