@@ -1,11 +1,13 @@
-"""One small study, run once: single grains in all regimes and a pile."""
+"""Studies that are run for tests: one small, of single grains in all regimes and a pile."""
 
 from pathlib import Path
 
 from orchestrator import plan, tables
+from orchestrator.plan import Plan
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
 from orchestrator.study import study
+from orchestrator.study.study import Study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
@@ -47,3 +49,11 @@ def run(out: Path, text: str = TEXT) -> Results:
         assert not engine.run(todo, pool, lambda outcome: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, cases)
+
+
+def in_turn(asked: Study, cases: Path) -> Plan:
+    """The plan of a study, with its cases run one after the other."""
+    planned = plan.make(asked, cases=cases)
+    for one in planned.cases.values():
+        engine.execute(one, cases, 600.0)
+    return planned

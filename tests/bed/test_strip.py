@@ -1,7 +1,5 @@
 """Strips in space: poured beds that are periodic across the flow."""
 
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +10,11 @@ from numpy.typing import NDArray
 from orchestrator.bed import poured
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.places import Places
-from orchestrator.bed.poured_case import BED, DUMP, PouredBed
+from orchestrator.bed.poured_case import BED, PouredBed
 from orchestrator.errors import InputError
 from orchestrator.runs import engine
 from orchestrator.study import study
+from tests.bed import by_hand
 
 FloatArray = NDArray[np.float64]
 WIDTH, DEPTH, SURFACE = 4.0, 4.0, 0.5 + 1 / 30
@@ -67,12 +66,7 @@ def test_packing_and_contacts_are_those_of_spheres_in_space(strip: Path) -> None
 
 
 def test_the_same_seed_gives_the_same_bytes_by_hand(strip: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy"
-    shutil.copytree(strip, copy)
-    (copy / DUMP).unlink()
-    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
-    assert (copy / DUMP).read_bytes() == (strip / DUMP).read_bytes()
+    assert by_hand.is_the_same(strip, tmp_path / "copy")
 
 
 def test_where_the_sides_are_changes_neither_who_is_exposed_nor_who_touches(strip: Path) -> None:

@@ -12,9 +12,9 @@ from orchestrator import plan, tables
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.runs import engine
 from orchestrator.runs.folder import Folder
 from orchestrator.study import study
+from tests import small_study
 
 SMALL = """
 [grain]
@@ -38,10 +38,7 @@ def _study(packing: str = "aligned", step: float = 0.05) -> study.Study:
 
 
 def _run(asked: study.Study, cases: Path) -> Pile:
-    planned = plan.make(asked)
-    for one in planned.cases.values():
-        engine.execute(one, cases, 300.0)
-    (pile,) = planned.piles.values()
+    (pile,) = small_study.in_turn(asked, cases).piles.values()
     return pile
 
 

@@ -1,18 +1,22 @@
 """Piles of poured grains through the whole line: one bed for all scenes, three methods."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from orchestrator import plan, tables
+from orchestrator import tables
 from orchestrator.fidelity.decision import decide
 from orchestrator.grains import pile_case
+from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
 from orchestrator.report import mixture
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
 from orchestrator.study import study
+from orchestrator.tables.piles import Answer, size_class_rows
+from tests import small_study
 
 STUDY = """
 fluid = { density = 1000.0, viscosity = 1e-6 }
@@ -33,10 +37,7 @@ ASKED = study.parse(STUDY, name="poured", where="test")
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     cases = tmp_path_factory.mktemp("cases")
-    planned = plan.make(ASKED, cases=cases)
-    for one in planned.cases.values():
-        engine.execute(one, cases, 300.0)
-    return planned, cases
+    return small_study.in_turn(ASKED, cases), cases
 
 
 def test_all_scenes_share_one_poured_bed(finished: tuple[Plan, Path]) -> None:
@@ -80,6 +81,19 @@ def test_each_size_class_has_its_threshold(finished: tuple[Plan, Path]) -> None:
         np.sort(grains["size_over_d"].unique()),
         np.unique(pile.packing.sizes[pile.packing.windward]),
     )
+
+
+def test_a_class_whose_first_grains_lie_loose_hides_nothing(finished: tuple[Plan, Path]) -> None:
+    planned, cases = finished
+    (answer, *_) = (
+        Answer.read(planned.decisions[name], pile, cases) for name, pile in planned.piles.items()
+    )
+    sizes = answer.pile.packing.sizes[answer.pile.packing.windward]
+    middle = np.abs(np.log(sizes)) < np.log(2) / 4
+    motion = Motion.of_flows(np.where(middle, 0.0, 0.1))
+    rows = pd.DataFrame(size_class_rows(replace(answer, motion=motion)))
+    assert set(rows["shields_own"] > 0) == {False, True}
+    assert rows["hiding"].isna().all()
 
 
 def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, Path]) -> None:

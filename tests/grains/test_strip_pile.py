@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import plan, tables
+from orchestrator import tables
 from orchestrator.plan import Plan
 from orchestrator.report import mixture
 from orchestrator.report.results import Results
-from orchestrator.runs import engine
 from orchestrator.study import study
+from tests import small_study
 
 STUDY = """
 fluid = { density = 1000.0, viscosity = 1e-6 }
@@ -40,10 +40,7 @@ ASKED = study.parse(STUDY, name="strip", where="test")
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     cases = tmp_path_factory.mktemp("cases")
-    planned = plan.make(ASKED, cases=cases)
-    for one in planned.cases.values():
-        engine.execute(one, cases, 600.0)
-    return planned, cases
+    return small_study.in_turn(ASKED, cases), cases
 
 
 def test_grains_lie_between_the_sides_and_feel_the_flow_along_x(
