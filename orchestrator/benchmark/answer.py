@@ -38,6 +38,11 @@ def key(quantity: str, at: str) -> Key:
     return quantity, f"{float(at):.7g}" if at.strip() else ""
 
 
+def keys(asked: pd.DataFrame) -> list[Key]:
+    """The keys of the numbers that are asked, by the columns ``quantity`` and ``at``."""
+    return [key(q, at) for q, at in zip(asked["quantity"], asked["at"], strict=True)]
+
+
 def read(path: Path, asked: pd.DataFrame, count: float | None) -> dict[Key, float]:
     """Read an answer.
 
@@ -56,9 +61,7 @@ def read(path: Path, asked: pd.DataFrame, count: float | None) -> dict[Key, floa
         Naming what is wrong with it.
     """
     found = numbers(path)
-    _check_complete(
-        found, [key(q, at) for q, at in zip(asked["quantity"], asked["at"], strict=True)]
-    )
+    _check_complete(found, keys(asked))
     _check_counts(found, count)
     return found
 

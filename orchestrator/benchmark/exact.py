@@ -1,7 +1,7 @@
 """Levels 1 and 2: scenes whose answers are formulas."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -189,6 +189,11 @@ def passing(push: float) -> Problem:
     x, z = float(np.cos(beta)), -float(np.sin(beta))
     tables = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
     return Problem(2, f"passing-{push:g}", "passing", told, tables, asked)
+
+
+def push_of(told: Mapping[str, Any]) -> float:
+    """The push of a passing, from the parameters of its scene."""
+    return float(told["force_n"] * np.tan(np.radians(told["beta_deg"])) / told["weight_n"])
 
 
 def passing_time(push: float, criterion: float, inertia: float = 0.4) -> float:

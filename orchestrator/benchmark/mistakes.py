@@ -108,7 +108,7 @@ def _of_kind(kind: str, told: Told, quantity: str) -> Iterator[tuple[float, str]
 
 def _passing(told: Told, bodies: Bodies) -> Iterator[tuple[float, str]]:
     criterion = told["displacement_criterion"]
-    push = told["force_n"] * math.tan(math.radians(told["beta_deg"])) / told["weight_n"]
+    push = exact.push_of(told)
     right = exact.passing_time(push, criterion)
     for other in CRITERIA:
         cause = f"a grain counts as moved at {other:g} d, not at {criterion:g} d"

@@ -197,12 +197,8 @@ def _variables(kind: str, told: Mapping[str, Any]) -> dict[str, float]:
         unit = np.sqrt(told["d_m"] * told["reduced_gravity_m_s2"])
         own["speed"] = float(told["speed_m_s"] / unit)
     if kind == "passing":
-        beta = np.radians(told["beta_deg"])
-        own["push"] = float(told["force_n"] * np.tan(beta) / told["weight_n"])
-        own |= {
-            "displacement_criterion": told["displacement_criterion"],
-            "stiffness": told["stiffness"],
-        }
+        names = ("displacement_criterion", "stiffness")
+        own |= {"push": exact.push_of(told), **{name: told[name] for name in names}}
     return own
 
 

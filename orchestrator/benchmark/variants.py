@@ -62,8 +62,7 @@ def wrong(expected: pd.DataFrame, given: bytes) -> str:
         found = answer.parsed(given)
     except AnswerError as error:
         return error.what
-    keys = [answer.key(q, at) for q, at in zip(expected["quantity"], expected["at"], strict=True)]
-    numbers = np.array([found.get(key, np.nan) for key in keys])
+    numbers = np.array([found.get(key, np.nan) for key in answer.keys(expected)])
     off = expected["tolerance"].notna() & ~within(numbers, expected, expected["tolerance"])
     if not off.any():
         return ""
@@ -90,14 +89,10 @@ def _closed_form(told: Told) -> Problem:
     return Problem(1, "", "closed-form", numbers, {}, expectations(rows))
 
 
-def _push(told: Told) -> float:
-    return float(told["force_n"] * np.tan(np.radians(told["beta_deg"])) / told["weight_n"])
-
-
 MAKERS: dict[str, Callable[[Told], Problem]] = {
     "closed-form": _closed_form,
     "collision": lambda told: exact.collision(told["damping"] * (1 - random.uniform(*MUCH))),
     "incline": lambda told: exact.incline(told["incline_deg"] * (1 - random.uniform(*MUCH))),
-    "passing": lambda told: exact.passing(_push(told) * (1 + random.uniform(*MUCH))),
+    "passing": lambda told: exact.passing(exact.push_of(told) * (1 + random.uniform(*MUCH))),
 }
 """Parameters that make a variant, by kind; the start of a sliding grain has no effect."""

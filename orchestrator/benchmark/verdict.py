@@ -173,7 +173,7 @@ def _judged(
     used, own_used = (_used(place) for place in (folder, ours))
     found, error = _answered(told, expected, folder, str(used.get("error") or ""))
     own = _own(ours / FILE)
-    keys = [answer.key(q, at) for q, at in zip(expected["quantity"], expected["at"], strict=True)]
+    keys = answer.keys(expected)
     given = np.array([found.get(key, math.nan) for key in keys])
     rows = expected.assign(
         found=given,
