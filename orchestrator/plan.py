@@ -113,7 +113,7 @@ def of(
 
     With a tolerance, answers without DEM are checked by it.
     """
-    checked = checks.decisions(decisions, tolerance, _cost_s) if tolerance else {}
+    checked = checks.decisions(decisions, tolerance) if tolerance else {}
     piles, check_piles = _piles(decisions, cases), _piles(checked, cases)
     grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
@@ -131,10 +131,6 @@ def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, P
         for asked, one in decisions.items()
         if isinstance(one.scene.bed, PileBed)
     }
-
-
-def _cost_s(scene: Scene) -> float:
-    return Pile(scene).case.cost_s
 
 
 def settled(study: Study, directory: Path) -> Plan:

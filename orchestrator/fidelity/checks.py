@@ -6,7 +6,7 @@ the two differ by more than the tolerance, all of them go to dearer levels.
 """
 
 import math
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,9 +27,7 @@ def group(scene: Scene) -> str:
     return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.forces.law}"
 
 
-def decisions(
-    answers: Mapping[str, Decision], tolerance: float, cost_s: Callable[[Scene], float]
-) -> dict[str, Decision]:
+def decisions(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decision]:
     """Decide on the checks of the piles that the tool chose to answer without DEM.
 
     Parameters
@@ -38,8 +36,6 @@ def decisions(
         By the id of the scene asked for.
     tolerance : float
         Relative error of tau_c.
-    cost_s : callable
-        Expected wall time of a pile by DEM, s.
 
     Returns
     -------
@@ -50,7 +46,7 @@ def decisions(
     for asked, answer in answers.items():
         if _needs_check(answer):
             check = _by_dem(answer.scene, tolerance)
-            member = (cost_s(check.scene), asked, check)
+            member = (Pile(check.scene).case.cost_s, asked, check)
             groups.setdefault(group(answer.scene), []).append(member)
     cheapest = (min(members, key=lambda one: one[:2]) for members in groups.values())
     return {asked: check for _, asked, check in cheapest}
