@@ -82,7 +82,7 @@ def programs(ranks: int) -> dict[str, str]:
     return {PROGRAM: version()}
 
 
-def check_log(directory: Path, last_words: str = LAST_WORDS) -> None:
+def check_log(directory: Path) -> None:
     """See that a run came to its own end: LIGGGHTS ends with 0 even without any grain left.
 
     Raises
@@ -97,7 +97,7 @@ def check_log(directory: Path, last_words: str = LAST_WORDS) -> None:
     error = re.search(r"^ERROR(?!: ld\.so:).*$", text, re.MULTILINE)
     if error:
         raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
-    if last_words not in text:
+    if LAST_WORDS not in text:
         raise SolverError(
             "LIGGGHTS ended before its protocol did",
             where=str(log),

@@ -104,10 +104,10 @@ class Evidence:
         table = self.joined("single_grain")
         return _commonest(table[table["force_law"] == BRIDGED])
 
-    def piles(self, name: str, packing: str = "aligned", stress: str = "wall") -> pd.DataFrame:
-        """A table of piles whose force law holds, of one packing and one stress."""
+    def piles(self, name: str, packing: str = "aligned") -> pd.DataFrame:
+        """A table of piles of one packing under the wall's stress, whose force law holds."""
         table = self.joined(name)
-        return table[in_regime(table) & (table["packing"] == packing) & (table["stress"] == stress)]
+        return table[in_regime(table) & (table["packing"] == packing) & (table["stress"] == "wall")]
 
 
 def _commonest(grains: pd.DataFrame) -> pd.DataFrame:
@@ -176,12 +176,12 @@ def others(table: pd.DataFrame, *along: str) -> list[str]:
     return [*fields.others(table, *along), *beside]
 
 
-def rising(found: pd.DataFrame, each: str, names: tuple[str, str] = ("rises", "ratio")) -> str:
+def rising(found: pd.DataFrame, each: str) -> str:
     """How many pairs rise, and by how much in the middle."""
     known = found["ratio"].dropna()
     silent = len(found) - len(known)
     text = (
-        f"{names[0]} in {int((known > 1).sum())} of {len(known)} pairs, by a factor of "
+        f"rises in {int((known > 1).sum())} of {len(known)} pairs, by a factor of "
         f"{known.median():.3f} in the median ({known.min():.3f} … {known.max():.3f}) {each}"
     )
     return text + (f"; {silent} pairs without a threshold" if silent else "")
