@@ -33,16 +33,15 @@ OPEN: Look = {"color": "black", "lw": 1.0, "ls": (0, (1, 1.5))}
 
 @dataclass(frozen=True)
 class Size:
-    """How large a map is drawn: height and width of a cell, inches; letters in a line of text."""
+    """How large a map is drawn: height of a cell, inches; letters in a line of text; its font."""
 
     cell: float
-    widest: float
     letters: int
     font: float
 
 
-ALONE = Size(cell=0.42, widest=1.0, letters=115, font=9)
-ON_SHEET = Size(cell=0.31, widest=1.0, letters=44, font=6.5)
+ALONE = Size(cell=0.42, letters=115, font=9)
+ON_SHEET = Size(cell=0.31, letters=44, font=6.5)
 PER_ROW = 2
 """Maps side by side on a sheet."""
 AROUND, LINE = 0.62, 0.115
@@ -55,7 +54,7 @@ def draw(judged: Judged) -> Canvas:
     figure = style.canvas(_height([cells], ALONE) + 0.5)
     ax = figure.subplots()
     rows, columns = cells.shape
-    ax.set_box_aspect(ALONE.cell * rows / min(ALONE.widest * columns, 6.0))
+    ax.set_box_aspect(ALONE.cell * rows / min(columns, 6.0))
     _panel(ax, cells, ALONE)
     style.legends(figure, _colour_entries([cells]), _look_entries([cells]))
     return figure

@@ -12,7 +12,6 @@ from orchestrator.paper.claims.base import (
     Evidence,
     Verdict,
     by_share,
-    combined,
     in_regime,
     pairs,
 )
@@ -153,14 +152,14 @@ def _whole_range(d: pd.Series) -> bool:
 
 def _beyond_drag_law(evidence: Evidence) -> tuple[str, ...]:
     texts = []
-    for name, table, reynolds in (
-        ("single grains", evidence.held, "reynolds"),
-        ("thresholds of piles", evidence.piles("pile_threshold"), "reynolds"),
+    for name, table in (
+        ("single grains", evidence.held),
+        ("thresholds of piles", evidence.piles("pile_threshold")),
     ):
-        high = table[(table["force_law"] == "high") & table[reynolds].notna()]
+        high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
         if len(high):
             limit = high["z0_over_d"].map(lambda ratio: drag_law_limit(float(ratio)))
-            texts.append(f"{int((high[reynolds] > limit).sum())} of {len(high)} {name}")
+            texts.append(f"{int((high['reynolds'] > limit).sum())} of {len(high)} {name}")
     return (f"high regime beyond the drag law: {', '.join(texts)}",) if texts else ()
 
 
@@ -184,7 +183,7 @@ def stress(evidence: Evidence) -> Claim:
         measured,
         "against the wall stress of the same flow; reproduced: u*₀ of at least 95 % of the "
         "thresholds within 5 %; not: of at most 5 %; else partly",
-        combined([by_share(inside)]),
+        by_share(inside),
         "Over a crest the flow accelerates and its profile is not the log law of a flat wall. The "
         "difference is an uncertainty of the model, not in the intervals.",
         ("wall-stress",),

@@ -74,9 +74,10 @@ def _constant_measured(
     series: list[pd.DataFrame], falls: list[float], ends: list[float]
 ) -> tuple[str, ...]:
     dem = pd.concat([_ends(own) for own in series], axis=1).T
+    most, least = max(falls), min(falls)
     return (
-        f"closed form: τ changes by {max(falls):+.0%} (β = {_beta(series, falls, max):g}°) to "
-        f"{min(falls):+.0%} (β = {_beta(series, falls, min):g}°) from Re* → 0 to 3, and stays "
+        f"closed form: τ changes by {most:+.0%} (β = {_beta(series, falls, most):g}°) to "
+        f"{least:+.0%} (β = {_beta(series, falls, least):g}°) from Re* → 0 to 3, and stays "
         f"within {NEARLY:.0%} up to Re* = {min(ends):.2f} … {max(ends):.2f}",
         f"DEM: {dem['fall'].max():+.0%} to {dem['fall'].min():+.0%} from Re* = "
         f"{dem['first'].min():.2g} … {dem['first'].max():.2g} to "
@@ -84,9 +85,8 @@ def _constant_measured(
     )
 
 
-def _beta(series: list[pd.DataFrame], falls: list[float], which: object) -> float:
-    at = int(np.argmax(falls) if which is max else np.argmin(falls))
-    return float(series[at]["beta_deg"].iloc[0])
+def _beta(series: list[pd.DataFrame], falls: list[float], fall: float) -> float:
+    return float(series[falls.index(fall)]["beta_deg"].iloc[0])
 
 
 def _ends(own: pd.DataFrame) -> pd.Series:
