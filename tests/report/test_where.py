@@ -71,6 +71,17 @@ def test_the_picture_of_a_long_train_shows_single_grains(results: Results) -> No
     assert "of the first form" in bed._part(train)
 
 
+def test_pictures_of_a_page_do_not_change_each_others_texts(results: Results) -> None:
+    """The styles of all are one on the page: no size of one picture may stand there."""
+    (figure,) = bed.draw(results)
+    svg = figure.image.decode()
+    style = svg[svg.index("<style>") : svg.index("</style>")]
+    assert "px" not in style
+    (pile,) = results.plan.piles.values()
+    left, right, *_ = bed.window(pile)
+    assert svg.count(f'font-size="{(right - left) / 75:.3g}"') == 2
+
+
 def test_a_current_a_metre_above_the_bed_follows_from_the_log_law(results: Results) -> None:
     rows = results.tables["pile_threshold"]
     z0 = rows["z0_over_d"] * rows["d_m"]

@@ -246,6 +246,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
             strict=True,
         ),
         bar=_bar(right - left),
+        size=f"{(right - left) / 75:.3g}",
         d=labels.millimetres(pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",
         title=labels.plain("alpha_deg", pile.bed.slope_deg),
