@@ -222,10 +222,13 @@ def draw(
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-    with space.folder.renewed(but=MARKERS):
+
+    def write_tables() -> None:
         tables.write(results, space.folder, "tables")
         tables.write({"timings": times}, space.folder, "timings")
-        report.write(study, planned, results, times, causes, space.folder, guests)
+
+    with space.folder.renewed(but=MARKERS):
+        report.write(study, planned, results, times, causes, space.folder, guests, write_tables)
     if not failures:
         drawn = {"of": _origin(study, planned), "sha256": space.folder.written(MARKERS)}
         space.folder.put(STATE, text_of(drawn))

@@ -2,9 +2,9 @@
 
 import contextlib
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.report import settings
 from orchestrator.report.guest import Guest
@@ -53,6 +53,7 @@ def write(
     failures: Mapping[str, str],
     folder: "Folder",
     guests: Sequence[Guest] = (),
+    beside: Callable[[], None] = lambda: None,
 ) -> None:
     """Draw the figures of a study and write its page.
 
@@ -68,7 +69,15 @@ def write(
         The study's directory: it holds ``cases`` and gets ``figures`` and the page.
     guests : sequence of callable
         Whoever may add to the page.
+    beside : callable
+        Called once, while other processes draw.
     """
+    said: dict[str, Any] = {}
+
+    def meanwhile() -> None:
+        beside()
+        said.update(page.said(results, timings, failures))
+
     with settings.own():
         # the drawing libraries take half a second to import: only who draws waits for them
         from orchestrator.report import drawing, page
@@ -76,13 +85,13 @@ def write(
 
         results = Results(study, plan, tables, folder.root / "cases")
         folder.make(FIGURES)
-        figures = drawing.draw(results, folder)
+        figures = drawing.draw(results, folder, meanwhile)
     names = [figure.name for figure in figures]
     added = [one for one in (guest(study, tables, names) for guest in guests) if one]
     for name, text in (item for one in added for item in one.files.items()):
         folder.put(name, text)
     sections = [one.section for one in added]
-    folder.put(PAGE, page.render(results, figures, timings, failures, sections))
+    folder.put(PAGE, page.render(said, figures, sections))
 
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":

@@ -58,10 +58,19 @@ def warm() -> None:
     page.template_of("page.html.j2", page.FOLDER)
 
 
-def draw(results: Results, folder: Folder) -> list[Figure]:
+def draw(results: Results, folder: Folder, beside: Callable[[], None]) -> list[Figure]:
     """Put each figure's files into a directory; give it with its image.
 
     The sections are drawn side by side: matplotlib holds one core for seconds a figure.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the study.
+    folder : Folder
+        The study's directory.
+    beside : callable
+        Called once, while other processes draw.
 
     Raises
     ------
@@ -70,7 +79,7 @@ def draw(results: Results, folder: Folder) -> list[Figure]:
     """
     _shared.append(results)
     try:
-        parts = _parts(folder)
+        parts = _parts(folder, beside)
     finally:
         _shared.clear()
     places = [place for place, _ in SECTIONS]
@@ -79,15 +88,17 @@ def draw(results: Results, folder: Folder) -> list[Figure]:
     return sorted(figures, key=lambda figure: (not figure.first, not figure.leads))
 
 
-def _parts(folder: Folder) -> list[list[Figure]]:
+def _parts(folder: Folder, beside: Callable[[], None]) -> list[list[Figure]]:
     # forked, the workers have the results and the imported libraries already
     context = multiprocessing.get_context("fork")
     workers = min(os.cpu_count() or 1, len(SECTIONS))
-    for _ in range(retry.MOST):
+    for tried in range(retry.MOST):
         pool = ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),))
         # no `pool.map`: it cancels what a pool that is killed then ends, which prints a traceback
         try:
             drawn = [pool.submit(_section, number, folder) for number in range(len(SECTIONS))]
+            if not tried:
+                beside()
             return [one.result() for one in drawn]
         except BrokenProcessPool:
             continue

@@ -22,57 +22,62 @@ from orchestrator.report.results import Results
 FOLDER = Path(__file__).parent
 
 
+def said(results: Results, timings: pd.DataFrame, failures: Mapping[str, str]) -> dict[str, Any]:
+    """The words and numbers of the page beside its figures, by the names of its template.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the study.
+    timings : DataFrame
+        Wall times of the finished cases.
+    failures : mapping of str to str
+        Causes by name of case.
+    """
+    return {
+        "title": results.study.title,
+        "study": results.study,
+        "scene_count": len(results.scenes),
+        "case_count": len(results.plan.cases),
+        "piles": facts.piles(results),
+        "grains": answer.grains(results),
+        "single_grains": facts.single_grains(results),
+        "levels": facts.levels(results),
+        "checks": facts.checks(results),
+        "remarks": facts.remarks(results, failures),
+        "paper_pair": bool(results.scenes["force_law"].isin(laws.PAIR).any()),
+        "force_laws": facts.force_laws(results),
+        "measured": measured_section(results),
+        "answer": answer.sentences(results),
+        "short": answer.sheet(results),
+        "failures": failures,
+        "links": links(results),
+        "tables": list(results.tables),
+        "parameters": facts.parameters(results),
+        "programs": facts.programs(results),
+        "times": facts.times(timings),
+        **_flow_facts(results),
+        **_grain_facts(results),
+        **_examples(results),
+    }
+
+
 def render(
-    results: Results,
-    figures: Sequence[Figure],
-    timings: pd.DataFrame,
-    failures: Mapping[str, str],
-    sections: Sequence[Markup] = (),
+    parts: Mapping[str, Any], figures: Sequence[Figure], sections: Sequence[Markup] = ()
 ) -> str:
     """The page's HTML.
 
     Parameters
     ----------
-    results : Results
-        What the study gave.
+    parts : mapping of str to Any
+        The words and numbers that `said` gives.
     figures : sequence of Figure
         With their images.
-    timings : DataFrame
-        Wall times of the finished cases.
-    failures : mapping of str to str
-        Causes by name of case.
     sections : sequence of Markup
         What guests add, before the figures.
     """
-    return fill(
-        "page.html.j2",
-        title=results.study.title,
-        study=results.study,
-        scene_count=len(results.scenes),
-        case_count=len(results.plan.cases),
-        piles=facts.piles(results),
-        grains=answer.grains(results),
-        single_grains=facts.single_grains(results),
-        levels=facts.levels(results),
-        checks=facts.checks(results),
-        remarks=facts.remarks(results, failures),
-        paper_pair=bool(results.scenes["force_law"].isin(laws.PAIR).any()),
-        force_laws=facts.force_laws(results),
-        measured=measured_section(results),
-        sections=sections,
-        figures=[{**entry(one), "number": n} for n, one in enumerate(figures, 1)],
-        answer=answer.sentences(results),
-        short=answer.sheet(results),
-        failures=failures,
-        links=links(results),
-        tables=list(results.tables),
-        parameters=facts.parameters(results),
-        programs=facts.programs(results),
-        times=facts.times(timings),
-        **_flow_facts(results),
-        **_grain_facts(results),
-        **_examples(results),
-    )
+    entries = [{**entry(one), "number": n} for n, one in enumerate(figures, 1)]
+    return fill("page.html.j2", **parts, sections=sections, figures=entries)
 
 
 def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:

@@ -1,6 +1,7 @@
 """Published thresholds to compare with: a band for water, lines for air."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -66,7 +67,15 @@ def air_lines(
     air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
     d = sweep(scenes)
     factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])
-    lines = {name: air.shields_diagram(d, factor * f(d, air)) for name, f in curves.AIR.items()}
+    lines = {
+        name: air.shields_diagram(d, factor * _ustar(name, air, tuple(d))) for name in curves.AIR
+    }
     x, y = lines["Bagnold 1941"]
     lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]
     return lines
+
+
+@cache  # one of the curves is found by iteration, for each panel and slope of a figure anew
+def _ustar(name: str, air: Air, diameters: tuple[float, ...]) -> FloatArray:
+    """Threshold friction velocity of a curve for air over a horizontal bed, m/s."""
+    return curves.AIR[name](np.array(diameters), air)

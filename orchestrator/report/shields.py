@@ -130,8 +130,8 @@ def draw_points(
 def draw_intervals(ax: Axes, x: FloatArray, a: FloatArray, b: FloatArray, colour: str) -> None:
     """Vertical bars with caps from one end to the other."""
     ax.vlines(x, a, b, color=colour, lw=0.8, zorder=2.5, gid="intervals")
-    for end in (a, b):
-        ax.plot(x, end, "_", color=colour, ms=5, mew=0.7, zorder=2.5)
+    both = np.concatenate([a, b])
+    ax.plot(np.tile(x, 2), both, "_", color=colour, ms=5, mew=0.7, zorder=2.5)
 
 
 def draw_water(ax: Axes) -> list[Artist]:

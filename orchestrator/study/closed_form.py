@@ -4,7 +4,7 @@ Thousands of scenes share few grains. Thresholds are found for many of them at o
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import cast
 
 import numpy as np
@@ -134,7 +134,13 @@ def _split(found: Threshold) -> Iterator[Threshold]:
 
 def regime_of(scene: Scene) -> Regime:
     """Which of Eqs. 2 and 4 holds at a scene's own single-grain threshold."""
-    return cast(Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high"))))
+    return _regime(_grain(scene))
+
+
+@cache
+def _regime(grain: tuple[float, ...]) -> Regime:
+    (low,), (high,) = (known(name, [grain]) for name in ("low", "high"))
+    return cast(Regime, str(regime(low, high)))
 
 
 def law_holds(scene: Scene) -> bool:

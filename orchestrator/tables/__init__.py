@@ -9,8 +9,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
+from numpy.typing import NDArray
 from pyarrow import parquet
 
 from orchestrator.errors import OrchestratorError
@@ -47,8 +49,8 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "single_grain": with_usable(grains, asked, study),
         "wall_stress": _concat(piles.wall_stress(flows.values(), cases)),
         "flow": pd.DataFrame(flows_table.row(pile, cases) for pile in flows.values()),
-        "pile_grain": _concat(map(piles.grains, ready)),
-        "pile_curve": _concat(map(piles.curve, ready)),
+        "pile_grain": _stacked(map(piles.grains, ready)),
+        "pile_curve": _stacked(map(piles.curve, ready)),
         "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
         "size_class": pd.DataFrame(row for one in ready for row in piles.size_class_rows(one)),
         "bed_change": _concat(wear.tables(ready)),
@@ -69,6 +71,20 @@ def _checks(
 def _concat(frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
     listed = list(frames)
     return pd.concat(listed, ignore_index=True) if listed else pd.DataFrame()
+
+
+def _stacked(parts: Iterable[piles.Columns]) -> pd.DataFrame:
+    """The columns of many parts one below the other; not a number where a part lacks a column."""
+    listed = list(parts)
+    names = dict.fromkeys(name for part in listed for name in part)
+    # a table of each part, for pandas to join, would take ten times as long
+    return pd.DataFrame(
+        {name: np.concatenate([_column(part, name) for part in listed]) for name in names}
+    )
+
+
+def _column(part: piles.Columns, name: str) -> NDArray[Any]:
+    return part[name] if name in part else np.full(len(next(iter(part.values()))), np.nan)
 
 
 def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

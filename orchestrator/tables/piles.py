@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from orchestrator.fidelity import checks, limits
 from orchestrator.fidelity.decision import Decision
@@ -21,6 +22,9 @@ from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.study.scene import Scene
 from orchestrator.tables.scenes import Row, point
+
+Columns = Mapping[str, NDArray[Any]]
+"""Columns of one length, by name."""
 
 
 @dataclass(frozen=True)
@@ -64,28 +68,25 @@ def wall_stress(piles: Iterable[Pile], cases: Path) -> Iterator[pd.DataFrame]:
         )
 
 
-def grains(answer: Answer) -> pd.DataFrame:
+def grains(answer: Answer) -> Columns:
     """The windward grains of a pile: the stress on each, when and how it moved."""
     motion, face = answer.motion, answer.face
-    found = threshold.of_grains(motion)
-    table = pd.DataFrame(
-        {
-            "scene_id": answer.scene_id,
-            "grain_id": face.ids,
-            "s_m": face.arc_length,
-            "x_m": face.x,
-            "ustar_over_ustar0": face.speed,
-            "moved_in_load_step": motion.level,
-            "fallen_in_load_step": motion.fallen,
-            "carried_off": motion.carried.astype(int),
-            "mode": [MODES[mode] for mode in motion.mode],
-            "ustar0_m_s": found.value,
-        }
-    )
-    return table.assign(**_of_its_own(answer.pile)) if answer.pile.pouring else table
+    return {
+        "scene_id": np.full(len(face.ids), answer.scene_id),
+        "grain_id": face.ids,
+        "s_m": face.arc_length,
+        "x_m": face.x,
+        "ustar_over_ustar0": face.speed,
+        "moved_in_load_step": motion.level,
+        "fallen_in_load_step": motion.fallen,
+        "carried_off": motion.carried.astype(int),
+        "mode": np.array(MODES)[motion.mode],
+        "ustar0_m_s": threshold.of_grains(motion).value,
+        **(_of_its_own(answer.pile) if answer.pile.pouring else {}),
+    }
 
 
-def _of_its_own(pile: Pile) -> Row:
+def _of_its_own(pile: Pile) -> Columns:
     """Columns that differ from grain to grain of a poured bed."""
     packed, chosen = pile.packing, pile.packing.windward
     found = {"size_over_d": packed.sizes[chosen], "pivot_deg": pile.pivot_angles_deg}
@@ -132,39 +133,37 @@ def _of_class(answer: Answer, one: classes.SizeClass, fraction: float) -> Row:
     }
 
 
-def curve(answer: Answer) -> pd.DataFrame:
+def curve(answer: Answer) -> Columns:
     """The fraction of a pile that had moved, and the stress on it, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
-    curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
-    return pd.DataFrame(
-        {
-            "scene_id": answer.scene_id,
-            "load_step": np.arange(len(motion.flow)),
-            "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
-            "ustar0_m_s": curve.ustar0,
-            "count": motion.count,
-            "moved": motion.moved,
-            "not_moved": motion.count - motion.moved,
-            "carried_off": motion.carried_off,
-            "fallen_upstream": motion.fallen_upstream,
-            "fraction_moved": curve.fraction,
-            "mean_tau_pa": curve.mean_tau,
-            "shields": shields(scene, curve.mean_tau),
-            "reynolds": _reynolds(scene, curve.mean_tau),
-        }
-    )
+    curve, steps = threshold.curve(motion, answer.face.speed, scene.fluid.density), len(motion.flow)
+    return {
+        "scene_id": np.full(steps, answer.scene_id),
+        "load_step": np.arange(steps),
+        "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
+        "ustar0_m_s": curve.ustar0,
+        "count": np.full(steps, motion.count),
+        "moved": motion.moved,
+        "not_moved": motion.count - motion.moved,
+        "carried_off": motion.carried_off,
+        "fallen_upstream": motion.fallen_upstream,
+        "fraction_moved": curve.fraction,
+        "mean_tau_pa": curve.mean_tau,
+        "shields": shields(scene, curve.mean_tau),
+        "reynolds": _reynolds(scene, curve.mean_tau),
+    }
 
 
 def threshold_rows(answer: Answer) -> Iterator[Row]:
     """The threshold of a pile at each fraction that its scene asks for."""
     pile, motion, speed = answer.pile, answer.motion, answer.face.speed
     scene = pile.scene
-    pivot = pile.pivot_thresholds(speed)
+    pivot, place = pile.pivot_thresholds(speed), point(scene)
     for fraction in scene.protocol.fractions:
         found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
         yield {
             "scene_id": answer.scene_id,
-            **point(scene),
+            **place,
             "packing": pile.bed.packing,
             "stress": scene.forces.stress,
             "fraction": fraction,

@@ -1,7 +1,5 @@
 """A table as the text of a file."""
 
-from typing import Any
-
 import pandas as pd
 
 BEGINS = ("=", "+", "-", "@", "\t", "\n")
@@ -19,15 +17,20 @@ def csv(table: pd.DataFrame, digits: str | None = None) -> str:
         Format of its numbers, such as ``%.9g``.
     """
     texts = table.select_dtypes(exclude=["number", "bool"])
-    harmless = {str(name): texts[name].map(_harmless) for name in texts}
+    harmless = {str(name): _column(texts[name]) for name in texts}
     return table.assign(**harmless).to_csv(index=False, float_format=digits)
 
 
-def _harmless(value: Any) -> Any:
-    if not isinstance(value, str):
-        return value
+def _column(texts: pd.Series) -> pd.Series:
+    """Thousands of rows share few texts."""
+    named = (value for value in texts.unique() if isinstance(value, str))
+    changed = {text: safe for text in named if (safe := _harmless(text)) != text}
+    return texts.map(lambda value: changed.get(value, value)) if changed else texts
+
+
+def _harmless(text: str) -> str:
     # pandas writes \r without quotes, and a reader takes it for the end of the row
-    text = value.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.startswith(BEGINS):
         return text
     try:

@@ -50,7 +50,8 @@ def _reasons(rows: pd.DataFrame, tolerance: float | None) -> Iterator[Reason]:
     if "answered_method" in rows and "reynolds_closed_form" in rows:
         reynolds = reynolds.where(rows["answered_method"] == "dem", rows["reynolds_closed_form"])
     reached = reynolds.notna().to_numpy()
-    yield ~reached, [_unreached(row) for row in rows.to_dict("records")]
+    counted = rows[[name for name in ("highest_fraction", "count") if name in rows]]
+    yield ~reached, [_unreached(row) for row in counted.to_dict("records")]
     ustar = (reynolds * rows["nu_m2_s"] / rows["d_m"]).to_numpy(float)
     yield from ((true & reached, texts) for true, texts in _law(rows, ustar))
     if "share_carried_off" in rows:
