@@ -15,6 +15,8 @@ from orchestrator.report.results import Results, split
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
+DRAWN = (*SHOWN, *TAU, "fraction", "scene_id", "regime", "usable", "answered_method", SHAPE)
+"""Columns that the extended diagram is drawn from: each point as a row of a hundred is dear."""
 
 MOST = 6
 """Panels of a figure."""
@@ -59,6 +61,7 @@ def extended(results: Results) -> Iterator[Figure]:
         written = labels.ratio_of(float(str(ratio)), "d")
         choices, rows, variants = parted(rows, *SHOWN, "fraction")
         keys = ["alpha_deg", *choices]
+        used = list(dict.fromkeys((*DRAWN, *keys)))
         for number, panels in enumerate(_sixes(rows, keys)):
             some = pd.concat(panels)
             yield Figure(
@@ -67,7 +70,7 @@ def extended(results: Results) -> Iterator[Figure]:
                 f"Thresholds of piles by slope, z₀ = {written}" + _part(number),
                 captions.extended(some),
                 tuple(sorted(set(some["case"].dropna()))),
-                _extended(results, panels, keys, colours, variants),
+                _extended(results, [part[used] for part in panels], keys, colours, variants),
                 fold=number > 0 or ratio != reached["z0_over_d"].min(),
             )
 

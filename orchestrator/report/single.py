@@ -184,7 +184,7 @@ def _ratios(ax: Axes, rows: pd.DataFrame, colours: dict[float, str]) -> None:
     for alpha, colour in colours.items():
         own = rows[rows["alpha_deg"] == alpha]
         shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
-    for bar in (*ax.collections, *(line for line in ax.lines if line.get_marker() == "_")):
-        bar.set_alpha(0.3)  # there are hundreds: the points are to be seen
+    for bars in (line for line in ax.lines if line.get_gid() == "intervals"):
+        bars.set_alpha(0.3)  # there are hundreds: the points are to be seen
     reach = 1.6 * float(np.nanmax(np.abs(rows[["value", "low", "high"]] - 1)))
     ax.set(ylim=(1 - reach, 1 + reach), ylabel=r"$u^\star_{DEM}/u^\star_{closed\;form}$")

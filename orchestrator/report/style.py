@@ -66,6 +66,8 @@ def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
     axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for unused in axes[count:]:
         unused.remove()
+    for spine in (one for ax in axes[:count] for one in ax.spines.values()):
+        spine.set_in_layout(False)  # they lie on the panel's edge, which counts anyway
     return figure, list(axes[:count])
 
 

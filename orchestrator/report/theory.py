@@ -56,6 +56,7 @@ class Branch:
 
 def branches(scenes: pd.DataFrame) -> list[Branch]:
     """The lines through scenes of one slope, one entrainment angle and one z0/d."""
+    scenes = scenes[[*GRAIN, "z0_over_d", "force_law"]]  # parts of sixty columns are dear
     low, high = span(scenes)
     reynolds = np.geomspace(low / WIDER, high * WIDER, POINTS)
     return [
@@ -114,7 +115,7 @@ def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
-    groups = split(scenes, "force_law")
+    groups = split(scenes[[*GRAIN, "force_law"]], "force_law")
     found = [one.reynolds for (law,), own in groups for one in thresholds(own, str(law))]
     reynolds = np.array(found, float)
     reynolds = reynolds[np.isfinite(reynolds)]

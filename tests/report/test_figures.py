@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
@@ -107,13 +106,11 @@ def test_bars_are_the_intervals_of_the_table(
     results: Results, grains: dict[str, list[Axes]]
 ) -> None:
     ax = grains["dem-slope-beta60"][-1]
-    bars = [c for c in ax.collections if c.get_gid() == "intervals"]
-    found = {
-        (float(x), float(low), float(high))
-        for bar in bars
-        if isinstance(bar, LineCollection)
-        for (x, low), (_, high) in bar.get_segments()
-    }
+    bars = [
+        np.reshape(np.asarray(line.get_xydata(), float), (-1, 3, 2))
+        for line in marked(ax, "intervals")
+    ]
+    found = {(float(x), float(low), float(high)) for (x, low), (_, high), _ in np.concatenate(bars)}
     table = results.tables["single_grain"]
     own = table[(table["beta_deg"] == 60) & (table["z0_over_d"] == 0.033333333)]
     columns = ["reynolds", "shields_dem_low", "shields_dem_high"]
