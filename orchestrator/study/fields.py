@@ -74,8 +74,16 @@ class Quantity:
 def plain(value: Any) -> Any:
     """A value as a cell of a table: what is not a word or a number becomes a text."""
     if isinstance(value, tuple):
-        return "; ".join(map(str, value)) or None
+        return "; ".join(map(_text, value)) or None
     return str(value) if isinstance(value, Profile | LogNormal) else value
+
+
+def _text(one: Any) -> str:
+    """An entry of a list; of a sieve table a class, its diameter and part of the mass."""
+    if isinstance(one, tuple):
+        diameter, fraction = one
+        return f"{1e3 * diameter:g} mm {100 * fraction:g} %"
+    return str(one)
 
 
 def _is_solved(scene: Scene) -> bool:

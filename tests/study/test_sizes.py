@@ -8,7 +8,7 @@ import pytest
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.grains.loaded_bed import LoadedBed
-from orchestrator.study import sizes, study
+from orchestrator.study import fields, sizes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal, Sizes
 
@@ -167,3 +167,7 @@ def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
     """
     scenes = [study.parse(text % (80 * d, d), name="m", where="m").scenes[0] for d in (1e-4, 2e-3)]
     assert len({LoadedBed(scene).pouring[0].id for scene in scenes}) == 1
+
+
+def test_a_sieve_table_is_told_with_its_units() -> None:
+    assert fields.plain(((5e-4, 0.15), (1e-3, 0.85))) == "0.5 mm 15 %; 1 mm 85 %"
