@@ -114,7 +114,7 @@ def test_a_plan_says_what_would_run_and_runs_nothing(orchestrator: Command, tmp_
     ended = orchestrator("study", "grains.toml", "--out", "out", "--plan", path="/nowhere")
     assert ended.returncode == 0, ended.stderr
     assert "2 scenes" in ended.stdout
-    assert "1 cases, 1 to run" in ended.stdout
+    assert "1 case, 1 to run" in ended.stdout
     assert "cells: 1, 1 to run" in ended.stdout
     assert "expected: about" in ended.stdout
     assert not (tmp_path / "out").exists()
