@@ -159,8 +159,8 @@ def bed(scene, case):
         for row in asked.grains
     ]
     protocol = Protocol(asked, ids)
-    if asked.settle_drag:
-        O.engines += [PyRunner(command="protocol.drag()", iterPeriod=2)]
+    protocol.fluid.dead = not asked.settle_drag
+    O.engines += [protocol.fluid]
     period = int(door.SAMPLING_INTERVAL * scene["time_unit_s"] / O.dt + 0.5)
     # one run with samples inside: between two runs YADE waits a twentieth of a second
     O.engines += [PyRunner(command="protocol.sample()", iterPeriod=period, initRun=False)]
@@ -178,6 +178,7 @@ class Protocol:
         mobile = [row["kind"] != "fixed" for row in grains]
         self.moving = [number for number, moves in zip(ids, mobile, strict=True) if moves]
         self.moved_in, self.carried = [0] * asked.counted, [False] * asked.counted
+        self.along = dict(zip(self.counted, asked.along, strict=True))
         self.marker = scene["displacement_criterion"] * scene["d_m"]
         self.far = door.AWAY * scene["d_m"]
         self.waiting_samples = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
@@ -186,7 +187,9 @@ class Protocol:
         margin = (door.MARGIN + 1) * scene["d_m"]
         self.low = [min(values) - margin for values in zip(*places, strict=True)]
         self.high = [max(values) + margin for values in zip(*places, strict=True)]
-        self.start = []
+        self.start = {}
+        # works while a poured bed settles
+        self.fluid = PyRunner(command="protocol.drag()", iterPeriod=2)
         self.settling = int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5)
         self.behind = asked.behind
         self._begin(0)
@@ -199,8 +202,6 @@ class Protocol:
 
     def drag(self):
         """Slow the grains by a still fluid while a poured bed settles."""
-        if self.load_step > 0:
-            return
         gamma, force = self.asked.settle_drag, self.asked.force(0)
         for number, (fx, fz) in zip(self.ids, force, strict=True):
             vx, _, vz = O.bodies[number].state.vel
@@ -211,12 +212,12 @@ class Protocol:
         if self.load_step == 0:
             self.settling -= 1
             if self.settling == 0:
-                self.start = [tuple(O.bodies[number].state.pos) for number in self.counted]
+                self.start = {one: tuple(O.bodies[one].state.pos) for one in self.counted}
+                self.fluid.dead = True
                 self._begin(1)
             return
         self.calm = 0 if self._note() else self.calm + 1
         self.moving = [number for number in self.moving if not self._gone(number)]
-        self._remove_far()
         lie = 0 in self.moved_in
         if lie and self.calm < self.waiting_samples:
             return
@@ -227,33 +228,27 @@ class Protocol:
 
     def _note(self):
         before = self.moved_in.count(0)
-        for place, (number, start) in enumerate(zip(self.counted, self.start, strict=True)):
-            if self.moved_in[place] == 0 and self._passed(number, start, self.asked.along[place]):
+        for place, number in enumerate(self.counted):
+            if self.moved_in[place] == 0 and self._passed(number):
                 self.moved_in[place] = self.load_step
                 self.carried[place] = O.bodies[number] is None
         return self.moved_in.count(0) < before
 
-    def _passed(self, number, start, along):
-        return O.bodies[number] is None or self._travel(number, start, along) >= self.marker
+    def _passed(self, number):
+        return O.bodies[number] is None or self._travel(number) >= self.marker
 
-    def _remove_far(self):
-        """Remove the counted grains that have come far, once they are known to have moved."""
-        for number, start, along in zip(self.counted, self.start, self.asked.along, strict=True):
-            far = O.bodies[number] is not None and self._travel(number, start, along) > self.far
-            if far:
-                O.bodies.erase(number)
-                self.moving.remove(number)
-
-    def _travel(self, number, start, along):
-        x, _, z = O.bodies[number].state.pos
+    def _travel(self, number):
+        """Displacement of a counted grain along its bed, in its own diameter over d, m."""
+        (x, _, z), start, along = O.bodies[number].state.pos, self.start[number], self.along[number]
         return (x - start[0]) * along[0] + (z - start[2]) * along[1]
 
     def _gone(self, number):
         x, _, z = O.bodies[number].state.pos
         slope, ridge_x, ridge_z = self.roof
-        over = x > self.behind or z > ridge_z - abs(x - ridge_x) * math.tan(slope)
+        over = z > ridge_z - abs(x - ridge_x) * math.tan(slope)
+        far = x > self.behind or (number in self.start and self._travel(number) > self.far)
         inside = self.low[0] < x < self.high[0] and self.low[1] < z < self.high[1]
-        if over or not inside:
+        if over or far or not inside:
             O.bodies.erase(number)
             return True
         return False

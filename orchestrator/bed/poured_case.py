@@ -101,12 +101,12 @@ class PouredBed(Case):
     @property
     def cost_s(self) -> float:
         """Expected time of one core, s: 15,000 steps at 6e6 grain-steps a second."""
-        return 1 + self.mould.count(self._mean) * 15_000 / 6e6
+        return 1 + self._count * 15_000 / 6e6
 
     @property
     def ranks(self) -> int:
         """Processes that the solver is run with."""
-        return liggghts.ranks(self.mould.count(self._mean))
+        return liggghts.ranks(self._count)
 
     def check_size(self) -> None:
         """See that the mould does not take more grains than a machine bears.
@@ -116,7 +116,7 @@ class PouredBed(Case):
         InputError
             If it does; with the field of a study file.
         """
-        count = self.mould.count(self._mean)
+        count = self._count
         if count > MOST_GRAINS:
             raise InputError(
                 f"about {count:.2g} grains would be poured, more than {MOST_GRAINS:g}",
@@ -124,11 +124,13 @@ class PouredBed(Case):
                 remedy="a shorter bed, larger grains, or less of bed.poured_depth or bed.width",
             )
 
-    @property
-    def _mean(self) -> float:
-        """Mean area of the grains' discs, d2; in a strip mean volume, d3."""
+    @cached_property
+    def _count(self) -> int:
+        """How many grains rain into the mould."""
         sizes = drawn(self.sizes, self.diameter, 1000, 0)
-        return float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
+        # mean area of the grains' discs, d2; in a strip mean volume, d3
+        mean = np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4)
+        return self.mould.count(float(mean))
 
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
@@ -137,7 +139,7 @@ class PouredBed(Case):
     @cached_property
     def _grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
-        count, floor = self.mould.count(self._mean), self.mould.floor
+        count, floor = self._count, self.mould.floor
         mixed = drawn(self.sizes, self.diameter, count, self.seed)
         places = self.mould.rain(mixed, self.seed)
         return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), mixed])

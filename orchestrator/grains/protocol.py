@@ -90,8 +90,7 @@ def poured_cost_s(
     """
     hold = rules.waiting_time * (1 + exposed / 700)
     small = math.pow(smallest(grain.sizes, grain.diameter), 1.5)
-    steps = load_steps * hold * math.sqrt(grain.stiffness) / (rules.time_step * small)
-    return 0.1 + steps * grains / 6e6
+    return _cost_s(load_steps * hold / small, grains, 6e6, rules, grain.stiffness)
 
 
 def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: float) -> float:
@@ -100,5 +99,9 @@ def run_cost_s(load_steps: float, grains: int, protocol: Protocol, stiffness: fl
     Measured on piles of 30 to 770 counted grains and 150 single ones, on one core: holds are
     shorter and steps dearer than that.
     """
-    steps = load_steps * 2 * protocol.waiting_time * math.sqrt(stiffness) / protocol.time_step
-    return 0.1 + steps * grains / 4.5e7
+    return _cost_s(load_steps * 2 * protocol.waiting_time, grains, 4.5e7, protocol, stiffness)
+
+
+def _cost_s(time: float, grains: float, rate: float, rules: Protocol, stiffness: float) -> float:
+    """Time of one core for a run of so many sqrt(d/g'), at a rate of grain-steps a second."""
+    return 0.1 + time * math.sqrt(stiffness) / rules.time_step * grains / rate

@@ -55,8 +55,8 @@ def _ends(piles: pd.DataFrame) -> list[pd.Series]:
 def _of_pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     ratio = f"{row['shields'] / single:.2g} times the stress of a single one"
-    others = [labels.plain(one, row[one]) for one in telling if labels.is_told(one, row[one])]
-    pile = ", ".join([_slope(row["alpha_deg"]), f"d = {labels.millimetres(row['d_m'])}", *others])
+    size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
+    pile = ", ".join([_slope(row["alpha_deg"]), size, *others])
     return (
         f"{pile}: {row['fraction']:.0%} of the exposed grains move at {ratio}, τ_c = "
         f"{row['shields']:.3g}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."

@@ -71,8 +71,7 @@ def _pile(row: pd.Series, extra: list[str]) -> tuple[str, ...]:
         f"{labels.ratio_of(row['z0_over_d'], 'd')}",
         f"{forces}, {row['nu_m2_s']:g}",
     )
-    chosen = "\n".join(labels.plain(c, row[c]) for c in extra if labels.is_told(c, row[c]))
-    return (*cells, chosen) if extra else cells
+    return (*cells, "\n".join(labels.told(row, extra))) if extra else cells
 
 
 def _threshold(row: pd.Series) -> str:

@@ -54,6 +54,11 @@ def value(column: str, value: Any) -> str:
     return "none" if pd.isna(value) else amount(value, info.unit)
 
 
+def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
+    """The values that a row has to tell, with their symbols, where there is no mathematics."""
+    return [plain(column, row[column]) for column in columns if is_told(column, row[column])]
+
+
 def is_told(column: str, value: Any) -> bool:
     """Whether a row has a value to tell: one without obstacles has none of them."""
     return bool(pd.notna(value)) or column in LISTS
@@ -115,6 +120,6 @@ def panel(row: pd.Series, columns: Sequence[str]) -> str:
 
     It is broken into lines that fit beside another panel.
     """
-    told = (column for column in columns if is_told(column, row[column]))
-    said = ", ".join(written(column, row[column]) for column in told)
+    shared = (column for column in columns if is_told(column, row[column]))
+    said = ", ".join(written(column, row[column]) for column in shared)
     return textwrap.fill(said, WIDTH, break_long_words=False)

@@ -161,7 +161,7 @@ def _slope(alpha: float) -> str:
 def _said(row: pd.Series, columns: Sequence[str], extra: Sequence[str]) -> list[str]:
     """Scene, threshold with its interval, what speaks against it, case."""
     told = (*SAID[:-1], *extra)
-    scene = ", ".join(labels.plain(c, row[c]) for c in told if labels.is_told(c, row[c]))
+    scene = ", ".join(labels.told(row, told))
     value, low, high = (row[column] for column in columns)
     ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]
     where = f" at n/N = {row['fraction']:.0%}" if "fraction" in row else ""

@@ -27,7 +27,7 @@ from orchestrator.runs.cores import Cores
 
 POLL_S = 0.2
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""As many cases run as there are cores: a solver that took more would take them from others."""
+"""Threads of a solver's process: solvers hold all cores, and more threads would take others'."""
 
 
 @dataclass(frozen=True)
