@@ -47,6 +47,8 @@ class Profile:
         The file itself.
     digest : str
         Digest of the content: all that two profiles differ in.
+    lines : tuple of int
+        Number of the file's line that has each point; empty for a smoothed line.
     """
 
     name: str = field(compare=False)
@@ -54,6 +56,7 @@ class Profile:
     z: tuple[float, ...]
     text: str = field(compare=False, repr=False)
     digest: str
+    lines: tuple[int, ...] = field(default=(), compare=False, repr=False)
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -103,7 +106,8 @@ def read(text: str, name: str, where: str, smoothing: float) -> Profile:
     _check_line(x, z, None if smoothing else lines, where)
     xs, zs = (tuple((values - values[0]).tolist()) for values in (x, z))
     corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
-    return Profile(name, xs, zs, text, digest_text(corners))
+    numbers = () if smoothing else tuple(lines.tolist())
+    return Profile(name, xs, zs, text, digest_text(corners), numbers)
 
 
 def a_profile(value: object) -> Profile:
@@ -143,7 +147,7 @@ def text_of(path: Path) -> str:
 
 def _points(text: str, where: str) -> Iterator[tuple[int, float, float]]:
     """Number of the line, x and z of each point."""
-    lines = text.splitlines()
+    lines = text.replace("\r\n", "\n").split("\n")
     places = _places(lines[0], where)
     for number, line in enumerate(lines[1:], 2):
         if not line.strip():
@@ -179,7 +183,8 @@ def _number(cell: str, where: str, line: int) -> float:
     if not cell.strip():
         raise _wrong(where, line, "an empty value", "close the gap, or cut the file there")
     try:
-        value = float(cell)
+        # float also takes underscores and the digits of other alphabets
+        value = float(cell) if cell.isascii() and "_" not in cell else float("none")
     except ValueError:
         remedy = "write it with a decimal point, in metres"
         raise _wrong(where, line, f"{cell[:30]!r} is not a number", remedy) from None
@@ -220,6 +225,12 @@ def _smoothed(
             f"smoothing over {length:g} m leaves nothing of {np.ptp(x):g} m",
             where=where,
             remedy="lower bed.smoothing",
+        )
+    if np.ptp(x) * RESOLVED > length * MOST_CORNERS:
+        raise InputError(
+            f"smoothing over {length:g} m leaves more than {MOST_CORNERS} points of {np.ptp(x):g} m",
+            where=where,
+            remedy="raise bed.smoothing",
         )
     count = max(int(np.ceil(np.ptp(x) / length * RESOLVED)), MANY)
     # beyond its ends the line goes on as turned about them: they stay where they are

@@ -8,7 +8,10 @@ from typing import Any
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.study import profile, sizes
 
-OWN = ("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius")
+OWN = (
+    *("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius"),
+    *("length", "forms", "spacing"),
+)
 """Fields of a bed that a profile has of its own."""
 
 

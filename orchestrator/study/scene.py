@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from orchestrator.physics.constants import KARMAN
@@ -25,6 +26,7 @@ from orchestrator.study.parts import (
     Protocol,
     UnfitError,
 )
+from orchestrator.study.profile import Profile
 from orchestrator.study.sizes import Sizes, largest, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
@@ -37,6 +39,13 @@ LEAST_WIDTH = 3.0
 """Least width of a strip, diameters of its largest grain: none touches another from both sides."""
 MOST_GRAINS = 1e5
 """Length of a profile, diameters."""
+NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
+"""Least distance of two points of a profile, over the diameter and over the height of the first
+cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
+a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
+ROUGHEST = 1 / 3
+"""Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the roughest that
+there is; above, a grain would lie within the layer in which the mean flow is at rest."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
 FIELDS_OF_SHAPES = {
     "windward": ("dune",),
@@ -68,6 +77,8 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
         check_density(self.grain.density, self.fluid.density)
+        bed_grains = self.grain.diameter / self.bed.relative_size
+        check_roughness(self.bed, bed_grains * largest(self.grain.sizes, self.grain.diameter))
         check_method(self.forces.law, self.protocol.method)
         if self.grain.sizes is not None and not self.is_poured:
             what = "a lattice has equal grains: a mixture needs a poured bed"
@@ -80,9 +91,12 @@ class Scene(Part):
             check_protrusion(self.forces.law, is_poured=self.is_poured)
         if isinstance(self.bed, PileBed):
             check_pile(self.bed, self.grain.diameter)
-            check_top(self.flow, self.bed.height)
+            check_top(self.flow, self.bed)
             if self.flow.model == "solve":
                 check_mesh(self.bed.height, self.first_cell_height)
+            if self.bed.profile:
+                cell = self.first_cell_height if self.flow.model == "solve" else 0.0
+                check_points(self.bed.profile, self.grain.diameter, cell)
         else:
             check_grain(self.bed, self.grain.diameter)
         if self.protocol.update:
@@ -186,6 +200,13 @@ def pocket_cosine(bed: Bed) -> float:
     return 2 * cos(radians(bed.entrainment_angle_deg)) / (1 + bed.relative_size)
 
 
+def check_roughness(bed: Bed, diameter: float) -> None:
+    """The roughness length belongs to the grains of the bed, the largest of which are given."""
+    if bed.roughness > ROUGHEST * diameter * (1 + 1e-9):
+        what = f"z0 = {bed.roughness:g} m is above a third of the bed's grains of {diameter:g} m"
+        raise UnfitError("bed.roughness", f"{what}, rougher than any grains lie", "typical: d/30")
+
+
 def check_grain(bed: Bed, diameter: float) -> None:
     """A single grain must stand out of the roughness and lie on its neighbours."""
     if bed.roughness >= diameter:
@@ -265,8 +286,30 @@ def check_pile(bed: PileBed, diameter: float) -> None:
         )
 
 
-def check_top(flow: Flow, height: float) -> None:
-    """Open water and a closed channel have a depth, which forms do not fill."""
+def check_points(profile: Profile, diameter: float, first_cell: float) -> None:
+    """Two points of a profile lie no nearer to one another than grains and mesh can follow."""
+    steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
+    near = int(np.argmin(steps))
+    least = max(NARROWEST_OVER_D * diameter, NARROWEST_OVER_CELL * first_cell)
+    if steps[near] < least:
+        line = f"line {profile.lines[near + 1]}, " if profile.lines else ""
+        raise UnfitError(
+            "bed.profile",
+            f"{profile.name}, {line}x = {profile.x[near + 1]:.6g} m: {steps[near]:.2g} m from the"
+            f" point before it, nearer than {least:.2g} m",
+            f"leave out one of the two, or {'give' if line else 'raise'} bed.smoothing",
+        )
+
+
+def check_top(flow: Flow, bed: PileBed) -> None:
+    """The top of the flow is well above the forms and the obstacles."""
+    top = flow.depth or flow.lid * bed.height
+    for obstacle in bed.obstacles:
+        if top < LEAST_DEPTH * obstacle.height:
+            what = f"{obstacle} under a flow {top:g} m deep"
+            remedy = f"at most a part of 1/{LEAST_DEPTH:g} of that, or raise the depth or flow.lid"
+            raise UnfitError("bed.obstacles", what, remedy)
+    height = bed.height
     if flow.top == "boundary layer":
         if flow.depth:
             remedy = 'leave it out, or choose flow.top = "open water"'

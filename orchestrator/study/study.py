@@ -6,6 +6,7 @@ is one group.
 """
 
 import itertools
+import math
 import os
 import sys
 import tomllib
@@ -213,16 +214,23 @@ def check_tolerance(value: Any, where: str) -> None:
 
 def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator[Group]:
     listed = data.get("group", [{}])
-    if not isinstance(listed, list) or not all(isinstance(item, dict) for item in listed):
+    is_list = isinstance(listed, list) and listed
+    if not is_list or not all(isinstance(item, dict) for item in listed):
         raise InputError(
             "not a list of tables", where=f"{where}: group", remedy="write [[group]] for each"
         )
+    count = 0
     for number, item in enumerate(listed, 1):
         place = f"{where}: group {number}" if "group" in data else where
         check_keys(item, GROUP_KEYS, place)
         merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
         if seeds := _seeds(item.get("seeds", data.get("seeds", 0)), f"{place}: seeds"):
             merged["axes"] = {**merged["axes"], "bed.seed": seeds}
+        _check_axes(merged["axes"], place)
+        count += math.prod(map(len, merged["axes"].values()))
+        if count > MOST_SCENES:
+            what = f"more than {MOST_SCENES} scenes in the study"
+            raise InputError(what, where=f"{place}: axes", remedy="shorten the lists")
         scenes = tuple(_scenes(merged, place, profiles))
         yield Group(str(item.get("name", f"group {number}")), scenes, place)
 
@@ -258,8 +266,8 @@ def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str, profiles: Profiles) -> list[Scene]:
-    axes = tables["axes"]
+def _check_axes(axes: Mapping[str, Any], where: str) -> None:
+    """See that each axis is a list of values of a field."""
     for key, values in axes.items():
         part, dot, field = key.partition(".")
         if part not in PARTS or not dot or not field:
@@ -274,9 +282,10 @@ def _scenes(tables: Mapping[str, dict[str, Any]], where: str, profiles: Profiles
                 where=f"{where}: axes.{key}",
                 remedy="write [first, second, ...]",
             )
-    grid = list(itertools.islice(itertools.product(*axes.values()), MOST_SCENES + 1))
-    if len(grid) > MOST_SCENES:
-        raise InputError(f"more than {MOST_SCENES} scenes", where=f"{where}: axes")
+
+
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, profiles: Profiles) -> list[Scene]:
+    grid = list(itertools.product(*tables["axes"].values()))
     scenes = [make_scene(parts, where, profiles) for parts in _points(tables, grid)]
     if len(grid) > 1:
         _check_distinct(scenes, grid, where)

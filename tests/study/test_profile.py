@@ -168,3 +168,42 @@ def test_noise_is_smoothed_and_the_ends_stay(tmp_path: Path) -> None:
     assert found.x[-1] == pytest.approx(1.0)
     with pytest.raises(InputError, match=r"10000 points, more than .* \(give bed.smoothing"):
         profile.read(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "flow", "line"),
+    [(1e-6, "solve", 4), (2e-5, "solve", 4), (2e-5, "flat", 4), (1e-4, "solve", 0)],
+)
+def test_points_nearer_than_mesh_or_grains_can_follow_are_refused_with_the_line(
+    distance: float, flow: str, line: int, tmp_path: Path
+) -> None:
+    """A second point 1e-6 m from another once took a fifth of the stress away."""
+    second = f"{0.05 + distance!r},{0.01 + 0.2 * distance!r}"
+    (tmp_path / "scan.csv").write_text(points("0,0", "0.05,0.01", second, "0.1,0.02", "0.14,0"))
+    text = STUDY.replace('"flat"', f'"{flow}"').replace("1e-3", "3e-4")
+    if not line:
+        assert len(bed_of(tmp_path, text).profile.x) == 5  # type: ignore[union-attr]
+        return
+    with pytest.raises(InputError, match=rf"bed.profile: scan.csv, line {line}, x = 0.05.* nearer"):
+        bed_of(tmp_path, text)
+
+
+@pytest.mark.parametrize("own", ["forms = 3", "spacing = 0.5", "length = 0.1"])
+def test_a_profile_takes_no_field_of_a_shape(own: str, tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD)
+    with pytest.raises(InputError, match=rf"bed.profile: it has its own {own.split()[0]}"):
+        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", {own}'))
+
+
+@pytest.mark.parametrize("smoothing", ["1e-300", "1e-9"])
+def test_a_smoothing_that_smooths_nothing_is_refused(smoothing: str, tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD)
+    with pytest.raises(InputError, match=r"leaves more than 3000 points .*raise bed.smoothing"):
+        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", smoothing = {smoothing}'))
+
+
+@pytest.mark.parametrize("number", ["1_0e-2", "٠.١", "0x1", "1e-2\u2028"])
+def test_a_number_of_a_profile_is_written_in_ascii_digits(number: str, tmp_path: Path) -> None:
+    (tmp_path / "scan.csv").write_text(GOOD.replace("0.05", number), encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 3: .* is not a number"):
+        bed_of(tmp_path)

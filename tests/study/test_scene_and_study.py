@@ -188,6 +188,32 @@ BAD = [
     ("[axes]\n'grain.diameter' = []\n", "test.toml: axes.grain.diameter", "list"),
     ("time_limit = -1\n[grain]\ndiameter = 1e-3\n", "test.toml: time_limit", "above 0"),
     ("group = 1\n", "test.toml: group", "[[group]]"),
+    ("group = []\n", "test.toml: group", "[[group]]"),
+    (PILE.replace('"d/30"', "2e-3"), "test.toml: bed.roughness", "a third of the bed's grains"),
+    (
+        "[grain]\ndiameter = 1e-3\n[bed]\nroughness = 9.99e-4\n",
+        "test.toml: bed.roughness",
+        "a third of the bed's grains",
+    ),
+    (
+        PILE
+        + "packing = 'poured'\nshape = 'flat'\nslope_deg = 0.0\n".replace("slope_deg = 0.0\n", "")
+        + "[flow]\nmodel = 'flat'\n",
+        "test.toml: bed.slope_deg",
+        "does not rise",
+    ),
+    (
+        PILE
+        + "obstacles = [{ kind = 'fence', x = -0.2, height = 0.1 }]\n"
+        + "[flow]\ntop = 'open water'\ndepth = 0.2\n",
+        "test.toml: bed.obstacles",
+        "under a flow 0.2 m deep",
+    ),
+    (
+        PILE + "obstacles = [{ kind = 'fence', x = -9.0, height = 1.0 }]\n",
+        "test.toml: bed.obstacles",
+        "under a flow 2 m deep",
+    ),
     ("[[group]]\ncolour = 1\n", "test.toml: group 1: colour", "known keys"),
     ("[[group]]\n[group.grain]\ndiametre = 1\n", "test.toml: group 1: grain.diametre", "diameter"),
 ]
@@ -230,3 +256,11 @@ def test_a_study_that_is_no_text(tmp_path: Path) -> None:
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="text"):
         study.load(str(path))
+
+
+def test_the_scenes_of_all_groups_together_are_limited() -> None:
+    few = "[[group]]\ngrain = { diameter = 1e-3 }\n"
+    values = ", ".join(f"{1e-4 + 1e-9 * k!r}" for k in range(99_999))
+    many = f"[[group]]\n[group.axes]\n'grain.diameter' = [{values}]\n"
+    with pytest.raises(InputError, match="group 3: axes: more than 100000 scenes in the study"):
+        _parse(few + few + many)

@@ -171,3 +171,10 @@ def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
 
 def test_a_sieve_table_is_told_with_its_units() -> None:
     assert fields.plain(((5e-4, 0.15), (1e-3, 0.85))) == "0.5 mm 15 %; 1 mm 85 %"
+
+
+@pytest.mark.parametrize("ends", ["smallest = 0.3, largest = 1.0", "smallest = 1.0, largest = 3.0"])
+def test_cut_offs_that_move_the_median_off_the_diameter_are_refused(ends: str) -> None:
+    with pytest.raises(InputError, match=r"grain.sizes: between these cut-offs d50 is"):
+        _grain(f"diameter = 1e-3\nsizes = {{ sigma_g = 2.0, {ends} }}")
+    _grain("diameter = 1e-3\nsizes = { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }")

@@ -10,6 +10,10 @@ from orchestrator.study.parts.part import Part, UnfitError, unless
 from orchestrator.study.ranges import Damping, Density, Diameter, FrictionAngle, Stiffness
 from orchestrator.study.sizes import Sizes
 
+OFF_MEDIAN = 0.01
+"""Largest difference of a log-normal mixture's d50 from the diameter, relative: Shields numbers and
+a roughness length of d/30 take the diameter."""
+
 
 class Grain(Part):
     """Equal spheres and their contact law."""
@@ -47,6 +51,9 @@ class Grain(Part):
         if what := sizes.fault(self.sizes):
             raise UnfitError("grain.sizes", what, "look at the rows")
         median = sizes.percentile(self.sizes, self.diameter, 0.5)
+        if abs(median / self.diameter - 1) > OFF_MEDIAN and not isinstance(self.sizes, tuple):
+            what = f"between these cut-offs d50 is {median:.4g} m, not the diameter"
+            raise UnfitError("grain.sizes", what, "write smallest = 1/largest")
         if isinstance(self.sizes, tuple) and abs(self.diameter / median - 1) > 1e-9:
             what = f"the d50 of grain.sizes is {median:.9g} m"
             raise UnfitError("grain.diameter", what, "leave it out")
