@@ -44,8 +44,8 @@ NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
 a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
 ROUGHEST = 1 / 3
-"""Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the roughest that
-there is; above, a grain would lie within the layer in which the mean flow is at rest."""
+"""Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the largest
+ratio measured; above 1/3 a grain would lie where the mean flow of the log law is at rest."""
 FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
 FIELDS_OF_SHAPES = {
     "windward": ("dune",),
