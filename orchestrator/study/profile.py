@@ -228,7 +228,7 @@ def _smoothed(
         )
     if np.ptp(x) * RESOLVED > length * MOST_CORNERS:
         raise InputError(
-            f"smoothing over {length:g} m of {np.ptp(x):g} m leaves more than {MOST_CORNERS} points",
+            f"smoothing over {length:g} m of {np.ptp(x):g} m leaves over {MOST_CORNERS} points",
             where=where,
             remedy="raise bed.smoothing",
         )

@@ -198,7 +198,7 @@ def test_a_profile_takes_no_field_of_a_shape(own: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("smoothing", ["1e-300", "1e-9"])
 def test_a_smoothing_that_smooths_nothing_is_refused(smoothing: str, tmp_path: Path) -> None:
     (tmp_path / "scan.csv").write_text(GOOD)
-    with pytest.raises(InputError, match=r"leaves more than 3000 points.*raise bed.smoothing"):
+    with pytest.raises(InputError, match=r"leaves over 3000 points.*raise bed.smoothing"):
         bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", smoothing = {smoothing}'))
 
 
