@@ -16,6 +16,7 @@ from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
 from orchestrator.fidelity import spread
 from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.flow.model import model
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.flow.theory import half_length, seen_by_the_flow
 from orchestrator.grains.loaded_bed import LoadedBed
@@ -76,6 +77,13 @@ def check(scene: Scene, where: str) -> None:
             if limit.refused:
                 raise InputError(what, where=f"{where}: {limit.field}", remedy=remedy)
             warnings.warn(f"{limit.field}: {what} ({remedy})", stacklevel=2)
+    if _pile(scene):
+        try:
+            _ = model(scene).cases  # a mesh that cannot be made is refused before anything runs
+        except InputError as error:
+            raise InputError(
+                error.what, where=f"{where}: {error.where}", remedy=error.remedy
+            ) from None
 
 
 def of_map(name: str) -> Iterator[Limit]:

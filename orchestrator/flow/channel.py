@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 from orchestrator.flow.case import FlowCase, set_values
 from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.solved import SolvedFlow
 from orchestrator.physics.log_law import depth_mean_speed
+from orchestrator.study.scene import LEAST_DEPTH
 
 MEAN_SPEED_ERROR = 0.1
 """Largest relative difference of the column's mean speed, before the inlet, from the log law's."""
@@ -26,6 +28,7 @@ class ChannelFlow(FlowCase):
     """
 
     closed: bool = False
+    least_lid: ClassVar[float] = LEAST_DEPTH
 
     @property
     def depth_m(self) -> float:

@@ -5,9 +5,10 @@ cells are a geometric series. They are shortest at sharp tops, where the stress 
 """
 
 from dataclasses import dataclass, replace
-from math import ceil, inf, log, radians, tan
+from math import ceil, expm1, inf, log, radians, tan
 
 import numpy as np
+from scipy.optimize import brentq
 
 from orchestrator.bed.line import BedLine, FloatArray
 
@@ -44,6 +45,14 @@ class Grid:
     cells: tuple[int, ...]
     ratio: tuple[float, ...]
 
+    @property
+    def shortest(self) -> tuple[float, float, float]:
+        """Length of the shortest cell and the two ends of its piece, m."""
+        pieces = zip(self.cells, self.ratio, np.diff(self.line.x).tolist(), strict=True)
+        shorter = [_first((n, max(ratio, 1 / ratio)), length) for n, ratio, length in pieces]
+        piece = int(np.argmin(shorter))
+        return shorter[piece], self.line.x[piece], self.line.x[piece + 1]
+
 
 def growth_far(growth: float, cells_per_face: int) -> float:
     """Ratio of neighbouring cells far from the forms."""
@@ -79,7 +88,8 @@ def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float
         foot = cell
     near = NEAR * line.h
     ends = (line.x[1] - near, line.x[-2] + near)
-    line = _divided(line.with_corners([x for x in ends if line.x[0] < x < line.x[-1]]), cell)
+    inside = [x for x in ends if line.x[0] + cell < x < line.x[-1] - cell]
+    line = _divided(line.with_corners(inside), cell)
     sizes = _sizes(line, cell, foot, max(growth, face_ratio))
     lengths = np.diff(line.x)
     inner = [_piece(*one) for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)]
@@ -91,13 +101,15 @@ def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float
 
 
 def ratio_of(cells: int, first: float, length: float) -> float:
-    """The ratio, from 1 to 2, at which `cells` cells that begin with `first` fill a length."""
-    low, high = 1 + 1e-9, 2.0
-    for _ in range(60):
-        ratio = (low + high) / 2
-        short = first * (ratio**cells - 1) / (ratio - 1) < length
-        low, high = (ratio, high) if short else (low, ratio)
-    return ratio
+    """The ratio, at least 1, at which `cells` cells that begin with `first` fill a length."""
+    if cells < 2 or first * cells >= length:
+        return 1.0
+
+    def beyond(ratio: float) -> float:
+        return first * float(expm1(cells * log(ratio))) / (ratio - 1) - length
+
+    # the last cell alone would fill the length at the upper end
+    return float(brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15))
 
 
 def _divided(line: BedLine, cell: float) -> BedLine:
@@ -157,8 +169,11 @@ def _away(length: float, first: float, growth: float) -> tuple[int, float]:
 
 
 def _first(piece: tuple[int, float], length: float) -> float:
+    """Length of the first cell of a piece; its cells are a geometric series."""
     cells, ratio = piece
-    return length / cells if ratio == 1 else length * (ratio - 1) / (ratio**cells - 1)
+    if ratio < 1:
+        return _first((cells, 1 / ratio), length) * ratio ** (1 - cells)
+    return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
 def _last(piece: tuple[int, float], length: float) -> float:

@@ -151,7 +151,9 @@ def _read(path: Path, size: int, changed_ns: int) -> WallStress:
 @cache
 def _shared(**fields: Any) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
-    return ChannelFlow(**fields) if "closed" in fields else FlowCase(**fields)
+    case = ChannelFlow(**fields) if "closed" in fields else FlowCase(**fields)
+    case.check_grid()
+    return case
 
 
 MODELS: dict[str, type[FlowModel]] = {
