@@ -26,7 +26,7 @@ from orchestrator.report import (
 from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import bed, flow, mesh
 from orchestrator.report.results import Results
-from orchestrator.runs import process, retry
+from orchestrator.runs import process
 from orchestrator.runs.folder import Folder
 
 Draw = Callable[[Results], Iterable[Figure]]
@@ -92,7 +92,7 @@ def _parts(folder: Folder, beside: Callable[[], None]) -> list[list[Figure]]:
     # forked, the workers have the results and the imported libraries already
     context = multiprocessing.get_context("fork")
     workers = min(os.cpu_count() or 1, len(SECTIONS))
-    for tried in range(retry.MOST):
+    for tried in range(process.TRIES):
         pool = ProcessPoolExecutor(workers, context, process.follow, (os.getpid(),))
         # no `pool.map`: it cancels what a pool that is killed then ends, which prints a traceback
         try:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.runs import lock, resources
+from orchestrator.runs import lock, process
 from orchestrator.runs.files import read_json, text_of
 from orchestrator.runs.folder import RECORD, Folder
 
@@ -78,7 +78,8 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
     OrchestratorError
         If another process holds it, or the shell's limits are too low for any work.
     """
-    resources.check()
+    for shortage in process.shortages():
+        raise shortage
     folder = Folder(root)
     with contextlib.ExitStack() as stack:
         try:

@@ -20,7 +20,7 @@ from orchestrator.errors import (
     of_system,
 )
 from orchestrator.runs import case as case_states
-from orchestrator.runs import process, retry
+from orchestrator.runs import process
 from orchestrator.runs.agenda import Agenda
 from orchestrator.runs.case import Case
 from orchestrator.runs.cores import Cores
@@ -138,13 +138,14 @@ def execute(
     outside_s = time.monotonic() - began
     try:
         with cores.held(case.ranks) if cores else nullcontext():
-            ended = retry.run(
+            ended = process.run(
                 ["sh", "Allrun"],  # a disk may forbid to run files, or know no right to
                 cwd=directory,
                 log=directory / case_states.LOG,
                 limit_s=limit_s,
                 stop=stop,
                 env=ONE_THREAD,
+                tries=process.TRIES,
             )
         began = time.monotonic()
         _check(case, directory, ended, limit_s)
@@ -159,6 +160,12 @@ def execute(
 
 
 def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) -> None:
+    if ended.over == "disk":
+        raise SolverError(
+            "no space is left on the disk, and the solver did not end",
+            where=str(directory),
+            remedy="make room, then the same command continues",
+        )
     if ended.timed_out:
         raise SolverError(
             f"the solver did not end within {limit_s:g} s and was killed",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.runs import resources
+from orchestrator.runs import process
 from orchestrator.solvers import liggghts, openfoam
 
 LIBRARIES = (
@@ -97,7 +97,7 @@ def _tool(name: str) -> Finding:
 
 
 def _limits() -> Finding:
-    low = [str(error) for error in resources.shortages()]
+    low = [str(error) for error in process.shortages()]
     return Finding("limits", not low, "; ".join(low) or "enough memory and open files")
 
 

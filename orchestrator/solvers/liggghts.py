@@ -1,13 +1,12 @@
 """LIGGGHTS: which version is here, and what the end of a run means."""
 
-import os
 import re
 import warnings
 from functools import cache
 from pathlib import Path
 
 from orchestrator.errors import SolverError
-from orchestrator.runs import program
+from orchestrator.runs import process
 
 PROGRAM = "liggghts"
 TRIED = (3, 8)
@@ -35,9 +34,9 @@ def version() -> str:
     SolverError
         If it is missing, does not say its version, or is older than any that works.
     """
-    path = program.find(PROGRAM, remedy=INSTALL)
+    path = process.find(PROGRAM, remedy=INSTALL)
     # without the option it leaves a log wherever the user happens to be
-    said = program.ask(path, "-h", "-log", "none", env={**os.environ, **ENVIRONMENT})
+    said = process.ask(path, "-h", "-log", "none", env=ENVIRONMENT)
     found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said.text)
     if not found:
         raise SolverError(
@@ -78,7 +77,7 @@ def programs(ranks: int) -> dict[str, str]:
         If one is missing.
     """
     if ranks > 1:
-        program.find("mpirun", remedy="install it: apt-get install openmpi-bin")
+        process.find("mpirun", remedy="install it: apt-get install openmpi-bin")
     return {PROGRAM: version()}
 
 

@@ -3,13 +3,13 @@
 import os
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.runs.program import Said, ask, find
+from orchestrator.runs.process import Reply, ask, find
 
 if TYPE_CHECKING:
     import pyvista
@@ -40,7 +40,7 @@ def version() -> str:
         If a program is missing, does not start, or is of a version that the case cannot run with.
     """
     paths = [find(name, remedy=INSTALL) for name in PROGRAMS]
-    said = _help(paths[-1], os.environ)
+    said = _help(paths[-1], os.environ.get("WM_PROJECT_DIR"))
     match = _STATED.search(said.text)
     if match is None:
         raise _stateless(paths[-1], said)
@@ -49,16 +49,14 @@ def version() -> str:
     return found
 
 
-def _help(path: str, environment: Mapping[str, str]) -> Said:
-    home = environment.get("WM_PROJECT_DIR") or _HOME
-    return ask(path, "-help", env={**environment, "WM_PROJECT_DIR": home})
+def _help(path: str, home: str | None) -> Reply:
+    return ask(path, "-help", env={"WM_PROJECT_DIR": home or _HOME})
 
 
-def _stateless(path: str, said: Said) -> SolverError:
+def _stateless(path: str, said: Reply) -> SolverError:
     """Why a program states no version that is known."""
     told = os.environ.get("WM_PROJECT_DIR")
-    rest = {name: value for name, value in os.environ.items() if name != "WM_PROJECT_DIR"}
-    if told and _STATED.search(_help(path, rest).text):
+    if told and _STATED.search(_help(path, None).text):
         return SolverError(
             f"WM_PROJECT_DIR is {told}, which is not the OpenFOAM of {path}",
             remedy="unset it, or put the programs of that OpenFOAM first in PATH",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.runs import retry
+from orchestrator.runs import process
 from tests.faults.bench import (
     Bench,
     case_of,
@@ -198,7 +198,7 @@ def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(
     with ledger.fault("SIGKILL to the solver, each time", "flow"):
         code, said = pile.study(programs=programs)
         assert code == 3, said
-        assert len((pile.folder / "tries").read_text().splitlines()) == retry.MOST
+        assert len((pile.folder / "tries").read_text().splitlines()) == process.TRIES
         assert "simpleFoam" in said
         assert all((one / "done.json").is_file() for one in case_of(pile.out, "cells"))
         pile.check_finished()

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -135,29 +134,3 @@ def test_a_program_cannot_end_its_keeper(tmp_path: Path) -> None:
         pytest.skip("this system has no namespaces for users")
     used = _run(tmp_path, "kill -9 $PPID; kill -9 1; exit 7")
     assert used.returncode == 7
-
-
-def test_a_killed_driver_ends_all(tmp_path: Path, walled: bool) -> None:
-    script = (
-        "from pathlib import Path; from orchestrator.runs import confined\n"
-        + ("" if walled else "confined.hides = lambda: False\n")
-        + "here = Path('.').absolute()\n"
-        "confined.run(['sh', '-c', 'setsid sh -c \"while :; do date >beat; sleep 0.1; done\" &"
-        " wait'], cwd=here, log=here / 'log', limits=confined.Limits())"
-    )
-    driver = subprocess.Popen(
-        [sys.executable, "-c", script], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}
-    )
-    beat = tmp_path / "beat"
-    end = time.monotonic() + 20
-    while not beat.is_file() and time.monotonic() < end:
-        time.sleep(0.05)
-    assert beat.is_file()
-    driver.kill()
-    driver.wait()
-    while time.monotonic() < end:
-        beat.unlink(missing_ok=True)
-        time.sleep(0.5)
-        if not beat.exists():
-            return
-    pytest.fail("it lives on")

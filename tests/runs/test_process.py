@@ -1,0 +1,227 @@
+"""External programs: their output, limits and ends, and what they answer about their version."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import Interrupted, SolverError
+from orchestrator.runs import process
+from orchestrator.runs.process import Ended
+from orchestrator.solvers import doctor, liggghts, openfoam
+
+ROOT = Path(__file__).parents[2]
+
+
+def _sh(folder: Path, script: str, **options: object) -> Ended:
+    options = {"limit_s": 30.0, **options}
+    return process.run(["sh", "-c", script], cwd=folder, log=folder / "log", **options)  # type: ignore[arg-type]
+
+
+def _has_ended(pid: int) -> bool:
+    for _ in range(200):
+        try:
+            state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except FileNotFoundError:
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def test_output_is_logged_and_the_exit_code_reported(tmp_path: Path) -> None:
+    ended = _sh(tmp_path, "echo out; echo err >&2; exit 3")
+    assert (ended.returncode, ended.over) == (3, "")
+    assert (tmp_path / "log").read_text() == "out\nerr\n"
+
+
+def test_the_environment_is_this_one_with_what_is_added_and_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FIRST", "1")
+    monkeypatch.setenv("SECOND", "2")
+    _sh(tmp_path, "echo $FIRST $SECOND $THIRD $PWD", env={"SECOND": None, "THIRD": "3"})
+    assert (tmp_path / "log").read_text() == f"1 3 {tmp_path}\n"
+
+
+FAMILY = "sleep 60 & echo $! >child; trap '' TERM; wait; wait"
+
+
+@pytest.mark.parametrize(
+    ("script", "options", "over"),
+    [
+        (FAMILY, {"limit_s": 0.3}, "time"),
+        (f"yes & {FAMILY}", {"output_limit": 10_000}, "output"),
+        ("sleep 60 & echo $! >child", {}, ""),
+    ],
+)
+def test_nothing_that_a_program_started_is_left(
+    tmp_path: Path, script: str, options: dict[str, float], over: str
+) -> None:
+    assert _sh(tmp_path, script, **options).over == over
+    assert _has_ended(int((tmp_path / "child").read_text()))
+
+
+def test_a_file_may_not_grow_beyond_its_limit(tmp_path: Path) -> None:
+    ended = _sh(tmp_path, "exec head -c 1000000 /dev/zero >file", file_limit=100_000)
+    assert ended.returncode != 0
+    assert (tmp_path / "file").stat().st_size <= 100_000
+
+
+def test_a_program_that_goes_on_while_the_disk_is_full_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process, "DISK_S", 0.2)
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1M", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("a file system can be mounted by root alone")
+    try:
+        script = "head -c 10000000 /dev/zero >file; while :; do sleep 0.1; done"
+        assert _sh(folder, script).over == "disk"
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_stop_ends_the_program(tmp_path: Path) -> None:
+    stop = threading.Event()
+    threading.Timer(0.3, stop.set).start()
+    with pytest.raises(Interrupted):
+        _sh(tmp_path, FAMILY, stop=stop)
+    assert _has_ended(int((tmp_path / "child").read_text()))
+
+
+def test_a_killed_driver_leaves_nothing_at_work(tmp_path: Path) -> None:
+    script = (
+        "from pathlib import Path; from orchestrator.runs import process;"
+        "process.run(['sh', '-c', 'sleep 60 & echo $! >child; echo $$ >pid; wait; sleep 60'],"
+        " cwd=Path('.').absolute(), log=Path('log').absolute(), limit_s=60)"
+    )
+    driver = subprocess.Popen(
+        [sys.executable, "-c", script], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )
+    pid = tmp_path / "pid"
+    while not (pid.is_file() and pid.read_text().strip()):
+        assert driver.poll() is None
+        time.sleep(0.05)
+    driver.kill()
+    driver.wait()
+    assert all(_has_ended(int((tmp_path / name).read_text())) for name in ("pid", "child"))
+
+
+@pytest.mark.parametrize(
+    ("script", "runs"), [("kill -KILL $$", 3), ("exit 143", 3), ("kill -SEGV $$", 1), ("exit 1", 1)]
+)
+def test_a_program_that_is_killed_from_outside_runs_again(
+    tmp_path: Path, script: str, runs: int
+) -> None:
+    _sh(tmp_path, f"echo >>runs; {script}", tries=process.TRIES)
+    assert len((tmp_path / "runs").read_text()) == runs
+
+
+VERSIONS: dict[str, Callable[[], str]] = {
+    "simpleFoam": openfoam.version.__wrapped__,
+    "liggghts": liggghts.version.__wrapped__,
+}
+STATED = {
+    "simpleFoam": "Using: OpenFOAM-v1912 (see www.OpenFOAM.com)",
+    "liggghts": "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)",
+}
+ANSWERS = (
+    "printf '\\377\\376 \\300\\n'; echo '{stated}'",
+    "echo '{stated}'; head -c 30000000 /dev/zero",
+    "echo '{stated}' >&2; exit 3",
+    "sleep 1000 & echo '{stated}'",
+)
+REFUSALS = {
+    "exit 4": "it ended with 4 and printed nothing",
+    "yes x": "printed “x”",
+    "echo 'error while loading shared libraries: libnone.so'; exit 127": "printed “error while",
+    "kill -SEGV $$": "it was killed by SIGSEGV",
+    "/nowhere/sh": "not found",
+}
+
+
+@pytest.fixture(params=VERSIONS)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+    """Put a program of a name in front of the real one."""
+
+    def put(script: str, mode: int = 0o755) -> Path:
+        path = tmp_path / name
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(mode)
+        monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+        return path
+
+    return put
+
+
+@pytest.mark.parametrize("script", ANSWERS)
+def test_a_version_is_read_whatever_else_is_printed(
+    put: Callable[..., Path], name: str, script: str
+) -> None:
+    put(script.format(stated=STATED[name]))
+    assert VERSIONS[name]() in STATED[name]
+
+
+@pytest.mark.parametrize("script", REFUSALS)
+def test_a_program_without_a_version_is_refused_with_its_words(
+    put: Callable[..., Path], name: str, script: str
+) -> None:
+    path = put(script)
+    with pytest.raises(SolverError, match=REFUSALS[script]) as caught:
+        VERSIONS[name]()
+    assert str(caught.value).startswith(str(path))
+
+
+def test_a_program_that_may_not_be_run(
+    tmp_path: Path, put: Callable[..., Path], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = put("", mode=0o400)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    # OpenFOAM's other programs are looked for first
+    for other in ("gmshToFoam", "setExprFields"):
+        (tmp_path / other).symlink_to("/bin/true")
+    with pytest.raises(SolverError, match=f"{path} may not be run .chmod"):
+        VERSIONS[name]()
+
+
+def test_a_program_that_does_not_answer_is_killed(
+    put: Callable[..., Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process, "QUERY_S", 0.5)
+    put(f"cd {tmp_path}; {FAMILY}")
+    with pytest.raises(SolverError, match=r"did not end within 0\.5 s"):
+        VERSIONS[name]()
+    assert _has_ended(int((tmp_path / "child").read_text()))
+
+
+def test_the_environment_of_another_openfoam_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("WM_PROJECT_DIR", str(tmp_path))
+    with pytest.raises(SolverError, match=f"WM_PROJECT_DIR is {tmp_path}, .*unset it"):
+        VERSIONS["simpleFoam"]()
+    monkeypatch.setenv("WM_PROJECT_DIR", "")
+    assert VERSIONS["simpleFoam"]() in openfoam.TRIED
+
+
+def test_the_doctor_names_a_solver_that_is_broken(put: Callable[..., Path], name: str) -> None:
+    put("exit 1")
+    openfoam.version.cache_clear()
+    liggghts.version.cache_clear()
+    findings = doctor.examine()
+    assert sum(not finding.good for finding in findings) == 1
+    assert len(doctor.text(findings).splitlines()) == len(findings)
