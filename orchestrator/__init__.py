@@ -19,6 +19,10 @@ __version__ = "0.1.0"
 __all__ = ["open", "run", "threshold"]
 
 
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
+
+
 def __getattr__(name: str) -> Any:
     # importing the package alone must not take the time of pandas
     if name in __all__:

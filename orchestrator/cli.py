@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signals.listen()
     streams.take()
     warnings.showwarning = _show_warning
-    options = _parser().parse_args(_plain(sys.argv[1:] if arguments is None else arguments))
+    options = _parser().parse_args(arguments)
     code = _code(options)
     lost = streams.lost()
     if lost and not code:
@@ -57,30 +58,13 @@ def _code(options: argparse.Namespace) -> int:
         return 1
 
 
-VALUED = (
-    "--out",
-    "--workers",
-    "--tolerance",
-    "--cluster",
-    "--solver",
-    "--from",
-    "--scene",
-    *calculator.VALUED,
-)
-FLAGS = ("-h", "--help", "--version", "--json", "--plan", *calculator.FLAGS, "--")
+class Parser(argparse.ArgumentParser):
+    """A parser that takes options by their whole names alone, and negative numbers as values."""
 
-
-def _plain(arguments: Sequence[str]) -> list[str]:
-    """Give argparse values and file names that begin with a dash in a form that it takes."""
-    plain: list[str] = []
-    for text in arguments:
-        if plain and plain[-1] in VALUED:
-            plain[-1] += f"={text}"
-        elif text.startswith("-") and text not in (*VALUED, *FLAGS) and os.path.lexists(text):
-            plain.append(f"./{text}")
-        else:
-            plain.append(text)
-    return plain
+    def __init__(self, *arguments: Any, **settings: Any) -> None:
+        super().__init__(*arguments, allow_abbrev=False, **settings)
+        # that of Python 3.14; before, -1e-3 and -30:30:7 count as options
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -88,7 +72,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="orchestrator",
         description="When does a sediment grain, or a whole bedform of grains, start to move?",
     )

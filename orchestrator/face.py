@@ -1,10 +1,11 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator import paper, pipeline, report, tables
 from orchestrator.calculator import table as calculator
-from orchestrator.errors import InputError, OrchestratorError, SolverError
+from orchestrator.errors import InputError, OrchestratorError, SolverError, of_system
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
@@ -23,8 +24,52 @@ if TYPE_CHECKING:
 
 Numbers = ArrayLike
 """A number or an array of them."""
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
+def _public(function: Callable[P, T]) -> Callable[P, T]:
+    """Call with numpy's default error handling; failures of the system as `OrchestratorError`."""
+
+    @wraps(function)
+    def call(*arguments: P.args, **settings: P.kwargs) -> T:
+        try:
+            with np.errstate(divide="warn", over="warn", under="ignore", invalid="warn"):
+                return function(*arguments, **settings)
+        except OSError as error:
+            raise of_system(error) from error
+
+    return call
+
+
+def _path(value: Any, name: str) -> Path:
+    """An argument as an absolute path."""
+    if not isinstance(value, str | os.PathLike) or "\0" in str(value):
+        raise InputError(f"{value!r} is not a path", where=name)
+    try:
+        return Path(value).absolute()
+    except FileNotFoundError as error:
+        raise of_system(error, "the working directory") from error
+
+
+def _array(values: Any, name: str) -> Any:
+    """An argument as an array of numbers; a roughness may have texts such as ``d/30``."""
+
+    def number(value: Any) -> Any:
+        if isinstance(value, str):
+            if name == "roughness":
+                return value
+            raise TypeError
+        return float(value)
+
+    try:
+        return np.vectorize(number, otypes=[object])(np.asarray(values, dtype=object))
+    except (TypeError, ValueError):
+        what = f"{values!r} is neither a number nor an array of numbers"
+        raise InputError(what, where=name) from None
+
+
+@_public
 def threshold(
     diameter: Numbers,
     *,
@@ -85,14 +130,22 @@ def threshold(
         "gravity": gravity,
         **({} if depth is None else {"depth": depth}),
     }
-    arrays = np.broadcast_arrays(*(np.asarray(values) for values in given.values()))
-    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True)))
+    if not isinstance(law, str | None):
+        raise InputError(f"{law!r} is not the name of a force law", where="law")
+    try:
+        arrays = np.broadcast_arrays(*(_array(values, name) for name, values in given.items()))
+    except ValueError as error:
+        raise InputError(str(error), where="threshold") from None
+    if not arrays[0].size:
+        raise InputError("an array without values", where="threshold")
+    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True))).infer_objects()
     answer = "bridged" if law is None else calculator.known_law(law)
     found = calculator.thresholds(points, answer)
     chosen = found if law is None else found[found["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)
 
 
+@_public
 def run(
     source: str | Path,
     *,
@@ -120,11 +173,15 @@ def run(
     SolverError
         If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
     """
+    if not isinstance(source, str | os.PathLike) or "\0" in str(source):
+        raise InputError(f"{source!r} is neither a path nor the name of a preset", where="source")
+    if workers is not None and not (isinstance(workers, int) and workers >= 1):
+        raise InputError(f"{workers!r} is not a whole number of at least 1", where="workers")
     asked = study.load(str(source), [paper.PRESETS])
     if tolerance is not None:
         study.check_tolerance(tolerance, "tolerance")
         asked = replace(asked, tolerance=tolerance)
-    place = Path(out) if out else Path("results") / asked.name
+    place = _path(Path("results") / asked.name if out is None else out, "out")
     count, guests = workers or os.cpu_count() or 1, (paper.report_card,)
     finished = pipeline.run(asked, place, workers=count, guests=guests)
     if finished.failures:
@@ -134,6 +191,7 @@ def run(
     return open(place)
 
 
+@_public
 def open(directory: str | Path) -> "Opened":
     """Open the directory of a study that was run.
 
@@ -144,13 +202,13 @@ def open(directory: str | Path) -> "Opened":
     OrchestratorError
         If it has no tables, or they have changed since they were written.
     """
-    space = Workspace(Path(directory).absolute())
+    space = Workspace(_path(directory, "directory"))
     asked, planned = pipeline.reopen(space)
     found = tables.read(space.folder, "tables")
     return Opened(Results(asked, planned, found, space.cases))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Opened:
     """A study that was run, as `run` and `open` give it."""
 
@@ -216,7 +274,7 @@ class Opened:
         return self._results.cases / found[0]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plots:
     """Figures of a study."""
 

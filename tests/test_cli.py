@@ -19,7 +19,7 @@ protocol = { load_increment = 0.05 }
 [axes]
 "grain.diameter" = [7e-4, 1e-3]
 """
-ODD = ["with space", """quo"te's""", "accents é", "-dash"]
+ODD = ["with space", """quo"te's""", "accents é"]
 
 
 def _refused(ended: "subprocess.CompletedProcess[str]", *words: str) -> None:
@@ -47,6 +47,18 @@ def test_threshold_as_json(orchestrator: Command) -> None:
         assert one["shields"] == pytest.approx(stress)
         assert one["drag"] > 0
         assert one["lift"] > 0
+
+
+@pytest.mark.parametrize("option", ["--fluid=1000", "--diam=1e-3"])
+def test_no_option_is_abbreviated(orchestrator: Command, option: str) -> None:
+    ended = orchestrator("threshold", "--diameter", "1e-3", option)
+    assert ended.returncode == 2
+    assert option in ended.stderr
+
+
+@pytest.mark.parametrize("value", ["-1e1", "-10:10:3", "-.5"])
+def test_a_negative_number_is_a_value(orchestrator: Command, value: str) -> None:
+    _refused(orchestrator("threshold", "--diameter", "1e-3", "--slope", value), "--slope", "0")
 
 
 def test_threshold_for_people_and_with_a_roughness_in_metres(orchestrator: Command) -> None:

@@ -1,10 +1,15 @@
 """The public Python face: what it gives is what commands and tables say."""
 
+import math
 import subprocess
 import sys
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import orchestrator
@@ -19,7 +24,7 @@ protocol = { load_increment = 0.05 }
 
 
 def test_three_names_are_public_and_importing_them_is_cheap() -> None:
-    assert sorted(orchestrator.__all__) == ["open", "run", "threshold"]
+    assert dir(orchestrator) == ["__version__", "open", "run", "threshold"]
     code = "import sys, orchestrator; sys.exit('pandas' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
     with pytest.raises(AttributeError, match="nothing"):
@@ -42,11 +47,48 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
         orchestrator.threshold(2e-4, law="nonsense")
 
 
+BAD: list[tuple[Callable[..., object], dict[str, object], str]] = [
+    *((orchestrator.threshold, {"law": law}, "law") for law in (5, ["bridged"])),
+    *((orchestrator.threshold, {"depth": x}, "depth") for x in ("x", {}, 1j, [[1.0], [1.0, 2.0]])),
+    (orchestrator.threshold, {"depth": []}, "without values"),
+    (orchestrator.threshold, {"density": [2e3, 3e3], "slope_deg": [0, 1, 2]}, "broadcast"),
+    *((orchestrator.run, {"workers": n}, "workers") for n in (math.nan, -1, 0, 1.5, "2")),
+    *((orchestrator.run, {"out": out}, "out") for out in (5, "a\0b")),
+    *((orchestrator.run, {"tolerance": x}, "tolerance") for x in ("x", math.nan, -1)),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments", "name"), BAD)
+def test_a_bad_argument_gets_one_clear_error(
+    function: Callable[..., object], arguments: dict[str, object], name: str
+) -> None:
+    first = "first-look" if function is orchestrator.run else 1e-3
+    with pytest.raises(InputError, match=name):
+        function(first, **arguments)
+
+
+@pytest.mark.parametrize("directory", [5, None, "a\0b"])
+def test_what_is_no_path_is_refused(directory: object) -> None:
+    for function in (orchestrator.run, orchestrator.open):
+        with pytest.raises(InputError, match="path"):
+            function(directory)  # type: ignore[arg-type]
+
+
+def test_numbers_of_any_type_and_numpy_settings_give_the_same() -> None:
+    exact = orchestrator.threshold(1e-3, roughness=1e-4, density=2650.0)
+    with np.errstate(all="raise"):
+        for number in (np.longdouble, Decimal, Fraction):
+            found = orchestrator.threshold(1e-3, roughness=number("1e-4"), density=number(2650))
+            pd.testing.assert_frame_equal(found, exact, rtol=1e-12)
+
+
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     (tmp_path / "grains.toml").write_text(GRAINS)
     ran = orchestrator.run(tmp_path / "grains.toml", out=tmp_path / "out", workers=1)
     found = orchestrator.open(tmp_path / "out")
     assert ran.page == found.page
+    assert ran == ran
+    assert {ran, ran} == {ran}
     assert found.page.is_file()
     rows = found.thresholds
     assert rows["d_m"].tolist() == [7e-4, 1e-3]

@@ -9,8 +9,6 @@ from typing import Any
 from orchestrator.calculator.parameters import DIAMETER, OPTION_OF, PARAMETERS, Parameter, renamed
 from orchestrator.errors import InputError
 
-VALUED = ("--law", *OPTION_OF.values())
-FLAGS = ("--csv",)
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
     "several ranges give every combination. Values of diameter, viscosity, roughness and depth "

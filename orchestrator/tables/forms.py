@@ -34,5 +34,6 @@ def rows(answer: Answer) -> Iterator[Row]:
                 "fraction": fraction,
                 "mean_ustar_over_ustar0": float(face.speed[own].mean()) if own.any() else np.nan,
                 "ustar0_m_s": reached if np.isfinite(reached) else np.nan,
-                "over_first_form": reached / first if np.isfinite(reached / first) else np.nan,
+                # loose grains of the first form go without a flow, which no other is a multiple of
+                "over_first_form": reached / first if first > 0 and np.isfinite(reached) else np.nan,
             }

@@ -103,8 +103,7 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
     listed = list(classes.classes(pile.packing.sizes[pile.packing.windward]))
     for fraction in scene.protocol.fractions:
         found = {one.number: _of_class(answer, one, fraction) for one in listed}
-        # a class whose first grains lie loose has a threshold of zero, which hides nothing
-        middle = (found[0]["shields_own"] if 0 in found else np.nan) or np.nan
+        middle = found[0]["shields_own"] if 0 in found else np.nan
         whole = threshold.first_level(answer.motion, fraction)
         for one in listed:
             moved = answer.motion.moved_by(whole or 0)[one.chosen]
@@ -115,7 +114,8 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
                 "count": int(one.chosen.sum()),
                 "class_moved": moved.mean() if whole else np.nan,
                 **found[one.number],
-                "hiding": found[one.number]["shields_own"] / middle,
+                # the grains of the middle class may lie loose: no ratio to a threshold of zero
+                "hiding": found[one.number]["shields_own"] / middle if middle > 0 else np.nan,
                 "hiding_wilcock_crowe": float(wilcock_crowe_hiding(one.size) / one.size),
                 "hiding_egiazaroff": float(egiazaroff_hiding(one.size)),
             }
