@@ -61,8 +61,8 @@ def _code(options: argparse.Namespace) -> int:
 class Parser(argparse.ArgumentParser):
     """A parser that takes options by their whole names alone, and negative numbers as values."""
 
-    def __init__(self, *arguments: Any, **settings: Any) -> None:
-        super().__init__(*arguments, allow_abbrev=False, **settings)
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**{**settings, "allow_abbrev": False})
         # that of Python 3.14; before, -1e-3 and -30:30:7 count as options
         self._negative_number_matcher = re.compile(r"-\.?\d")
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -47,9 +48,11 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
         orchestrator.threshold(2e-4, law="nonsense")
 
 
-BAD: list[tuple[Callable[..., object], dict[str, object], str]] = [
+NUMBERS: list[Any] = [np.longdouble, Decimal, Fraction]
+NO_NUMBERS: list[Any] = ["x", {}, 1j, [[1.0], [1.0, 2.0]]]
+BAD: list[tuple[Callable[..., object], dict[str, Any], str]] = [
     *((orchestrator.threshold, {"law": law}, "law") for law in (5, ["bridged"])),
-    *((orchestrator.threshold, {"depth": x}, "depth") for x in ("x", {}, 1j, [[1.0], [1.0, 2.0]])),
+    *((orchestrator.threshold, {"depth": bad}, "depth") for bad in NO_NUMBERS),
     (orchestrator.threshold, {"depth": []}, "without values"),
     (orchestrator.threshold, {"density": [2e3, 3e3], "slope_deg": [0, 1, 2]}, "broadcast"),
     *((orchestrator.run, {"workers": n}, "workers") for n in (math.nan, -1, 0, 1.5, "2")),
@@ -60,7 +63,7 @@ BAD: list[tuple[Callable[..., object], dict[str, object], str]] = [
 
 @pytest.mark.parametrize(("function", "arguments", "name"), BAD)
 def test_a_bad_argument_gets_one_clear_error(
-    function: Callable[..., object], arguments: dict[str, object], name: str
+    function: Callable[..., object], arguments: dict[str, Any], name: str
 ) -> None:
     first = "first-look" if function is orchestrator.run else 1e-3
     with pytest.raises(InputError, match=name):
@@ -77,7 +80,7 @@ def test_what_is_no_path_is_refused(directory: object) -> None:
 def test_numbers_of_any_type_and_numpy_settings_give_the_same() -> None:
     exact = orchestrator.threshold(1e-3, roughness=1e-4, density=2650.0)
     with np.errstate(all="raise"):
-        for number in (np.longdouble, Decimal, Fraction):
+        for number in NUMBERS:
             found = orchestrator.threshold(1e-3, roughness=number("1e-4"), density=number(2650))
             pd.testing.assert_frame_equal(found, exact, rtol=1e-12)
 

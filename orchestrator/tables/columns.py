@@ -57,9 +57,9 @@ COLUMNS: dict[str, str] = {
     "mode": "how it moved: rolled, slid, lifted (rose by more than 0.3 d) or none; how many"
     " are lifted depends on the stiffness and on the mobile layers of the model",
     "fell_upstream": "whether the grain fell back before or instead of moving downstream",
-    "moved_in_load_step": "number of the load step in which the grain moved: passed the displacement"
-    " criterion downstream, or was carried off; 0: never",
-    "fallen_in_load_step": "number of the load step in which the grain was first displaced upstream by the"
+    "moved_in_load_step": "load step in which the grain moved: passed the displacement criterion"
+    " downstream, or was carried off; 0: never",
+    "fallen_in_load_step": "load step in which the grain was first displaced upstream by the"
     " displacement criterion; 0: never",
     "u_e_m_s": "speed of the approaching flow 10 h above the flat bed",
     "lid_over_h": "height of the lid above the flat bed over h",
@@ -78,13 +78,13 @@ COLUMNS: dict[str, str] = {
     "ustar_largest": "its largest value on the bed",
     "ustar0_m_s": "undisturbed friction velocity",
     "count": "N, counted grains: the exposed grains of the part of the bed that bed.counted names",
-    "moved": "n, grains that had moved: passed the displacement criterion downstream, or were carried off",
+    "moved": "n, grains that had moved: passed the displacement criterion downstream or carried off",
     "not_moved": "N - n",
     "carried_off": "of the grains that had moved, those that lift took off the bed before they"
     " passed the displacement criterion; in pile_grain: 1 if that happened to the grain, else 0",
     "share_carried_off": "carried_off over moved where the fraction is first reached",
-    "fallen_upstream": "grains that had been displaced upstream by the displacement criterion, carried off later"
-    " or not",
+    "fallen_upstream": "grains that had been displaced upstream by the displacement criterion,"
+    " carried off later or not",
     "fraction": "n/N at which the threshold is read",
     "fraction_moved": "n/N",
     "highest_fraction": "largest n/N that the load steps reached",

@@ -27,6 +27,8 @@ def rows(answer: Answer) -> Iterator[Row]:
             sorted_ = np.sort(np.nan_to_num(flow[own], nan=np.inf))
             reached = float(sorted_[needed - 1]) if own.any() else np.nan
             first = reached if number == 0 else first
+            # loose grains of the first form move in still fluid: nothing is a multiple of that
+            ratio = reached / first if first > 0 else np.nan
             yield {
                 "scene_id": answer.scene_id,
                 "form": number + 1,
@@ -34,6 +36,5 @@ def rows(answer: Answer) -> Iterator[Row]:
                 "fraction": fraction,
                 "mean_ustar_over_ustar0": float(face.speed[own].mean()) if own.any() else np.nan,
                 "ustar0_m_s": reached if np.isfinite(reached) else np.nan,
-                # loose grains of the first form go without a flow, which no other is a multiple of
-                "over_first_form": reached / first if first > 0 and np.isfinite(reached) else np.nan,
+                "over_first_form": ratio if np.isfinite(ratio) else np.nan,
             }
