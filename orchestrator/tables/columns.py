@@ -78,7 +78,8 @@ COLUMNS: dict[str, str] = {
     "ustar_largest": "its largest value on the bed",
     "ustar0_m_s": "undisturbed friction velocity",
     "count": "N, counted grains: the exposed grains of the part of the bed that bed.counted names",
-    "moved": "n, grains that had moved: passed the displacement criterion downstream or carried off",
+    "moved": "n, grains that had moved: passed the displacement criterion downstream, or were"
+    " carried off",
     "not_moved": "N - n",
     "carried_off": "of the grains that had moved, those that lift took off the bed before they"
     " passed the displacement criterion; in pile_grain: 1 if that happened to the grain, else 0",
