@@ -11,6 +11,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import TIE, Packing
 from orchestrator.bed.places import Places, across
 from orchestrator.bed.poured_case import BED
+from orchestrator.errors import InputError
 from orchestrator.study.parts import Range
 
 FloatArray = NDArray[np.float64]
@@ -62,6 +63,12 @@ def read(
     in_layers = surface - height < (mobile_layers - 0.5) * LAYER
     mobile = (in_layers | free) & on_form & (rows["fixed"] == 0).to_numpy()
     counted = free & counted_segments(line, counts)[segment] & within(centres[:, 0], counts)
+    if not counted.any():
+        raise InputError(
+            "no grain of the poured bed is exposed where grains are counted",
+            where="bed.counted",
+            remedy="choose another part of the bed, or another bed.seed",
+        )
     # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
     order = np.lexsort((along, ~mobile))
     kept = order[(mobile | _near(places, sizes, mobile))[order]]

@@ -35,6 +35,8 @@ MOST_LOOKS = 400
 SETTLING = "settling.csv"
 DUMP = "poured.dump"
 BED = "bed.csv"
+LEAST_LENGTH = 5.0
+"""Least length of the forms of a poured bed, d."""
 MOST_GRAINS = 100_000
 """Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
 
@@ -109,13 +111,21 @@ class PouredBed(Case):
         return liggghts.ranks(self._count)
 
     def check_size(self) -> None:
-        """See that the mould does not take more grains than a machine bears.
+        """See that the mould has room for a bed, and takes no more grains than a machine bears.
 
         Raises
         ------
         InputError
-            If it does; with the field of a study file.
+            With the field of a study file.
         """
+        length = self.line.x[-2] - self.line.x[1]
+        if length < LEAST_LENGTH:
+            raise InputError(
+                f"a poured bed of {length:.3g} grains: fewer than {LEAST_LENGTH:g} in a row have no"
+                " pockets that are those of a bed",
+                where="bed.length",
+                remedy=f"at least {LEAST_LENGTH:g} diameters",
+            )
         count = self._count
         if count > MOST_GRAINS:
             raise InputError(

@@ -33,6 +33,8 @@ SPACING = 3.0
 never meet."""
 UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
+SCALED = {"diameter", "density", "sizes"}
+"""Fields of the grain that a cell, whose grain is that of the deck, knows by its forces alone."""
 BLOCK = 512
 """Most cells of a deck."""
 
@@ -158,6 +160,6 @@ def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
 
 
 def _shared_key(scene: Scene) -> str:
-    contact = scene.grain.model_dump(include={"friction_angle_deg", "stiffness", "damping"})
+    contact = scene.grain.model_dump(mode="json", exclude=SCALED)
     rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
     return canonical_json([contact, rules])

@@ -22,7 +22,7 @@ MEANING = {
     "stiffness": "K d/W, normal and tangential",
     "damping": "ratio of a collision",
     "time_step": "sqrt(m/K)",
-    "waiting_time": "a load step ends when nothing has passed for this long, sqrt(d/g')",
+    "waiting_time": "time without a passage of the criterion that ends a load step, sqrt(d/g')",
     "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
     "settle": "time before the first load step, sqrt(d/g')",
     "settle_drag": "of a still fluid in that time, m sqrt(g/d)",
@@ -108,9 +108,9 @@ def write(
         The grains; ids are their places, from 1.
     parameters : mapping
         Each becomes a variable of the deck.
-    flows : ndarray, shape (holds + 1,)
+    flows : ndarray, shape (load steps + 1,)
         The flow of the settling, then of each load step.
-    force : ndarray, shape (holds + 1, n, 2)
+    force : ndarray, shape (load steps + 1, n, 2)
         The flow's force on each grain at these flows, N; only pushed grains feel one.
     margin : float
         Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.

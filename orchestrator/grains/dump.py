@@ -61,26 +61,30 @@ def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame)
         The case.
     ids : ndarray of int, shape (N,)
         Ids of the counted grains, rising.
-    looks : DataFrame
+    samples : DataFrame
         The deck's table of samples, T rows.
 
     Raises
     ------
     SolverError
-        If a dump is not one of these grains and looks.
+        If a dump is not one of these grains and samples.
     Exploded
         If it holds none of them.
     """
     path = directory / PASSAGE
     dump = read_dump(path, PASSAGE_COLUMNS)
     if not np.array_equal(dump.steps[1:], samples["step"]):
-        raise SolverError("it is not of these holds", where=str(path), remedy="run the case again")
+        raise SolverError(
+            "its samples are not those of samples.csv", where=str(path), remedy="run the case again"
+        )
     rows = dump.rows
     if rows.empty or not rows["id"].isin(ids).all():
         remedy = "a smaller protocol.time_step, or look for grains that overlap"
         if rows.empty:
             raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
-        raise SolverError("it is not of these grains", where=str(path), remedy="run the case again")
+        raise SolverError(
+            "it lists grains that are not counted", where=str(path), remedy="run the case again"
+        )
     state = np.full((len(PASSAGE_COLUMNS) - 1, len(dump.steps), len(ids)), np.nan)
     row, column = np.searchsorted(dump.steps, rows["step"]), np.searchsorted(ids, rows["id"])
     for part, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
@@ -93,12 +97,14 @@ def read_passage(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame)
 
 
 def _left(directory: Path, ids: NDArray[np.int64], samples: pd.DataFrame) -> NDArray[np.bool_]:
-    """Which counted grains there were at the end of each load step, shape (holds, N)."""
+    """Which counted grains there were at the end of each load step, shape (load steps, N)."""
     bed = read_dump(directory / BED, BED_COLUMNS)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
     if not np.array_equal(bed.steps, ends):
         raise SolverError(
-            "it is not of these holds", where=str(directory / BED), remedy="run the case again"
+            "its frames are not the ends of the load steps",
+            where=str(directory / BED),
+            remedy="run the case again",
         )
     rows = bed.rows[bed.rows["id"].isin(ids)]
     found = np.zeros((len(ends), len(ids)), bool)

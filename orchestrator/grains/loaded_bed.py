@@ -22,7 +22,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, pockets
 from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces, on_slopes
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
 
 FloatArray = NDArray[np.float64]
@@ -104,6 +104,12 @@ class LoadedBed:
         """Height over the bed line of the centre of an exposed grain, d."""
         return 0.5 + self.bed.roughness / self.scene.grain.diameter
 
+    @property
+    def counts(self) -> str | Range:
+        """Which exposed grains are counted; a range of x in diameters."""
+        counts, d = self.bed.counts, self.scene.grain.diameter
+        return counts if isinstance(counts, str) else (counts[0] / d, counts[1] / d)
+
     @cached_property
     def pouring(self) -> tuple[PouredBed, ...]:
         """The run that pours the bed, if one does."""
@@ -130,10 +136,7 @@ class LoadedBed:
     @cached_property
     def packing(self) -> Packing:
         """The grains' places, in diameters; scenes that differ in their forces alone share them."""
-        bed, d = self.bed, self.scene.grain.diameter
-        counts = bed.counts
-        if not isinstance(counts, str):
-            counts = (counts[0] / d, counts[1] / d)
+        bed, d, counts = self.bed, self.scene.grain.diameter, self.counts
         for run in self.pouring:
             assert self.cases is not None, "a poured bed is known when its run is done"
             return _poured(
@@ -320,6 +323,19 @@ class LoadedBed:
             there=there,
         )
         return np.asarray(found[self.packing.windward])
+
+    def row_hold(self, cases: Path) -> float:
+        """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
+
+        The flow (u*_0) at which the first counted grain leaves by peeling, over that at which the
+        first one moves by itself; `cases` holds the finished runs of the flow. It is 1 where the
+        first grain of a row has none before it, as at a sharp crest, and on a poured bed.
+        """
+        if self.pouring or self.bed.is_wedge:
+            return 1.0
+        ratio = self.ustar_over_ustar0(cases)
+        first = self.pivot_thresholds(ratio[self.packing.windward])[0]
+        return max(float(self.leaving(ratio).min() / first), 1.0)
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """The same, sorted, shape (N,).

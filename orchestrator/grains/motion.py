@@ -43,7 +43,8 @@ class Motion:
     flow : ndarray, shape (levels + 1,)
         The flow of each load step, never falling, in the deck's unit; first that of the settling.
     level : ndarray of int, shape (N,)
-        Hold (index into `flow`) in which a grain moved by the rule of `counting`; 0 for never.
+        Load step (index into `flow`) in which a grain moved by the rule of `counting`; 0 for
+        never.
     fallen : ndarray of int, shape (N,)
         Load step in which a grain was first the criterion upstream of its place; 0 for never.
     carried : ndarray of bool, shape (N,)
@@ -252,7 +253,7 @@ def _reconcile(directory: Path, samples: pd.DataFrame, track: Track, marker: flo
     agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
         raise SolverError(
-            f"the counts do not reconcile at look {int(agree.argmin()) + 1}",
+            f"the counts do not reconcile at sample {int(agree.argmin()) + 1}",
             where=str(directory / SAMPLES),
             remedy="grains were lost, or the tables are of different runs",
         )

@@ -167,6 +167,8 @@ def flows(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
         # a bed that rolls by itself, or is blocked until its grains push: the deck will tell
         thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
         first = _first(bed, thresholds)
+    if not 0 < first < np.inf:
+        raise _none_leaves(bed)
     last = thresholds[int(np.ceil(rules.final_fraction * bed.packing.count)) - 1]
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
@@ -187,14 +189,18 @@ def _flows_of_pockets(bed: LoadedBed, ratio: FloatArray) -> FloatArray:
     thresholds = bed.pivot_thresholds(ratio[bed.packing.windward])
     held = thresholds[(thresholds > 0) & np.isfinite(thresholds)]
     if not len(held):
-        raise InputError(
-            "no exposed grain lies in a pocket that lets it go",
-            where=f"scene {bed.scene.id}: bed",
-            remedy="a longer or wider bed, or another bed.seed",
-        )
+        raise _none_leaves(bed)
     last = held[min(int(rules.final_fraction * len(thresholds)), len(held) - 1)]
     first = _first(bed, held)
     return protocol.flows(protocol.START * first, protocol.BEYOND * last, rules.load_increment)
+
+
+def _none_leaves(bed: LoadedBed) -> InputError:
+    return InputError(
+        "no exposed grain lies in a pocket that lets it go",
+        where=f"scene {bed.scene.id}: bed",
+        remedy="a longer or wider bed, or another bed.seed",
+    )
 
 
 def flows_from(reached: float, bed: LoadedBed, ratio: FloatArray, there: BoolArray) -> FloatArray:
@@ -235,7 +241,7 @@ def _numbers(bed: LoadedBed, grains: GrainTable, enough: int) -> dict[str, float
         "density": bed.scene.grain.density,
         "gravity": bed.scene.reduced_gravity,
         **protocol.contact(bed.scene.grain, rules),
-        **protocol.raising(rules, enough, is_poured=bed.scene.is_poured),
+        **protocol.raising(rules, enough, smallest=grains.smallest, is_poured=bed.scene.is_poured),
         "slope": slope,
         "ceiling_x": ridge[0] * d,
         "ceiling_z": ridge[1] * d,

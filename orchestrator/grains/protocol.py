@@ -23,7 +23,8 @@ bed at its limiting slope would not come to rest."""
 START = 0.9
 """Flow of the first load step over that of the first threshold by the pivot law."""
 STIR = 0.02
-"""A counted grain that is no further from its place lies there, d: it is left out of the dump."""
+"""A counted grain that is no further from its place lies there, d: it is left out of the dump.
+With a small displacement criterion, or small grains, it is less."""
 AWAY = 10.0
 """A counted grain that has come so far along the bed is gone, d: those that it could still meet
 have left before it."""
@@ -56,7 +57,9 @@ def flows(first: float, last: float, step: float) -> FloatArray:
     return np.concatenate([[SETTLE_FLOW * first], rising])
 
 
-def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict[str, float | int]:
+def raising(
+    protocol: Protocol, enough: int, *, smallest: float = 1.0, is_poured: bool = False
+) -> dict[str, float | int]:
     """How the deck waits at a load step, looks at the grains and goes on to the next.
 
     Parameters
@@ -65,6 +68,8 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
         Protocol of the scene.
     enough : int
         The sequence of load steps ends early when no more than this many grains still lie.
+    smallest : float
+        Diameter of the smallest grain that may move, d.
     is_poured : bool
         Whether the bed was poured, and so on springs of its own.
     """
@@ -74,7 +79,7 @@ def raising(protocol: Protocol, enough: int, *, is_poured: bool = False) -> dict
         "settle": SETTLE,
         "settle_drag": POURED_DRAG if is_poured else 0.0,
         "displacement_criterion": protocol.displacement_criterion,
-        "stir": STIR,
+        "stir": min(STIR, protocol.displacement_criterion * smallest / 2),
         "away": AWAY,
         "enough": enough,
     }

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ class Curve:
     fraction : ndarray
         n/N that had moved by the end of the load step.
     mean_tau : ndarray
-        Mean signed wall stress over the grains that had moved, Pa; NaN before any had.
+        Mean over the grains that had moved of the wall stress's size, Pa; NaN before any had.
     """
 
     ustar0: FloatArray
@@ -63,11 +64,11 @@ def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
     motion : Motion
         Motion of the N windward grains.
     speed : ndarray, shape (N,)
-        Signed local friction velocity over the undisturbed one.
+        Local friction velocity over the undisturbed one; only its size matters.
     fluid_density : float
         kg/m3.
     """
-    stress = _signed(speed)
+    stress = speed**2
     mean = np.array([_mean(motion, stress, level) for level in range(len(motion.flow))])
     return Curve(motion.flow, motion.fraction, fluid_density * motion.flow**2 * mean)
 
@@ -83,10 +84,13 @@ class PileThreshold:
     ustar0 : float
         Undisturbed friction velocity, m/s; NaN if the fraction was not reached.
     tau, tau_low, tau_high : float
-        tau_c and its interval, Pa: the mean signed wall stress over the grains that have moved.
-        The interval holds the step between two flows and the count's resolution of 1/N.
+        tau_c and its interval, Pa: the mean over the grains that have moved of the stress that
+        drives each along its own way, whichever way that is. The interval holds the step between
+        two flows and the count's resolution of 1/N.
     carried_off : float
         Share of the grains that had moved which were carried off.
+    against_the_flow : float
+        Share of the grains that had moved which a reversed flow drove upstream.
     """
 
     fraction: float
@@ -95,6 +99,7 @@ class PileThreshold:
     tau_low: float
     tau_high: float
     carried_off: float
+    against_the_flow: float
 
 
 def of_pile(
@@ -103,16 +108,15 @@ def of_pile(
     """tau_c of a pile at a fraction; arguments as in `curve`."""
     level = first_level(motion, fraction)
     if level is None:
-        return PileThreshold(fraction, *(math.nan,) * 5)
+        return PileThreshold(fraction, *(math.nan,) * 6)
     half_a_grain = 0.5 / motion.count
     below = first_level(motion, fraction - half_a_grain) or level
     # where half a grain more was not reached, the interval is open: it ends at the last load step
     above = first_level(motion, fraction + half_a_grain) or len(motion.flow) - 1
     flow = math.sqrt(motion.low[level] * motion.flow[level])
-    signed = _signed(speed)
 
     def stress(at: int, ustar0: float) -> float:
-        return fluid_density * float(ustar0) ** 2 * _mean(motion, signed, at)
+        return fluid_density * float(ustar0) ** 2 * _mean(motion, speed**2, at)
 
     return PileThreshold(
         fraction=fraction,
@@ -121,6 +125,7 @@ def of_pile(
         tau_low=stress(below, motion.low[below]),
         tau_high=stress(above, motion.flow[above]),
         carried_off=float(motion.carried_off[level] / motion.moved[level]),
+        against_the_flow=_mean(motion, speed < 0, level),
     )
 
 
@@ -131,12 +136,7 @@ def first_level(motion: Motion, fraction: float) -> int | None:
     return int(reached[0]) if len(reached) else None
 
 
-def _signed(speed: FloatArray) -> FloatArray:
-    """The stress on each grain in units of the undisturbed one, positive downstream."""
-    return np.asarray(np.sign(speed) * speed**2)
-
-
-def _mean(motion: Motion, stress: FloatArray, level: int) -> float:
-    """Mean stress on the moved grains; NaN before any has moved."""
-    own = stress[motion.moved_by(level)]
-    return float(own.mean()) if len(own) else math.nan
+def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
+    """Mean over the grains that have moved; NaN before any has."""
+    moved = values[motion.moved_by(level)]
+    return float(moved.mean()) if len(moved) else math.nan

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
@@ -30,6 +31,9 @@ GRAINS = "grains.csv"
 LIGGGHTS, in its case."""
 EDGE = 2.0
 """Length over which the edge of a bared part is rounded, d."""
+LEVEL = 1e-6
+"""A bed that is less above the flat bed lies on it, d."""
+FAR = 1e9
 SPACING = 0.25
 """Spacing of the places at which the height of the grains is asked, d."""
 
@@ -218,16 +222,21 @@ def sunk(bed: LoadedBed, worn: Worn) -> BedLine:
     The difference is averaged over `EDGE`, so that the lattice does not show in it.
     """
     line = bed.line
-    x = np.arange(line.x[1] - EDGE, line.toe[0] + EDGE, SPACING)
+    x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE, SPACING)
     centres, radii, there = bed.packing.centres, bed.packing.sizes / 2, worn.there
     depth = _height(centres, radii, x) - _height(worn.places[there], radii[there], x)
     window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
     depth = np.convolve(depth, window, mode="same")
     places = x[_corners(depth)]
     finer = line.with_corners(places[(places > line.x[0]) & (places < line.x[-1])].tolist())
-    z = np.array(finer.z) - np.interp(finer.x, x, depth, left=0.0, right=0.0)
-    # no corner of the whole pile's flat bed moves
-    return replace(finer, z=tuple(np.maximum(z, 0.0).tolist()))
+    before, ground = np.array(finer.z), min(line.z[0], line.z[-1])
+    z = before - np.interp(finer.x, x, depth, left=0.0, right=0.0)
+    # a form wears down to the flat bed around it, unless counted grains lie as low as that
+    low = np.maximum(line.z[1:], line.z[:-1]) <= ground + LEVEL
+    if not (low & counted_segments(line, bed.counts)).any():
+        z = np.maximum(z, np.minimum(before, ground))
+    inside = (np.array(finer.x) > line.x[1]) & (np.array(finer.x) < line.x[-2])
+    return replace(finer, z=tuple(np.where(inside, z, before).tolist()))
 
 
 def _corners(depth: FloatArray) -> BoolArray:
@@ -239,8 +248,8 @@ def _corners(depth: FloatArray) -> BoolArray:
 
 
 def _height(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
-    """Height of the grains' upper sides at some places, d; 0 where there are none."""
-    found = np.zeros(len(x))
+    """Height of the grains' upper sides at some places, d; far below where there are none."""
+    found = np.full(len(x), -FAR)
     for (xc, zc), radius in zip(centres.tolist(), radii.tolist(), strict=True):
         # as wide as half the way to the next: the gaps of a row do not count
         first, last = np.searchsorted(x, [xc - 2 * radius, xc + 2 * radius])

@@ -84,12 +84,16 @@ COLUMNS: dict[str, str] = {
     "carried_off": "of the grains that had moved, those that lift took off the bed before they"
     " passed the displacement criterion; in pile_grain: 1 if that happened to the grain, else 0",
     "share_carried_off": "carried_off over moved where the fraction is first reached",
+    "share_against_flow": "share of the grains that had moved, where the fraction is first reached,"
+    " which a reversed flow drove upstream",
+    "row_hold": "ustar0 at which the first grain leaves by peeling over that at which the first"
+    " moves by itself: above 1 the touching grains of a row without a free end hold one another",
     "fallen_upstream": "grains that had been displaced upstream by the displacement criterion,"
     " carried off later or not",
     "fraction": "n/N at which the threshold is read",
     "fraction_moved": "n/N",
     "highest_fraction": "largest n/N that the load steps reached",
-    "mean_tau_pa": "mean signed wall stress over the grains that had moved",
+    "mean_tau_pa": "mean size of the wall stress on the grains that had moved",
     "flow_level": "fidelity level that the flow was found on",
     "grain_level": "fidelity level that the motion was found on",
     "error_estimate": "known relative error of the two levels; empty where it is not known",

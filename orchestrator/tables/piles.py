@@ -35,11 +35,12 @@ class Answer:
     pile: Pile
     motion: Motion
     face: Face
+    row_hold: float
 
     @classmethod
     def read(cls, decision: Decision, pile: Pile, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
-        return cls(decision, pile, pile.motion(cases), pile.face(cases))
+        return cls(decision, pile, pile.motion(cases), pile.face(cases), pile.row_hold(cases))
 
     @property
     def scene_id(self) -> str:
@@ -179,6 +180,8 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
             "share_carried_off": found.carried_off,
+            "share_against_flow": found.against_the_flow,
+            "row_hold": answer.row_hold,
             **_levels(answer.decision),
             "error_estimate": answer.decision.error_estimate,
             "case": pile.runs[-1].name if pile.runs else None,

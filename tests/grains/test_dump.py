@@ -80,5 +80,5 @@ def test_a_hold_without_its_grains_at_the_end(tmp_path: Path, grains: deck.Grain
     folder = _run(tmp_path, 0.02)
     frames = (folder / dump.BED).read_text().split("ITEM: TIMESTEP")
     (folder / dump.BED).write_text("ITEM: TIMESTEP".join(frames[:-1]))
-    with pytest.raises(SolverError, match=r"bed.dump: it is not of these holds"):
+    with pytest.raises(SolverError, match=r"bed.dump: its frames are not the ends"):
         dump.read_track(folder, grains, pd.read_csv(folder / motion.SAMPLES))

@@ -130,6 +130,25 @@ def test_a_stair_of_horizontal_rows_holds_longer(slow: Pile, cases: Path) -> Non
     assert found.ustar0 > 1.2 * reference.ustar0
 
 
+@pytest.mark.parametrize(
+    ("fields", "least", "most"),
+    [
+        ("slope_deg = 20.0", 1.0, 1.0),
+        ('shape = "dune"\nslope_deg = 15.0\nforms = 2', 1.0, 1.01),
+        ('shape = "cosine"\nslope_deg = 20.0', 1.5, 4.0),
+        ('shape = "flat"', 2.0, 4.0),
+    ],
+)
+def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
+    tmp_path: Path, fields: str, least: float, most: float
+) -> None:
+    text = SMALL.format(packing="aligned", step=0.05).replace("slope_deg = 20.0", fields)
+    text = text.replace("cells_per_face = 20", 'model = "flat"')
+    (scene,) = study.parse(text, name="row", where="test").scenes
+    pile = Pile(scene)
+    assert least <= pile.row_hold(tmp_path) <= most
+
+
 def test_scenes_that_differ_in_their_grains_alone_share_the_flow() -> None:
     text = SMALL.format(packing="aligned", step=0.05).replace('"d/30"', "3e-5")
     asked = study.parse(

@@ -8,14 +8,17 @@ import pandas as pd
 import pytest
 
 from orchestrator import tables
+from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
 from orchestrator.grains import pile_case
 from orchestrator.grains.motion import Motion
-from orchestrator.plan import Plan
+from orchestrator.grains.pile import Pile
+from orchestrator.plan import Plan, make
 from orchestrator.report import mixture
 from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.tables.piles import Answer, size_class_rows
+from orchestrator.types import BoolArray, FloatArray
 from tests import small_study
 
 STUDY = """
@@ -64,6 +67,30 @@ def test_load_steps_begin_at_the_first_grain_that_lies(finished: tuple[Plan, Pat
     assert pile_case._first(pile, np.array([0.0, 0.1, 0.2])) == 0.1
     many = np.concatenate([[0.0], np.arange(1.0, 401.0)])
     assert pile_case._first(pile, many) == 5.0
+
+
+class Loose(Pile):
+    """A bed none of whose grains is held by another."""
+
+    def alone(self, speed: FloatArray) -> FloatArray:
+        return np.zeros(len(speed))
+
+    def leaving(self, ratio: FloatArray, there: BoolArray | None = None) -> FloatArray:
+        return np.zeros(self.packing.count)
+
+
+def test_a_bed_none_of_whose_grains_is_held_is_refused(finished: tuple[Plan, Path]) -> None:
+    planned, cases = finished
+    (pile, *_) = planned.piles.values()
+    with pytest.raises(InputError, match="lets it go"):
+        pile_case.flows(Loose(pile.scene, cases), pile.ustar_over_ustar0(cases))
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-12])
+def test_a_poured_bed_has_room_for_some_grains(length: float) -> None:
+    text = STUDY.replace("slope_deg = 15.0", f'shape = "flat", length = {length}')
+    with pytest.raises(InputError, match=r"bed\.length: a poured bed of .* grains"):
+        make(study.parse(text, name="short", where="test"))
 
 
 def test_each_size_class_has_its_threshold(finished: tuple[Plan, Path]) -> None:

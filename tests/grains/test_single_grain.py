@@ -15,6 +15,7 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
+from orchestrator.study.parts import Grain
 
 BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
 
@@ -93,6 +94,36 @@ def test_a_bed_has_no_scale(tmp_path: Path) -> None:
 def test_blocks_do_not_depend_on_the_order_of_the_scenes() -> None:
     scenes = study.parse(FIGURE, name="cells", where="test").scenes
     assert [c.id for c in batches(scenes)] == [c.id for c in batches(reversed(scenes))]
+
+
+class Sticky(Grain):
+    """A grain with a property of its contact that no deck knows yet."""
+
+    cohesion: float = 0.0
+
+
+def test_grains_of_two_contact_laws_share_no_deck() -> None:
+    (parsed,) = study.parse("grain = { diameter = 1e-3 }", name="cells", where="test").scenes
+    scene = parsed.model_copy(update={"grain": Sticky(diameter=1e-3)})
+    others = {
+        "diameter": 2e-3,
+        "density": 3000.0,
+        "friction_angle_deg": 40.0,
+        "stiffness": 2e4,
+        "damping": 0.2,
+        "cohesion": 1.0,
+    }
+    assert {*others, "sizes"} == set(Sticky.model_fields)
+    for name, value in others.items():
+        other = scene.model_copy(update={"grain": scene.grain.model_copy(update={name: value})})
+        decks = len(list(batches([scene, other])))
+        assert decks == (1 if name in ("diameter", "density") else 2), name
+
+
+def test_a_displacement_criterion_may_be_very_small(tmp_path: Path) -> None:
+    text = "protocol = { load_increment = 0.02, displacement_criterion = 1e-3 }"
+    found = threshold.of_grains(_run(_cells(f"grain = {{ diameter = 1e-3 }}\n{text}"), tmp_path))
+    np.testing.assert_allclose(found.value, 1.0, atol=0.02)
 
 
 def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> None:

@@ -66,6 +66,16 @@ def test_the_interval_holds_the_counts_resolution() -> None:
     assert found.tau_high == pytest.approx(DENSITY * 1.69 * 18.75 / 9)
 
 
+def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_their_stress() -> None:
+    forward, back = (threshold.of_pile(MOTION, way * SPEED, 0.9, DENSITY) for way in (1, -1))
+    assert back.tau == forward.tau > 0
+    assert (forward.against_the_flow, back.against_the_flow) == (0, 1)
+    curve = threshold.curve(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), DENSITY)
+    assert (curve.mean_tau[1:] > 0).all()
+    some = threshold.of_pile(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), 0.5, DENSITY)
+    assert some.against_the_flow == 0.4
+
+
 def test_a_fraction_that_was_not_reached_is_empty() -> None:
     found = threshold.of_pile(MOTION, SPEED, 0.95, DENSITY)
     assert found.fraction == 0.95

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,7 +22,11 @@ from orchestrator.report.results import Results
 from orchestrator.runs.claim import STUDY
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
+from orchestrator.study.parts import Grain
+from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
+from tests.bed.test_shapes import SHAPES
+from tests.bed.test_shapes import bed as bed_of
 
 PILE = """
 grain = {{ diameter = 1e-3, stiffness = 1e3 }}
@@ -79,17 +83,34 @@ def worn(results: Results) -> dict[str, Done]:
     }
 
 
-@pytest.mark.parametrize("packing", ["aligned", "horizontal"])
-def test_a_whole_bed_has_not_sunk(packing: str) -> None:
-    (scene,) = study.parse(
-        PILE.format(more="").replace('"pile",', f'"pile", packing = "{packing}",'),
-        name="one",
-        where="test",
-    ).scenes
+X, Z = (0.0, 0.02, 0.06, 0.1, 0.14, 0.18), (0.0, 0.0, -0.01, 0.005, 0.0, 0.0)
+WORN: dict[str, dict[str, Any]] = {
+    **SHAPES,
+    "step up": {"shape": "step up", "slope_deg": 25.0},
+    "everything": {"counted": "all"},
+    "trough": {"profile": Profile("trough", X, Z, "", "trough"), "height": 0.015},
+    "level behind a fence": {**SHAPES["flat"], **SHAPES["fence"]},
+}
+
+
+@pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
+@pytest.mark.parametrize("name", WORN)
+def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, packing: str) -> None:
+    scene = Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
     bed = LoadedBed(scene)
-    line = wear.sunk(bed, Worn.whole(bed))
-    x = np.linspace(line.x[0], line.x[-1], 500)
+    whole, counted = Worn.whole(bed), bed.packing.windward
+    x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
+    line = wear.sunk(bed, whole)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
+    # the gap between rows, over the cosine of at most 40 degrees, and a grain of level rows
+    sunk = bed.line.height(x) - wear.sunk(
+        bed, Worn(whole.gone(counted), whole.left, whole.speed)
+    ).height(x)
+    places = np.sort(bed.packing.centres[counted, 0])
+    away = np.abs(x[:, None] - places).min(axis=1)
+    assert sunk[away > wear.EDGE + 3] == pytest.approx(0.0, abs=1e-9)
+    assert -1e-9 <= sunk.min() <= sunk.max() < 1.7
+    assert 0.8 < np.median(sunk[away < 0.5]) < 1.2
 
 
 def test_a_bared_row_sinks_by_a_row() -> None:
