@@ -328,14 +328,15 @@ class LoadedBed:
         """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
 
         The flow (u*_0) at which the first counted grain leaves by peeling, over that at which the
-        first one moves by itself; `cases` holds the finished runs of the flow. It is 1 where the
+        same grain moves by itself; `cases` holds the finished runs of the flow. It is 1 where the
         first grain of a row has none before it, as at a sharp crest, and on a poured bed.
         """
         if self.pouring or self.bed.is_wedge:
             return 1.0
         ratio = self.ustar_over_ustar0(cases)
-        first = self.pivot_thresholds(ratio[self.packing.windward])[0]
-        return max(float(self.leaving(ratio).min() / first), 1.0)
+        leaving, alone = self.leaving(ratio), self.alone(ratio[self.packing.windward])
+        first = int(leaving.argmin())
+        return max(float(leaving[first] / alone[first]), 1.0) if alone[first] > 0 else 1.0
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """The same, sorted, shape (N,).

@@ -86,8 +86,8 @@ COLUMNS: dict[str, str] = {
     "share_carried_off": "carried_off over moved where the fraction is first reached",
     "share_against_flow": "share of the grains that had moved, where the fraction is first reached,"
     " which a reversed flow drove upstream",
-    "row_hold": "ustar0 at which the first grain leaves by peeling over that at which the first"
-    " moves by itself: above 1 the touching grains of a row without a free end hold one another",
+    "row_hold": "ustar0 at which the first grain leaves by peeling over that at which it moves"
+    " by itself: above 1 the touching grains of a row without a free end hold one another",
     "fallen_upstream": "grains that had been displaced upstream by the displacement criterion,"
     " carried off later or not",
     "fraction": "n/N at which the threshold is read",
