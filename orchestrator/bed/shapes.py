@@ -37,7 +37,7 @@ def of_bed(bed: PileBed) -> BedLine:
         corners = train(form, bed.forms, bed.spacing or float(form[-1, 0]))
     for one in bed.obstacles:
         corners = _reaching(corners, one.x - one.reach, one.x + one.reach)
-    return with_obstacles(between_flats(corners, bed.height), bed.obstacles)
+    return with_obstacles(between_flats(corners, bed.relief), bed.obstacles)
 
 
 @cache

@@ -1,6 +1,6 @@
 """Thresholds of many grains under every force law, as one table: the core of `threshold`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any
@@ -13,11 +13,11 @@ from orchestrator.calculator.parameters import DEPTH, SCENE
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.physics.exposure import Exposure, FloatArray
-from orchestrator.physics.force_law import ForceLaw
+from orchestrator.physics.force_law import Bound, ForceLaw
 from orchestrator.physics.laws import LAWS, law
 from orchestrator.physics.log_law import depth_mean_speed, log_law_speed
 from orchestrator.physics.regime import LAWS_OF, Regime, regime
-from orchestrator.physics.threshold import Threshold, threshold
+from orchestrator.physics.threshold import Threshold, lift_bound, threshold
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 
@@ -187,15 +187,18 @@ def _told(here: ForceLaw, found: Threshold, given: Values) -> dict[str, Any]:
         "drag": found.drag,
         "lift": found.lift,
     }
-    why = _why_not(here, ustar, _exposure(given))
+    exposed = _exposure(given)
+    lifted = {name: given[name] for name in ("density", "slope_deg", "gravity")}
+    bounds = (*here.bounds(ustar, exposed), lift_bound(found.lift, exposed, **lifted))
+    why = _why_not(bounds, len(ustar))
     columns: dict[str, Any] = {one.column: told[one.name] for one in QUANTITIES}
     return {**columns, "valid": found.valid, "why_not": np.array(why, dtype=object)}
 
 
-def _why_not(here: ForceLaw, ustar: FloatArray, exposure: Exposure) -> list[str]:
+def _why_not(bounds: Sequence[Bound], count: int) -> list[str]:
     """As `ForceLaw.why_not`, of many grains."""
-    reasons: list[list[str]] = [[] for _ in ustar]
-    for bound in here.bounds(ustar, exposure):
+    reasons: list[list[str]] = [[] for _ in range(count)]
+    for bound in bounds:
         for index in np.flatnonzero(~bound.holds):
             reasons[index].append(str(replace(bound, value=bound.value[index])))
     return ["; ".join(said) for said in reasons]

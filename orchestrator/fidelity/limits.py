@@ -182,7 +182,7 @@ def _laminar(scene: Scene) -> str | None:
     bed = _solved(scene)
     if not bed:
         return None
-    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.height, scene.solve_roughness)
+    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, scene.solve_roughness)
     ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.flow.viscosity
     if ratio >= 1:
         return None

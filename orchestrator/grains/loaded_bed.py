@@ -201,7 +201,7 @@ class LoadedBed:
     def ratio(self, stress: WallStress, line: BedLine) -> FloatArray:
         """The same under the stress along a line (d) that the bed may have worn down to."""
         how, d = self.scene.forces, self.scene.grain.diameter
-        length = max(d, how.averaging_length * self.bed.height)
+        length = max(d, how.averaging_length * self.bed.relief)
         s = self.packing.arc_length
         if line is not self.line:
             x = np.interp(s, self.line.arc_lengths, self.line.x)

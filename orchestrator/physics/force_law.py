@@ -11,6 +11,12 @@ from orchestrator.physics.exposure import Exposure, FloatArray
 from orchestrator.physics.near_bed import saffman_lift
 from orchestrator.physics.sphere_drag import SphereDrag
 
+SUBLAYER = 5.0
+"""Thickness of the viscous sublayer, wall units."""
+SMOOTH_END = 1.25
+"""Speed over that above a smooth wall from which a law's logarithm is of no wall: it is at most
+1.2 for z0 = d/1000."""
+
 
 @dataclass(frozen=True)
 class Bound:
@@ -55,6 +61,9 @@ class ForceLaw(ABC):
         Whether the flow also turns the grain about its centre.
     protrudes : bool
         Whether a grain's own height over the bed matters to its forces.
+    unverified : str
+        What of the law was not confirmed by its source; empty if all was. An unverified law takes
+        part in no score, and its answers are not usable.
     """
 
     name: ClassVar[str]
@@ -65,6 +74,7 @@ class ForceLaw(ABC):
     drag_end: ClassVar[float] = np.inf
     turns: ClassVar[bool] = False
     protrudes: ClassVar[bool] = False
+    unverified: ClassVar[str] = ""
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
@@ -94,10 +104,28 @@ class ForceLaw(ABC):
     def bounds(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Bound, ...]:
         """The ranges that the law holds in; a law with more of them adds its own."""
         particle = self.particle_reynolds(ustar, exposure)
+        over = self.speed_over_smooth(ustar, exposure)
         return (
             Bound("Re*", exposure.reynolds(ustar), *self.reynolds),
             Bound(f"particle Reynolds number ({self.drag_law})", particle, 0.0, self.drag_end),
+            Bound("speed over that above a smooth wall (z0 = 0.11 nu/u*)", over, 0.0, SMOOTH_END),
         )
+
+    def speed_over_smooth(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+        """Speed of the flow over that with the roughness length of a smooth wall added to z0.
+
+        z0 = 0.11 nu/u* is that of a smooth wall (Nikuradse, VDI Forschungsheft 356, 1932); it
+        bounds the speed over a bed that is far smoother than its grains are large. 1 where the
+        grain lies within the viscous sublayer, Re* < 5.
+        """
+        e, reynolds = exposure, np.asarray(exposure.reynolds(ustar))
+        with np.errstate(all="ignore"):
+            z0 = e.roughness + 0.11 * e.diameter / np.maximum(reynolds, SUBLAYER)
+            smooth = Exposure(
+                e.diameter, z0, e.fluid_density, e.viscosity, e.lift_coefficient, e.gap
+            )
+            over = self.speed(ustar, e) / self.speed(ustar, smooth)
+        return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))
 
     def valid(self, ustar: ArrayLike, exposure: Exposure) -> NDArray[np.bool_]:
         """Whether the law holds: in its range of Re* and in all others of its bounds."""

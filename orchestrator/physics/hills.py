@@ -9,7 +9,7 @@ from dataclasses import dataclass
 NEAR = 0.02
 """Share by which a hill, or ten times by which z0, may differ and still be the experiment's."""
 HEIGHT_OVER_ROUGHNESS = 0.117 / 1.57e-4
-"""z0 from memory."""
+"""Height of the hills over z0: ERCOFTAC's data begin at 0.157 mm, the z0 of the wall."""
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,19 @@ class MeasuredHill:
         Where reversed flow ends behind the top, heights; 0: there was none in the mean.
     source : str
         Where the number is from.
+    verified : bool
+        Whether the number was read in its source; others are shown as unverified.
     """
 
     aspect: float
     reattachment: float
     source: str
+    verified: bool = True
 
 
 _SUMMARY = "separated behind the steepest hill alone: EPA-600/S4-81-067"
 RUSHIL = (
-    MeasuredHill(3.0, 6.5, f"{_SUMMARY}; the length from memory"),
+    MeasuredHill(3.0, 6.5, f"{_SUMMARY}; the length is unverified", verified=False),
     MeasuredHill(5.0, 0.0, _SUMMARY),
     MeasuredHill(8.0, 0.0, _SUMMARY),
 )

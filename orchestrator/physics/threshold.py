@@ -7,8 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.exposure import Exposure, FloatArray
-from orchestrator.physics.force_law import ForceLaw
+from orchestrator.physics.force_law import Bound, ForceLaw
 from orchestrator.physics.root import friction_velocity_at
+
+LIFT_OFF = 1 + 1e-9
+"""Lift over the weight normal to the bed from which a grain leaves without rolling: on level bed
+with no drag the pivot itself is at 1."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,7 @@ class Threshold:
     drag, lift : ndarray
         Forces on the grain at the threshold, N.
     valid : ndarray of bool
-        Whether the law holds there: its range of Re* and that of its drag.
+        Whether the law holds there: its range of Re*, that of its drag, and no lift-off.
     """
 
     friction_velocity: FloatArray
@@ -54,6 +58,43 @@ def pivot_resistance(slope_deg: ArrayLike, entrainment_angle_deg: ArrayLike) -> 
     """Moment over W that the flow needs about the pivot: cos(alpha - beta) (Eq. 1)."""
     lean = np.radians(np.asarray(slope_deg, float) - np.asarray(entrainment_angle_deg, float))
     return np.asarray(np.cos(lean))
+
+
+def standing_out(relative_size: ArrayLike, entrainment_angle_deg: ArrayLike) -> FloatArray:
+    """Part of a single grain's height that lies above the tops of its two neighbours.
+
+    Parameters
+    ----------
+    relative_size : array_like
+        D/d, its diameter over that of the neighbours, whose centres are 2 d cos(beta) apart.
+    entrainment_angle_deg : array_like
+        beta.
+    """
+    size = np.asarray(relative_size, float)
+    half = np.cos(np.radians(np.asarray(entrainment_angle_deg, float)))
+    centre = np.sqrt(np.maximum(((1 + size) / 2) ** 2 - half**2, 0.0))
+    return np.asarray((centre + size / 2 - 0.5) / size)
+
+
+def lift_bound(
+    lift: ArrayLike,
+    exposure: Exposure,
+    *,
+    density: ArrayLike,
+    slope_deg: ArrayLike,
+    gravity: ArrayLike = GRAVITY,
+) -> Bound:
+    """The bound of the pivot: a lift (N) below the part of the weight that is normal to the bed.
+
+    A greater lift carries the grain off before it can roll.
+    """
+    e = exposure
+    submerged = weight(
+        diameter=e.diameter, density=density, fluid_density=e.fluid_density, gravity=gravity
+    )
+    normal = submerged * np.cos(np.radians(np.asarray(slope_deg, float)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Bound("lift over the weight normal to the bed", lift / normal, -np.inf, LIFT_OFF)
 
 
 def threshold(
@@ -104,13 +145,15 @@ def threshold(
     )
     # where no flow moves the grain the forces are those of an infinite one: not a number
     with np.errstate(invalid="ignore"):
+        lift = law.lift(ustar, e)
+        rolls = lift_bound(lift, e, density=density, slope_deg=slope_deg, gravity=gravity).holds
         return Threshold(
             friction_velocity=ustar,
             reynolds=e.reynolds(ustar),
             shields=np.asarray(e.fluid_density * (ustar * e.diameter) ** 2 * np.pi / 6 / submerged),
             drag=law.drag(ustar, e),
-            lift=law.lift(ustar, e),
-            valid=law.valid(ustar, e),
+            lift=lift,
+            valid=law.valid(ustar, e) & rolls,
         )
 
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.report import labels, theory
 from orchestrator.report.results import Results, split
@@ -109,8 +110,12 @@ class Fit:
 
 
 def fits(results: Results) -> list[Fit]:
-    """The combinations of a study's single grains on a flat bed: the widest first, then nearest."""
+    """The combinations of a study's single grains on a flat bed: the widest first, then nearest.
+
+    Unverified force laws take no part.
+    """
     grains = results.beds("grain")
+    grains = grains[~grains["force_law"].isin([n for n, law in LAWS.items() if law.unverified])]
     found = [
         Fit(str(law), theory.bed_of(own), *theory.span(own))
         for (law, *_), own in split(

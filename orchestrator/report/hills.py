@@ -47,7 +47,9 @@ def draw(results: Results) -> Iterator[Figure]:
     names = [name for name in COLOURS if name in set(flows["turbulence_model"])]
     colours = [style.entry(label(name), COLOURS[name]) for name in names]
     known = flows["measured_reattachment_over_h"].notna().any()
-    style.legends(canvas, colours, [Line2D([], [], **MEASURED)] if known else [])
+    unverified = "" if flows["measured_verified"].all() else " (unverified)"
+    measured_end = {**MEASURED, "label": f"{MEASURED['label']}{unverified}"}
+    style.legends(canvas, colours, [Line2D([], [], **measured_end)] if known else [])
     cases = tuple(flows["flow_case"])
     yield Figure("hills", "Hills that others measured", captions.hills(), cases, canvas, first=True)
 
@@ -63,6 +65,8 @@ def sentences(results: Results) -> Iterator[str]:
             found.append(f"none by {', '.join(none)}")
         known = rows["measured_reattachment_over_h"].iloc[0]
         measured_ = f"measured to {known:.1f} h" if pd.notna(known) else "none measured"
+        if not rows["measured_verified"].all():
+            measured_ += " (unverified)"
         yield (
             f"Reversed flow behind the top of the hill of half length {hill:g} h: {measured_}; "
             f"{', '.join(found)}."

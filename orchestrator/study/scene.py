@@ -93,7 +93,7 @@ class Scene(Part):
             check_pile(self.bed, self.grain.diameter)
             check_top(self.flow, self.bed)
             if self.flow.model == "solve":
-                check_mesh(self.bed.height, self.first_cell_height)
+                check_mesh(self.bed.relief, self.first_cell_height)
             if self.bed.profile:
                 cell = self.first_cell_height if self.flow.model == "solve" else 0.0
                 check_points(self.bed.profile, self.grain.diameter, cell)
@@ -187,9 +187,9 @@ class Scene(Part):
         assert isinstance(self.bed, PileBed)
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
-        ustar0 = log_law_ustar(self.flow.speed, 10 * self.bed.height, self.solve_roughness)
+        ustar0 = log_law_ustar(self.flow.speed, 10 * self.bed.relief, self.solve_roughness)
         viscous = self.flow.viscosity / (KARMAN * float(ustar0))
-        return default_first_cell_height(self.bed.height, self.solve_roughness, viscous)
+        return default_first_cell_height(self.bed.relief, self.solve_roughness, viscous)
 
 
 def pocket_cosine(bed: Bed) -> float:

@@ -68,6 +68,7 @@ COLUMNS: dict[str, str] = {
     "separation_over_h": "where reversed flow begins behind the top, over h; empty: nowhere",
     "reattachment_over_h": "where it ends, over h",
     "measured_reattachment_over_h": "where it ended in a wind tunnel, over h; empty: nowhere",
+    "measured_verified": "whether the measured number was read in its source",
     "measured_source": "where the measured number is from",
     "ustar_foot": "u*/u*_0 of the wall stress at the foot of the first form",
     "ustar_quarter": "the same at a quarter of the way along the bed from there to the top",

@@ -63,4 +63,8 @@ def _beside(hill: MeasuredHill | None) -> Row:
     if hill is None:
         return {}
     length = hill.reattachment or np.nan
-    return {"measured_reattachment_over_h": length, "measured_source": hill.source}
+    return {
+        "measured_reattachment_over_h": length,
+        "measured_verified": hill.verified,
+        "measured_source": hill.source,
+    }

@@ -6,14 +6,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.physics.exposure import Exposure
 from orchestrator.physics.force_law import Bound
 from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import lift_bound, standing_out
 from orchestrator.study.study import Study
 
 SMOOTH_BELOW = 5 / 30
 """u* z0/nu below which a bed is hydraulically smooth: u* k_s/nu = 5 with k_s = 30 z0 (Nikuradse,
 VDI Forschungsheft 361, 1933)."""
+TURBULENT_FROM = 2000.0
+"""Speed times depth over nu from which a flow is turbulent: of a channel its mean speed and depth,
+of a boundary layer U_e and the 10 h at which it is given."""
+EXPOSED_FROM = 0.25
+"""Part of a grain over the tops of its neighbours from which it is an exposed one."""
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
 Reason = tuple[NDArray[np.bool_], list[str]]
@@ -54,8 +61,10 @@ def _reasons(rows: pd.DataFrame, tolerance: float | None) -> Iterator[Reason]:
     yield ~reached, [_unreached(row) for row in counted.to_dict("records")]
     ustar = (reynolds * rows["nu_m2_s"] / rows["d_m"]).to_numpy(float)
     yield from ((true & reached, texts) for true, texts in _law(rows, ustar))
+    yield _hidden(rows)
     if "share_carried_off" in rows:
         yield _smooth(rows, ustar)
+        yield _laminar(rows)
         share = rows["share_carried_off"].to_numpy(float)
         yield (
             share > CARRIED_OFF,
@@ -77,8 +86,22 @@ def _law(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Iterator[Reason]:
         own = (rows["force_law"] == name).to_numpy()
         d = rows["d_m"].to_numpy(float)
         z0 = rows["z0_over_d"].to_numpy(float) * d
+        law = LAWS[name]
         exposure = Exposure(d, z0, *(rows[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s")))
-        for bound in LAWS[name].bounds(ustar, exposure):
+        bounds = list(law.bounds(ustar, exposure))
+        if "share_carried_off" not in rows:
+            bounds.append(
+                lift_bound(
+                    law.lift(ustar, exposure),
+                    exposure,
+                    density=rows["rho_sol_kg_m3"],
+                    slope_deg=rows["alpha_deg"],
+                    gravity=rows["g_m_s2"],
+                )
+            )
+        if law.unverified:
+            yield own, [f"unverified force law: {law.unverified}"] * len(rows)
+        for bound in bounds:
             values = np.broadcast_to(bound.value, ustar.shape)
             texts = [str(Bound(bound.quantity, value, bound.low, bound.high)) for value in values]
             yield own & ~bound.holds, texts
@@ -91,6 +114,27 @@ def _smooth(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Reason:
         f"hydraulically smooth bed: u* z0/nu {n:.2g} is below {SMOOTH_BELOW:.2g}" for n in number
     ]
     return number < SMOOTH_BELOW, texts
+
+
+def _laminar(rows: pd.DataFrame) -> Reason:
+    """The flow of a pile is a turbulent one; a laminar one has another stress and mean speed."""
+    speed, height = rows["u_e_m_s"], SPEED_HEIGHT * rows["h_m"]
+    if "depth_m" in rows and "mean_speed_m_s" in rows:
+        speed = rows["mean_speed_m_s"].fillna(speed)
+        height = rows["depth_m"].fillna(height)
+    number = (speed * height / rows["nu_m2_s"]).to_numpy(float)
+    texts = [
+        f"laminar flow: speed times depth over nu, {n:.0f}, is below {TURBULENT_FROM:g}"
+        for n in number
+    ]
+    return number < TURBULENT_FROM, texts
+
+
+def _hidden(rows: pd.DataFrame) -> Reason:
+    """A small grain lies lower than its neighbours' tops, and the laws are of exposed grains."""
+    part = standing_out(rows["relative_size"], rows["beta_deg"])
+    texts = [f"hidden grain: {p:.0%} of it stands out of its neighbours" for p in part]
+    return part < EXPOSED_FROM, texts
 
 
 def _inexact(error: NDArray[np.float64], tolerance: float) -> Reason:

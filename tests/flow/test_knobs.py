@@ -8,6 +8,7 @@ import pytest
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_asked
+from orchestrator.flow.model import model
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
 
@@ -90,3 +91,13 @@ def test_the_solvers_knobs_reach_its_case() -> None:
         "upwind",
         0,
     )
+
+
+def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
+    """The flow over it is measured in the height of the fence, not in a length without meaning."""
+    flat = TEXT.replace("slope_deg = 15.0", 'shape = "flat"\nlength = 0.2\n') + 'model = "solve"\n'
+    fence = 'obstacles = [{ kind = "fence", x = -0.05, height = 0.02 }]\n'
+    texts = [flat.replace("[flow]", f"height = {height}\n{fence}[flow]") for height in (0.05, 0.2)]
+    scenes = [study.parse(text, name="t", where="t").scenes[0] for text in texts]
+    assert len({model(scene).cases for scene in scenes}) == 1
+    assert len({scene.first_cell_height for scene in scenes}) == 1

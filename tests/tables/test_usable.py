@@ -22,8 +22,16 @@ SOUND = {
     "highest_fraction": 0.8,
     "share_carried_off": 0.0,
     "error_estimate": 0.03,
+    "u_e_m_s": 10.0,
 }
-SCENE = {"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0}
+SCENE = {
+    "scene_id": "a",
+    "rho_f_kg_m3": 1.0,
+    "alpha_s": 1.0,
+    "h_m": 0.02,
+    "relative_size": 1.0,
+    "beta_deg": 60.0,
+}
 NAN = float("nan")
 
 

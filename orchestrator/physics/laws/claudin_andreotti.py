@@ -29,10 +29,10 @@ class ClaudinAndreotti(ForceLaw):
     """
 
     name: ClassVar[str] = "claudin-andreotti"
-    label: ClassVar[str] = "Claudin & Andreotti 2006"
+    label: ClassVar[str] = "Claudin & Andreotti 2006 (unverified)"
+    unverified: ClassVar[str] = "its equations are quoted from memory"
     reference: ClassVar[str] = (
-        "P. Claudin and B. Andreotti, Earth Planet. Sci. Lett. 252, 2006, arXiv:cond-mat/0603656 "
-        "(equations from memory)"
+        "P. Claudin and B. Andreotti, Earth Planet. Sci. Lett. 252, 2006, arXiv:cond-mat/0603656"
     )
 
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:

@@ -69,7 +69,8 @@ class PileBed(Bed):
     kind: Annotated[Literal["pile"], Info("bed", column="bed", choices=BEDS)]
     """what the bed is made of"""
     height: Annotated[Height, Info("height", "h", "m", "h_m", scope="piles")] = 0.02
-    """height of the forms that the flow goes over; that of a profile follows from it"""
+    """height of the forms that the flow goes over; that of a profile follows from it, and over a
+    flat bed with obstacles the flow is measured in the height of the tallest"""
     shape: Annotated[
         Shape,
         unless("triangle"),
@@ -200,6 +201,13 @@ class PileBed(Bed):
     def level_length(self) -> float:
         """Length of level bed with grains, m."""
         return self.length or LEVEL * self.height
+
+    @property
+    def relief(self) -> float:
+        """Height of what the flow goes over, m: of the forms, on a flat bed of its obstacles."""
+        stands = [one.height for one in self.obstacles]
+        flat = self.shape == "flat" and not self.profile
+        return max(stands) if flat and stands else self.height
 
     @property
     def counts(self) -> str | Range:
