@@ -139,7 +139,8 @@ def threshold(
     if not arrays[0].size:
         raise InputError("an array without values", where="threshold")
     points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True))).infer_objects()
-    answer = "bridged" if law is None else calculator.known_law(law)
+    answer = "bridged" if law is None else law
+    calculator.check_law(answer)
     found = calculator.thresholds(points, answer)
     chosen = found if law is None else found[found["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)

@@ -1,20 +1,55 @@
-"""The command `threshold`: parse, call, print."""
+"""The command `threshold`: ranges and questions of the command line, and what it prints."""
 
 import argparse
+import itertools
+import json
 import math
+import re
 import sys
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator.parameters import DIAMETER, OPTION_OF, PARAMETERS, Parameter, renamed
+from orchestrator.calculator.parameters import PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+Value = float | str
+"""A number, or a part of the diameter such as ``d/30``."""
+OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
+MOST_POINTS = 100_000
+FORM = "write FIRST:LAST:COUNT, such as 1e-4:2e-3:20"
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
     "several ranges give every combination. Values of diameter, viscosity, roughness and depth "
     "are spaced geometrically, all others evenly. Winds are those of the logarithmic law over z0; "
     "a fluid below 100 kg/m3 is a gas. A law that does not hold is marked, with the reason."
 )
+UNITS = (
+    ("diameter", 0.05, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
+    ("diameter", 20.0, math.inf, "{0:g} m: did you mean {0:g} um", 1e-6),
+    ("density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
+    ("slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", 180 / math.pi),
+    ("entrainment_angle_deg", 1e-300, 1.571, "{0:g} deg: did you mean {0:g} rad", 180 / math.pi),
+    ("lift_coefficient", 6.0, 7.0, "{0:g}: did you mean Saffman's for the radius", 0.25),
+    ("gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
+)
+"""Ranges in which a number is likelier in another unit, the question, and the factor to SI."""
+GAS_BELOW = 100.0
+"""Density that tells gases from liquids, kg/m3."""
+COHESIVE_BELOW = {"gas": 1e-4, "liquid": 6e-5}
+"""Diameter below which cohesion is no longer small against the weight, m."""
+USUAL_PA_S = {"gas": (3e-6, 1e-4), "liquid": (1e-4, 0.1)}
+"""Usual dynamic viscosities, Pa s."""
+RULE = {
+    "low": "Eq. 2 (low), since Re* is below 3",
+    "high": "Eq. 4 (high), since Re* is not below 30",
+    "transition": "both Eq. 2 (low) and Eq. 4 (high), since neither holds",
+}
+"""Laws that the paper's rule picks in each regime."""
+GIVE_DEPTH = "for the mean velocity of the liquid give its depth, --depth in m"
+LAMINAR = "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
 def add(commands: Any) -> None:
@@ -22,14 +57,15 @@ def add(commands: Any) -> None:
     command = commands.add_parser(
         "threshold", help="when one grain starts to move, closed form, at once", epilog=RANGES
     )
-    for one in PARAMETERS:
+    for name, one in PARAMETERS.items():
+        default = f"{one.default:g}" if isinstance(one.default, float) else one.default
         command.add_argument(
-            one.option,
-            dest=one.name,
-            default=None if one.default is None else str(one.default),
-            required=one is DIAMETER,
+            OPTIONS[name],
+            dest=name,
+            default=default,
+            required=name == "diameter",
             metavar="X",
-            help=_help(one),
+            help="; ".join(filter(None, (one.label, one.note, default and f"default {default}"))),
         )
     command.add_argument(
         "--law",
@@ -43,67 +79,237 @@ def add(commands: Any) -> None:
     command.set_defaults(run=_run)
 
 
-def _help(one: Parameter) -> str:
-    default = one.default if isinstance(one.default, str | None) else f"{one.default:g}"
-    parts = (one.label, one.note, default and f"default {default}")
-    return "; ".join(part for part in parts if part)
-
-
 def _run(options: argparse.Namespace) -> int:
-    from orchestrator.calculator import doubts, ranges, table
+    import pandas as pd
 
-    answer = _of_option("--law", table.known_law, options.law)
-    given = {one: getattr(options, one.name) for one in PARAMETERS}
-    axes = {
-        one.name: _of_option(one.option, ranges.values, one, text)
-        for one, text in given.items()
-        if text is not None
-    }
-    asked = doubts.questions({name: _largest(values) for name, values in axes.items()})
+    from orchestrator.calculator import table
+
+    table.check_law(options.law, "--law")
+    texts = {name: getattr(options, name) for name in PARAMETERS}
+    axes = {name: values(name, text) for name, text in texts.items() if text is not None}
+    count = math.prod(map(len, axes.values()))
+    if count > MOST_POINTS:
+        what = f"the ranges have {count} points together, more than {MOST_POINTS}"
+        raise InputError(what, where="threshold", remedy="lower a COUNT")
+    asked = questions({name: _numbers(axis) for name, axis in axes.items()})
+    points = pd.DataFrame(itertools.product(*axes.values()), columns=list(axes))
     try:
-        found = table.thresholds(ranges.grid(axes), answer)
+        thresholds = table.thresholds(points, options.law)
     except InputError as error:
-        raise _refusal(error, asked) from None
+        raise _renamed(error, asked) from None
     if asked:
         print(f"orchestrator: {'; '.join(asked.values())}", file=sys.stderr)
-    varied = [one for one in PARAMETERS if len(axes.get(one.name, ())) > 1]
-    print(_printed(found, answer, varied, options), end="")
+    if options.csv:
+        print(thresholds.to_csv(index=False), end="")
+    elif options.json:
+        print(as_json(thresholds))
+    else:
+        varied = [name for name, axis in axes.items() if len(axis) > 1]
+        print("\n".join(as_text(thresholds, options.law, varied)))
     return 0
 
 
-def _of_option(option: str, read: Any, *arguments: Any) -> Any:
-    """Read the text of an option; a refusal names the option."""
+def values(name: str, text: str) -> list[Value]:
+    """The values that a text gives to a parameter.
+
+    Parameters
+    ----------
+    name : str
+        The parameter. A roughness may be a part of the diameter.
+    text : str
+        A number, or a range ``FIRST:LAST:COUNT``, both ends included.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    import numpy as np
+
+    option, ends, geometric = OPTIONS[name], text.split(":"), PARAMETERS[name].geometric
+    parts = [re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", end) for end in ends[:2]]
+    of_diameter = name == "roughness" and all(part and float(part[1]) > 0 for part in parts)
+    if len(ends) == 1:
+        return [text if of_diameter else _number(text, name, option)]
+    if len(ends) != 3:
+        raise InputError(f"{text!r} is not a range", where=option, remedy=FORM)
+    if of_diameter:
+        first, last = (1 / float(part[1]) for part in parts if part)
+    else:
+        first, last = (_number(end, name, option) for end in ends[:2])
+    count = _number(ends[2], name, option)
+    if not (math.isfinite(first) and math.isfinite(last)):
+        what = f"{text!r} does not end at finite numbers"
+    elif not first < last:
+        what = f"{text!r} does not rise from its first to its last value"
+    elif not count.is_integer() or count < 2:
+        what = f"{ends[2]!r} is not a count of values from 2 up"
+    elif count > MOST_POINTS:
+        what = f"{ends[2]} values are more than {MOST_POINTS}"
+    else:
+        # a range wider than all floats ends in values that the scene refuses
+        with np.errstate(all="ignore"):
+            space = np.geomspace if geometric and first > 0 else np.linspace
+            spaced = [float(value) for value in space(first, last, int(count))]
+        return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else [*spaced]
+    raise InputError(what, where=option, remedy=FORM)
+
+
+def _number(text: str, name: str, option: str) -> float:
     try:
-        return read(*arguments)
-    except InputError as error:
-        raise InputError(error.what, where=option, remedy=error.remedy) from None
+        return float(text)
+    except ValueError:
+        remedy = "write a number in SI units, such as 2e-4; or a range FIRST:LAST:COUNT"
+        if name == "roughness":
+            remedy = 'write metres, or a part of the diameter as "d/30"; or a range of either'
+        raise InputError(f"{text!r} is not a number", where=option, remedy=remedy) from None
 
 
-def _largest(values: Sequence[float | str]) -> float:
-    numbers = (value for value in values if not isinstance(value, str) and math.isfinite(value))
-    return max(numbers, default=0.0)
+def _numbers(axis: Sequence[Value]) -> list[float]:
+    return [v for v in axis if not isinstance(v, str) and math.isfinite(v)] or [0.0]
 
 
-def _refusal(error: InputError, asked: Mapping[str, str]) -> InputError:
-    """A refusal in the words of the command line; a question about what it names is the remedy."""
-    said = renamed(error, OPTION_OF)
-    whole = said.where == "threshold"
-    about = [
-        asked[one.name]
-        for one in PARAMETERS
-        if one.name in asked and (whole or one.option in said.where)
+def questions(axes: Mapping[str, Sequence[float]]) -> dict[str, str]:
+    """Questions on parameters that look like another unit, or lie beyond the model, by name.
+
+    Parameters
+    ----------
+    axes : mapping
+        The numbers of each parameter; the largest of them is looked at.
+    """
+    top = {name: max(axis) for name, axis in axes.items()}
+    asked = {
+        name: f"{question.format(top[name])}, {OPTIONS[name]} {top[name] * factor:.4g}?"
+        for name, low, high, question, factor in UNITS
+        if low <= top[name] < high
+    }
+    smallest, rho = min(axes["diameter"]), top["fluid_density"]
+    kind = "gas" if rho < GAS_BELOW else "liquid"
+    if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[kind]:
+        asked["diameter"] = (
+            f"{smallest:g} m: cohesion, which the force laws leave out, holds grains this small;"
+            " they need a stronger flow"
+        )
+    if fluid := _fluid(rho, top["viscosity"]):
+        asked["viscosity"] = fluid
+    return asked
+
+
+def _fluid(rho: float, nu: float) -> str:
+    """A fluid is told by its dynamic viscosity."""
+
+    def is_usual(rho: float, nu: float) -> bool:
+        low, high = USUAL_PA_S["gas" if rho < GAS_BELOW else "liquid"]
+        return low <= rho * nu <= high
+
+    if not (rho > 0 and nu > 0):
+        return ""
+    if is_usual(rho, nu):
+        of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
+        return f"{nu:g} m2/s is air's: did you mean water, --viscosity 1e-06?" if of_air else ""
+    units = (
+        (1 / rho, f"{nu:g} Pa s"),
+        (1e-6, f"{nu:g} mm2/s"),
+        (1e-5, f"{nu:g}e-5 m2/s"),
+        (1e-4, f"{nu:g} cm2/s"),
+    )
+    meant = [f"{text}, --viscosity {nu * f:.4g}" for f, text in units if is_usual(rho, nu * f)]
+    if is_usual(rho * 1000, nu):
+        meant.insert(0, f"{rho:g} g/cm3, --fluid-density {rho * 1000:g}")
+    kind = "gas" if rho < GAS_BELOW else "liquid"
+    unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for a {kind} of {rho:g} kg/m3"
+    return f"{unusual}: did you mean {' or '.join(meant)}?" if meant else f"{unusual}: is it right?"
+
+
+def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
+    """A refusal with options for the fields of a study file; questions are its remedy."""
+    options = {one.field: OPTIONS[name] for name, one in PARAMETERS.items()}
+
+    def renamed(text: str) -> str:
+        return re.sub(r"\b[a-z]+\.[a-z_]+\b", lambda field: options.get(field[0], field[0]), text)
+
+    place, _, field = error.where.rpartition(": ")
+    where = f"{place}: {options.get(field, field)}" if place else field
+    about = [text for name, text in asked.items() if not place or where.endswith(OPTIONS[name])]
+    advice = about if about and not place else [renamed(error.remedy), *about]
+    return InputError(renamed(error.what), where=where, remedy="; ".join(filter(None, advice)))
+
+
+def as_json(table: "pd.DataFrame") -> str:
+    """A record for one point, or a list of records: parameters, rules, an object for each law."""
+    from orchestrator.physics.regime import LAWS_OF
+
+    def plain(value: Any) -> Any:  # JSON has no NaN
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    names = {column: name for column, (name, _) in QUANTITIES.items()}
+    names |= {"valid": "valid", "why_not": "why_not"}
+    rows, laws = table.to_dict("records"), table["law"].nunique()
+    records = [
+        {
+            "input": {name: plain(point[0][one.column]) for name, one in PARAMETERS.items()},
+            "regime": point[0]["regime"],
+            "paper": list(LAWS_OF[point[0]["regime"]]),
+            "answer": [row["law"] for row in point if row["answer"]],
+            **{row["law"]: {name: plain(row[c]) for c, name in names.items()} for row in point},
+        }
+        for point in (rows[start : start + laws] for start in range(0, len(rows), laws))
     ]
-    advice = about if whole and about else [said.remedy, *about]
-    return InputError(said.what, where=said.where, remedy="; ".join(filter(None, advice)))
+    if len(records) == 1:
+        return json.dumps(records[0], indent=2, allow_nan=False)
+    lines = ",\n".join(json.dumps(record, allow_nan=False) for record in records)
+    return f"[\n{lines}\n]"
 
 
-def _printed(
-    found: Any, answer: str, varied: Sequence[Parameter], options: argparse.Namespace
-) -> str:
-    from orchestrator.calculator import records, text
+def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterator[str]:
+    """Lines for people: of one point the answer and every law, of many points the answer's rows."""
+    import pandas as pd
 
-    if options.csv:
-        return str(found.to_csv(index=False))
-    if options.json:
-        return records.text(found) + "\n"
-    return (text.several(found, answer, varied) if varied else text.single(found, answer)) + "\n"
+    chosen, rest = table[table["answer"]], table[~table["answer"]]
+    name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
+    shown = {c: label for c, (_, label) in QUANTITIES.items() if table[c].notna().any()}
+    if varied:
+        yield name
+        first = {PARAMETERS[one].column: PARAMETERS[one].label for one in varied}
+        first |= {"law": "force law"} if answer == "paper" else {}
+        rows = chosen
+    else:
+        yield f"{name}: a grain of {table['d_m'].iloc[0] * 1000:.4g} mm starts to move at"
+        columns = [["", *shown.values()]]
+        columns += [[law, *map(_text, row[list(shown)])] for law, row in _by_law(chosen)]
+        yield from (f"  {line}" for line in _aligned(columns)[len(chosen) == 1 :])
+        for law, row in _by_law(chosen):
+            if row["why_not"]:
+                yield f"  outside the range of {law}: {row['why_not']}"
+        if not chosen["valid"].any():
+            yield f"  laws that hold here: {', '.join(rest.loc[rest['valid'], 'law'])}"
+        yield ""
+        first, rows = {"law": "force law"}, pd.concat([chosen, rest])
+        shown.pop("wind_1m_m_s", None)
+    first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
+    holds = ["holds", *(f"no: {why}" if why else "yes" for why in rows["why_not"])]
+    yield from _aligned([*([label, *map(_text, rows[c])] for c, label in first.items()), holds])
+    if not varied:
+        yield f"\npaper's rule: {RULE[table['regime'].iloc[0]]}"
+    liquid = (table["rho_f_kg_m3"] >= GAS_BELOW) & table["mean_velocity_m_s"].isna()
+    if (liquid & table["depth_m"].isna()).any():
+        yield GIVE_DEPTH
+    if (liquid & table["depth_m"].notna() & table["valid"]).any():
+        yield LAMINAR
+
+
+def _by_law(table: "pd.DataFrame") -> Iterator[tuple[str, Any]]:
+    return ((str(row["law"]), row) for _, row in table.iterrows())
+
+
+def _text(value: Value) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def _aligned(columns: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of columns of cells, each as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in columns]
+    return [
+        "  ".join(f"{c:<{w}}" for c, w in zip(cells, widths, strict=True)).rstrip()
+        for cells in zip(*columns, strict=True)
+    ]

@@ -1,27 +1,20 @@
-"""Parameters of the closed form of a grain, by every name that they have."""
+"""Parameters and results of the closed form of a grain, by every name that they have."""
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from orchestrator.errors import InputError
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number that the closed form depends on.
+    """A number that the closed form depends on.
 
     Attributes
     ----------
-    name : str
-        Name of the keyword, also in JSON.
-    option : str
-        Option of the command line.
     field : str
         Field of a study file; the depth has none.
     column : str
-        Column of a table, with the unit.
+        Column of the table, with the unit.
     label : str
         Symbol and unit, for people.
     default : float or str or None
@@ -32,8 +25,6 @@ class Parameter:
         Whether a range of it is spaced geometrically.
     """
 
-    name: str
-    option: str
     field: str
     column: str
     label: str
@@ -42,71 +33,38 @@ class Parameter:
     geometric: bool = False
 
 
-DIAMETER = Parameter("diameter", "--diameter", "grain.diameter", "d_m", "d, m", geometric=True)
-DENSITY = Parameter(
-    "density", "--density", "grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", 2500.0
-)
-FLUID_DENSITY = Parameter(
-    *("fluid_density", "--fluid-density", "fluid.density", "rho_f_kg_m3", "rho_f, kg/m3"),
-    default=1.0,
-    note="water: 1000",
-)
-VISCOSITY = Parameter(
-    *("viscosity", "--viscosity", "fluid.viscosity", "nu_m2_s", "nu, m2/s"),
-    default=1e-5,
-    note="kinematic; water: 1e-6",
-    geometric=True,
-)
-SLOPE = Parameter(
-    *("slope_deg", "--slope", "bed.slope_deg", "alpha_deg", "alpha, deg"),
-    default=0.0,
-    note="the flow goes up it",
-)
-ENTRAINMENT_ANGLE = Parameter(
-    *("entrainment_angle_deg", "--entrainment-angle", "bed.entrainment_angle_deg"),
-    *("beta_deg", "beta, deg"),
-    default=60.0,
-)
-ROUGHNESS = Parameter(
-    *("roughness", "--roughness", "bed.roughness", "z0_m", "z0, m"),
-    default="d/30",
-    note='or a part of the diameter as "d/10"',
-    geometric=True,
-)
-LIFT = Parameter(
-    *("lift_coefficient", "--lift-coefficient", "forces.lift_coefficient", "alpha_s", "alpha_s"),
-    default=LIFT_COEFFICIENT,
-)
-G = Parameter("gravity", "--gravity", "fluid.gravity", "g_m_s2", "g, m/s2", GRAVITY)
-DEPTH = Parameter(
-    *("depth", "--depth", "depth", "depth_m", "depth, m"),
-    note="of a liquid, for its mean velocity",
-    geometric=True,
-)
-
-SCENE = (
-    DIAMETER,
-    DENSITY,
-    FLUID_DENSITY,
-    VISCOSITY,
-    SLOPE,
-    ENTRAINMENT_ANGLE,
-    ROUGHNESS,
-    LIFT,
-    G,
-)
-"""Parameters of a scene. The paper's values are the defaults."""
-PARAMETERS = (*SCENE, DEPTH)
-OPTION_OF = {parameter.field: parameter.option for parameter in PARAMETERS}
-"""Options of the command line by the fields of a study file."""
-
-
-def renamed(error: InputError, names: Mapping[str, str]) -> InputError:
-    """The same refusal, with other names for the fields of a study file."""
-    prefix, colon, field = error.where.rpartition(": ")
-
-    def named(text: str) -> str:
-        return re.sub(r"\b[a-z]+\.[a-z_]+\b", lambda found: names.get(found[0], found[0]), text)
-
-    where = f"{prefix}{colon}{names.get(field, field)}"
-    return InputError(named(error.what), where=where, remedy=named(error.remedy))
+PARAMETERS = {
+    "diameter": Parameter("grain.diameter", "d_m", "d, m", geometric=True),
+    "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", 2500.0),
+    "fluid_density": Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", 1.0, "water: 1000"),
+    "viscosity": Parameter(
+        "fluid.viscosity", "nu_m2_s", "nu, m2/s", 1e-5, "kinematic; water: 1e-6", geometric=True
+    ),
+    "slope_deg": Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", 0.0, "the flow goes up it"),
+    "entrainment_angle_deg": Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", 60.0),
+    "roughness": Parameter(
+        *("bed.roughness", "z0_m", "z0, m", "d/30"),
+        note='or a part of the diameter as "d/10"',
+        geometric=True,
+    ),
+    "lift_coefficient": Parameter(
+        "forces.lift_coefficient", "alpha_s", "alpha_s", LIFT_COEFFICIENT
+    ),
+    "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", GRAVITY),
+    "depth": Parameter(
+        "depth", "depth_m", "depth, m", note="of a liquid, for its mean velocity", geometric=True
+    ),
+}
+"""By keyword, which is also the name in JSON. The paper's values are the defaults."""
+QUANTITIES = {
+    "ustar_m_s": ("friction_velocity", "u*, m/s"),
+    "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),
+    "wind_10m_m_s": ("wind_speed_10_m", "wind at 10 m, m/s"),
+    "mean_velocity_m_s": ("mean_velocity", "mean velocity, m/s"),
+    "stress_pa": ("stress", "stress, Pa"),
+    "shields": ("shields", "Shields"),
+    "reynolds": ("reynolds", "Re*"),
+    "drag_n": ("drag", "drag, N"),
+    "lift_n": ("lift", "lift, N"),
+}
+"""Columns of a threshold, each with its name in JSON and its symbol and unit for people."""

@@ -1,129 +1,118 @@
-"""Thresholds of many grains under every force law, as one table: the core of `threshold`."""
+"""Thresholds of many single grains under every force law, as one table."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from operator import attrgetter
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from orchestrator.calculator.parameters import DEPTH, SCENE
+from orchestrator.calculator.parameters import PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
-from orchestrator.physics.exposure import Exposure, FloatArray
-from orchestrator.physics.force_law import Bound, ForceLaw
+from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import ForceLaw
 from orchestrator.physics.laws import LAWS, law
-from orchestrator.physics.log_law import depth_mean_speed, log_law_speed
-from orchestrator.physics.regime import LAWS_OF, Regime, regime
+from orchestrator.physics.log_law import depth_mean_speed, log_law_speed, smooth_wall_roughness
+from orchestrator.physics.regime import LAWS_OF, regime
 from orchestrator.physics.threshold import Threshold, lift_bound, threshold
+from orchestrator.study.closed_form import PAPER, SingleGrain, single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 
-PAPER = "paper"
-"""The paper's rule: Eq. 2 or Eq. 4 where each holds, both in the transition."""
+MOST_POINTS = 100_000
 GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
 DEEPEST = 2e4
 """Largest depth of a liquid, m: twice the deepest sea."""
-Values = Mapping[str, FloatArray]
+LAMINAR_BELOW = 2000.0
+"""U D/nu below which open water may be laminar, and has no logarithmic profile."""
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity of a threshold: its name in JSON, its column, and words for people."""
-
-    name: str
-    column: str
-    label: str
-    unit: str = ""
-
-
-WINDS = (
-    Quantity("wind_speed_1_m", "wind_1m_m_s", "wind at 1 m", "m/s"),
-    Quantity("wind_speed_10_m", "wind_10m_m_s", "wind at 10 m", "m/s"),
-)
-MEAN_VELOCITY = Quantity("mean_velocity", "mean_velocity_m_s", "mean velocity", "m/s")
-QUANTITIES = (
-    Quantity("friction_velocity", "ustar_m_s", "u*", "m/s"),
-    *WINDS,
-    MEAN_VELOCITY,
-    Quantity("stress", "stress_pa", "stress", "Pa"),
-    Quantity("shields", "shields", "Shields"),
-    Quantity("reynolds", "reynolds", "Re*"),
-    Quantity("drag", "drag_n", "drag", "N"),
-    Quantity("lift", "lift_n", "lift", "N"),
-)
-
-
-def known_law(name: str) -> str:
-    """The name of a force law or of the paper's rule.
+def check_law(name: str, where: str = "threshold: law") -> None:
+    """See that a name is that of a force law or the paper's rule.
 
     Raises
     ------
     InputError
-        If it is neither; it lists those that there are.
+        If it is neither; it lists the names that there are.
     """
     if name == PAPER:
-        return name
+        return
     try:
-        return law(name).name
+        law(name)
     except InputError as error:
-        raise InputError(error.what, remedy=f"{error.remedy}, {PAPER}") from None
+        raise InputError(error.what, where=where, remedy=f"{error.remedy}, {PAPER}") from None
 
 
 def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
-    """Thresholds of motion of single grains, each under every force law.
+    """Thresholds of single grains under every force law.
 
     Parameters
     ----------
     points : DataFrame
-        One row for each grain, with columns named as the `PARAMETERS` (SI units, degrees). Those
-        that are absent have their default; a roughness may be a text such as ``d/30``.
+        A row for each point; its columns are keys of `PARAMETERS`. A parameter that is left out
+        has its default, and the depth none.
     answer : str
-        The law whose rows are marked as the answer; ``paper`` marks those of the paper's rule.
+        A force law, or ``paper`` for the paper's rule.
 
     Returns
     -------
     DataFrame
-        One row for each point and law, units in the columns' names: the parameters, ``law``, the
-        `QUANTITIES`, ``valid``, ``why_not``, ``regime`` and ``answer``. A gas has winds, a liquid
-        of a given depth a mean velocity; the others are NaN.
+        A row for each point and law, point by point: the parameters, ``law``, the columns of
+        `QUANTITIES`, ``valid`` and ``why_not``, ``regime``, and ``answer``, whether the law is one
+        of those that are asked for. A gas has winds, a liquid of a given depth a mean velocity
+        where its flow is turbulent; the others are NaN.
 
     Raises
     ------
     InputError
-        For a point that is no scene, a depth that is none, or if no law holds at any point.
+        For a point that is no scene, a depth that is none, more than 100,000 points, or if no law
+        holds at any point.
     """
-    scenes = [_scene(point) for point in points.to_dict("records")]
-    given = {p.name: np.array([attrgetter(p.field)(one) for one in scenes]) for p in SCENE}
-    given[DEPTH.name] = _depths(points, given)
+    if len(points) > MOST_POINTS:
+        what = f"{len(points)} points are more than {MOST_POINTS}"
+        raise InputError(what, where="threshold", remedy="ask in parts")
+    grains = pd.DataFrame(
+        [single_grain(_scene(point)) for point in points.to_dict("records")],
+        columns=SingleGrain._fields,
+    )
+    grains["depth"] = points["depth"].to_numpy(float) if "depth" in points else np.nan
+    if "depth" in points:
+        _check_depth(grains)
+    exposure = _exposure(grains)
+    others = {name: grains[name].to_numpy() for name in SingleGrain._fields[5:]}
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
-        found = {name: _threshold(one, given) for name, one in LAWS.items()}
-        blocks = [_told(LAWS[name], found[name], given) for name in LAWS]
-    regimes = regime(found["low"], found["high"])
-    columns = {p.column: np.repeat(given[p.name], len(LAWS)) for p in (*SCENE, DEPTH)}
-    columns["law"] = np.tile(list(LAWS), len(scenes))
-    for name in blocks[0]:
-        columns[name] = np.stack([block[name] for block in blocks], axis=1).ravel()
-    columns["regime"] = np.repeat(regimes, len(LAWS))
-    picked = {one: [name in _picked(answer, one) for name in LAWS] for one in LAWS_OF}
-    columns["answer"] = np.array([picked[one] for one in regimes.tolist()]).ravel()
-    table = pd.DataFrame(columns)
-    if not table["valid"].any():
-        raise InputError(
-            "no force law holds", where="threshold", remedy="are all numbers in SI units?"
+        by_law = {name: threshold(one, exposure, **others) for name, one in LAWS.items()}
+        blocks = {name: _columns(LAWS[name], one, grains) for name, one in by_law.items()}
+    regimes = regime(by_law["low"], by_law["high"])
+    given = pd.DataFrame({one.column: grains[name] for name, one in PARAMETERS.items()})
+    picked = {one: LAWS_OF[one] if answer == PAPER else (answer,) for one in LAWS_OF}
+    table = pd.concat(
+        given.assign(
+            law=name,
+            **block,
+            regime=regimes,
+            answer=[name in picked[one] for one in regimes.tolist()],
         )
+        for name, block in blocks.items()
+    ).sort_index(kind="stable", ignore_index=True)
+    if not table["valid"].any():
+        what, remedy = "no force law holds", "are all numbers in SI units?"
+        raise InputError(what, where="threshold", remedy=remedy)
     return table
+
+
+def _exposure(grains: pd.DataFrame) -> Exposure:
+    return Exposure(*(grains[name] for name in SingleGrain._fields[:5]))
 
 
 def _scene(point: Mapping[Any, Any]) -> Scene:
     parts: dict[str, dict[str, Any]] = {name: {} for name in Scene.model_fields}
-    for parameter in SCENE:
-        part, _, field = parameter.field.partition(".")
-        value = point.get(parameter.name, parameter.default)
+    for name in SingleGrain._fields:
+        part, _, field = PARAMETERS[name].field.partition(".")
+        value = point.get(name, PARAMETERS[name].default)
         if value is not None:
             parts[part][field] = value
     scene = make_scene(parts, "threshold")
@@ -131,78 +120,44 @@ def _scene(point: Mapping[Any, Any]) -> Scene:
     return scene
 
 
-def _depths(points: pd.DataFrame, given: Values) -> FloatArray:
-    if DEPTH.name not in points:
-        return np.full(len(points), np.nan)
-    depths = points[DEPTH.name].to_numpy(float)
-    bad = ~(depths > given["diameter"])
-    where = f"threshold: {DEPTH.name}"
-    if (depths > DEEPEST).any():
-        raise InputError(
-            f"{depths.max():g} m is deeper than any liquid, {DEEPEST:g} m",
-            where=where,
-            remedy="give the depth of the liquid in m",
-        )
-    if bad.any():
-        raise InputError(
-            f"a depth of {depths[bad][0]:g} m does not cover a grain of"
-            f" {given['diameter'][bad][0]:g} m",
-            where=where,
-            remedy="give the depth of the liquid in m",
-        )
-    if np.all(_is_gas(given)):
-        raise InputError(
-            f"{given['fluid_density'][0]:g} kg/m3 is a gas, and a depth is a liquid's",
-            where=where,
-            remedy="leave it out, or set fluid.density and fluid.viscosity; water: 1000, 1e-6",
-        )
-    return depths
+def _check_depth(grains: pd.DataFrame) -> None:
+    depth, d, density = grains["depth"], grains["diameter"], grains["fluid_density"]
+    what, remedy = "", "give the depth of the liquid in m"
+    if (depth > DEEPEST).any():
+        what = f"{depth.max():g} m is deeper than any liquid, {DEEPEST:g} m"
+    elif (bad := ~(depth > d)).any():
+        what = f"a depth of {depth[bad].iloc[0]:g} m does not cover a grain of {d[bad].iloc[0]:g} m"
+    elif (density < GAS_BELOW).all():
+        what = f"{density[0]:g} kg/m3 is a gas, and a depth is a liquid's"
+        remedy = "leave it out, or set fluid.density and fluid.viscosity; water: 1000, 1e-6"
+    if what:
+        raise InputError(what, where="threshold: depth", remedy=remedy)
 
 
-def _is_gas(given: Values) -> NDArray[np.bool_]:
-    return given["fluid_density"] < GAS_BELOW
-
-
-def _exposure(given: Values) -> Exposure:
-    told = {name: given[name] for name in Exposure.__dataclass_fields__ if name in given}
-    return Exposure(**told)
-
-
-def _threshold(here: ForceLaw, given: Values) -> Threshold:
-    others = ("density", "slope_deg", "entrainment_angle_deg", "gravity")
-    return threshold(here, _exposure(given), **{name: given[name] for name in others})
-
-
-def _told(here: ForceLaw, found: Threshold, given: Values) -> dict[str, Any]:
-    """The columns of one law."""
-    ustar, z0, gas = found.friction_velocity, given["roughness"], _is_gas(given)
-    told = {
-        "friction_velocity": ustar,
-        "wind_speed_1_m": np.where(gas, log_law_speed(ustar, 1.0, z0), np.nan),
-        "wind_speed_10_m": np.where(gas, log_law_speed(ustar, 10.0, z0), np.nan),
-        "mean_velocity": np.where(gas, np.nan, depth_mean_speed(ustar, given["depth"], z0)),
-        "stress": given["fluid_density"] * ustar**2,
+def _columns(here: ForceLaw, found: Threshold, grains: pd.DataFrame) -> dict[str, Any]:
+    """The columns of one law, each of shape (n,)."""
+    ustar, exposure = found.friction_velocity, _exposure(grains)
+    density, viscosity = grains["fluid_density"].to_numpy(), grains["viscosity"].to_numpy()
+    z0 = np.maximum(grains["roughness"], smooth_wall_roughness(ustar, viscosity))
+    gas, depth = density < GAS_BELOW, grains["depth"].to_numpy()
+    mean = depth_mean_speed(ustar, depth, z0)
+    turbulent = mean * depth / viscosity >= LAMINAR_BELOW
+    rest = {name: grains[name].to_numpy() for name in ("density", "slope_deg", "gravity")}
+    why = np.full(len(grains), "", object)
+    for bound in (*here.bounds(ustar, exposure), lift_bound(found.lift, exposure, **rest)):
+        for i in np.flatnonzero(~bound.holds):
+            said = str(replace(bound, value=bound.value[i]))
+            why[i] = "; ".join(filter(None, (why[i], said)))
+    return {
+        "ustar_m_s": ustar,
+        "wind_1m_m_s": np.where(gas, log_law_speed(ustar, 1.0, z0), np.nan),
+        "wind_10m_m_s": np.where(gas, log_law_speed(ustar, 10.0, z0), np.nan),
+        "mean_velocity_m_s": np.where(~gas & turbulent, mean, np.nan),
+        "stress_pa": density * ustar**2,
         "shields": found.shields,
         "reynolds": found.reynolds,
-        "drag": found.drag,
-        "lift": found.lift,
+        "drag_n": found.drag,
+        "lift_n": found.lift,
+        "valid": found.valid,
+        "why_not": why,
     }
-    exposed = _exposure(given)
-    lifted = {name: given[name] for name in ("density", "slope_deg", "gravity")}
-    bounds = (*here.bounds(ustar, exposed), lift_bound(found.lift, exposed, **lifted))
-    why = _why_not(bounds, len(ustar))
-    columns: dict[str, Any] = {one.column: told[one.name] for one in QUANTITIES}
-    return {**columns, "valid": found.valid, "why_not": np.array(why, dtype=object)}
-
-
-def _why_not(bounds: Sequence[Bound], count: int) -> list[str]:
-    """As `ForceLaw.why_not`, of many grains."""
-    reasons: list[list[str]] = [[] for _ in range(count)]
-    for bound in bounds:
-        for index in np.flatnonzero(~bound.holds):
-            reasons[index].append(str(replace(bound, value=bound.value[index])))
-    return ["; ".join(said) for said in reasons]
-
-
-def _picked(answer: str, here: Regime) -> tuple[str, ...]:
-    return LAWS_OF[here] if answer == PAPER else (answer,)

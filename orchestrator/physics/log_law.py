@@ -27,6 +27,14 @@ def log_law_speed(ustar: ArrayLike, height: ArrayLike, roughness: ArrayLike) -> 
     return np.asarray(np.asarray(ustar, float) / KARMAN * _log(height, roughness))
 
 
+def smooth_wall_roughness(ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
+    """Roughness length of a hydraulically smooth wall, 0.11 nu/u*, m (Nikuradse 1933).
+
+    A wall has the larger of this length and that of its grains.
+    """
+    return np.asarray(0.11 * np.asarray(viscosity, float) / np.asarray(ustar, float))
+
+
 def depth_mean_speed(ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike) -> FloatArray:
     """Depth-averaged speed (m/s) of wide open water of a depth (m) with that profile up to its top.
 

@@ -15,7 +15,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import Threshold, shields_at
 from orchestrator.report import laws
 from orchestrator.report.results import split
-from orchestrator.study.closed_form import known
+from orchestrator.study import closed_form
 
 FloatArray = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
 
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     """The closed form of the single grains of some rows under a law."""
-    return known(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
+    return closed_form.thresholds(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
 
 
 def sweep(scenes: pd.DataFrame) -> FloatArray:

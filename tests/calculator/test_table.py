@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.calculator.parameters import OPTION_OF, ROUGHNESS, SCENE
+from orchestrator.calculator.parameters import PARAMETERS
 from orchestrator.calculator.table import thresholds
 from orchestrator.errors import InputError
 from orchestrator.physics.exposure import Exposure
@@ -51,10 +51,34 @@ def test_a_point_that_is_no_scene_is_named() -> None:
 
 def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> None:
     fields = {one.name: one for one in FIELDS}
-    for parameter in SCENE:
+    for name, parameter in PARAMETERS.items():
+        if name == "depth":
+            continue
         assert parameter.column == fields[parameter.field].column
-        part, _, name = parameter.field.partition(".")
-        declared = PARTS[part].model_fields[name]
-        if parameter is not ROUGHNESS:  # its default is a part of the diameter
+        part, _, field = parameter.field.partition(".")
+        declared = PARTS[part].model_fields[field]
+        if name != "roughness":  # its default is a part of the diameter
             assert parameter.default == (None if declared.is_required() else declared.default)
-    assert len(set(OPTION_OF.values())) == len(SCENE) + 1
+
+
+def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:
+    """Sand on Mars: u* z0/nu = 0.011, so that z0 is 0.11 nu/u* and the wind 45 m/s, not 55."""
+    point = {"diameter": 1e-4, "density": 3000.0, "fluid_density": 0.02, "viscosity": 5.5e-4}
+    mars = thresholds(pd.DataFrame([{**point, "gravity": 3.71}])).query("answer").iloc[0]
+    ustar = mars["ustar_m_s"]
+    z0 = 0.11 * 5.5e-4 / ustar
+    assert mars["wind_1m_m_s"] == pytest.approx(ustar / 0.41 * np.log(1 + 1 / z0))
+    assert mars["wind_1m_m_s"] == pytest.approx(44.8, abs=0.1)
+
+
+@pytest.mark.parametrize("depth", [0.02, 2.0])
+def test_laminar_water_has_no_mean_velocity_by_the_log_law(depth: float) -> None:
+    """A film of light oil runs at a third of what the log law says."""
+    oil = {"diameter": 1e-3, "density": 2650.0, "fluid_density": 870.0, "viscosity": 5e-5}
+    row = thresholds(pd.DataFrame([{**oil, "depth": depth}])).query("answer").iloc[0]
+    assert np.isnan(row["mean_velocity_m_s"]) == (depth < 1)
+
+
+def test_points_are_limited() -> None:
+    with pytest.raises(InputError, match="100001 points are more than 100000"):
+        thresholds(pd.DataFrame({"diameter": np.full(100_001, 1e-3)}))

@@ -218,6 +218,8 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
         (["--diameter", "1e-3", "--entrainment-angle", "1.05"], "1.05 rad, --entrainment-angle 60"),
         (["--diameter", "1e-3", "--gravity", "981"], "981 cm/s2, --gravity 9.81?"),
         (["--diameter", "1e-3", "--lift-coefficient", "6.46"], "--lift-coefficient 1.615?"),
+        (["--diameter", "1e-6"], "1e-06 m: cohesion, which the force laws leave out, holds"),
+        (["--diameter", "3e-5:1e-3:3", *WATER], "3e-05 m: cohesion"),
     ],
 )
 def test_what_looks_like_another_unit_is_asked_and_answered(

@@ -3,7 +3,7 @@
 import itertools
 import warnings
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from annotated_types import Ge, Gt, Le, Lt
@@ -129,13 +129,13 @@ def test_a_time_limit_is_one_that_can_be_waited_for(limit: str) -> None:
 
 def test_thresholds_of_many_groups_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = itertools.count()
-    find = closed_form._threshold
+    find = closed_form.threshold
 
-    def counted(*arguments: object) -> Threshold:
+    def counted(*arguments: Any, **named: Any) -> Threshold:
         next(calls)
-        return find(*arguments)  # type: ignore[arg-type]
+        return find(*arguments, **named)
 
-    monkeypatch.setattr(closed_form, "_threshold", counted)
+    monkeypatch.setattr(closed_form, "threshold", counted)
     groups = (f"[[group]]\ngrain = {{ diameter = {1.17e-3 + k * 1e-6!r} }}\n" for k in range(50))
     asked = parse("\n".join(["[forces]", "law = 'bridged'", *groups]))
     assert len(asked.groups) == 50
