@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.physics.threshold import Threshold
+from orchestrator.physics.threshold import Threshold, threshold
 from orchestrator.study import closed_form, fields, reference, study
 from orchestrator.study.study import Study
 
@@ -129,7 +129,7 @@ def test_a_time_limit_is_one_that_can_be_waited_for(limit: str) -> None:
 
 def test_thresholds_of_many_groups_are_found_together(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = itertools.count()
-    find = closed_form.threshold
+    find = threshold
 
     def counted(*arguments: Any, **named: Any) -> Threshold:
         next(calls)
