@@ -183,7 +183,7 @@ def _laminar(scene: Scene) -> str | None:
     if not bed:
         return None
     ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, scene.solve_roughness)
-    ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.flow.viscosity
+    ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.solve_viscosity
     if ratio >= 1:
         return None
     return (

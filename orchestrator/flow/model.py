@@ -118,7 +118,7 @@ class Solved(FlowModel):
                 height_m=bed.relief,
                 roughness_m=self.scene.solve_roughness,
                 speed_m_s=flow.speed,
-                viscosity_m2_s=flow.viscosity,
+                viscosity_m2_s=self.scene.solve_viscosity,
                 first_cell_m=self.scene.first_cell_height,
                 cells_per_face=flow.cells_per_face,
                 expansion_ratio=flow.expansion_ratio,

@@ -31,6 +31,10 @@ from orchestrator.study.sizes import Sizes, largest, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
+SOLVE_VISCOSITY = 1e-5
+"""Kinematic viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
+VISCOUS_CELLS = 2.5
+"""Height of the first cell over nu/(kappa u*_0): at its centre the flow is turbulent."""
 LEAST_DEPTH = 3.0
 """Least depth of a channel, heights of the forms: the rows of its mesh are level at half of it."""
 MOST_POURED_STIFFNESS = 1e5
@@ -187,9 +191,23 @@ class Scene(Part):
         assert isinstance(self.bed, PileBed)
         if self.flow.first_cell_height:
             return self.flow.first_cell_height
-        ustar0 = log_law_ustar(self.flow.speed, 10 * self.bed.relief, self.solve_roughness)
-        viscous = self.flow.viscosity / (KARMAN * float(ustar0))
+        viscous = (self.flow.viscosity or 0.0) / self._eddy_viscosity
         return default_first_cell_height(self.bed.relief, self.solve_roughness, viscous)
+
+    @property
+    def solve_viscosity(self) -> float:
+        """Kinematic viscosity at which the flow over a pile is solved, m2/s."""
+        if self.flow.viscosity:
+            return self.flow.viscosity
+        most = self._eddy_viscosity * self.first_cell_height / VISCOUS_CELLS
+        return min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
+
+    @property
+    def _eddy_viscosity(self) -> float:
+        """Eddy viscosity of the undisturbed flow of the solve over the height, kappa u*_0, m/s."""
+        assert isinstance(self.bed, PileBed)
+        height = 10 * self.bed.relief
+        return KARMAN * float(log_law_ustar(self.flow.speed, height, self.solve_roughness))
 
 
 def pocket_cosine(bed: Bed) -> float:
@@ -303,13 +321,13 @@ def check_points(profile: Profile, diameter: float, first_cell: float) -> None:
 
 def check_top(flow: Flow, bed: PileBed) -> None:
     """The top of the flow is well above the forms and the obstacles."""
-    top = flow.depth or flow.lid * bed.height
+    height = bed.relief
+    top = flow.depth or flow.lid * height
     for obstacle in bed.obstacles:
         if top < LEAST_DEPTH * obstacle.height:
             what = f"{obstacle} under a flow {top:g} m deep"
             remedy = f"at most a part of 1/{LEAST_DEPTH:g} of that, or raise the depth or flow.lid"
             raise UnfitError("bed.obstacles", what, remedy)
-    height = bed.height
     if flow.top == "boundary layer":
         if flow.depth:
             remedy = 'leave it out, or choose flow.top = "open water"'
@@ -366,7 +384,7 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
     viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow is not turbulent.
     h/4 is the end.
     """
-    return min(max(height / 40, 2.5 * roughness, 2.5 * viscous), height / 4)
+    return min(max(height / 40, 2.5 * roughness, VISCOUS_CELLS * viscous), height / 4)
 
 
 def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:

@@ -101,3 +101,17 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
     scenes = [study.parse(text, name="t", where="t").scenes[0] for text in texts]
     assert len({model(scene).cases for scene in scenes}) == 1
     assert len({scene.first_cell_height for scene in scenes}) == 1
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 10.0])
+def test_a_slow_solve_keeps_its_first_cells(speed: float) -> None:
+    """Its viscosity is lowered instead: the wall is rough, and the stress scales with the speed."""
+    (scene,) = study.parse(f"{TEXT}speed = {speed}\n", name="t", where="t").scenes
+    assert scene.first_cell_height == pytest.approx(0.02 / 40)
+    (case,) = model(scene).cases
+    assert case.viscosity_m2_s == min(1e-5, case.viscosity_m2_s)
+    turbulent = 0.41 * case.ustar0_m_s * case.first_cell_m / 2 / case.viscosity_m2_s
+    assert turbulent > 1.2
+    (given,) = study.parse(f"{TEXT}speed = {speed}\nviscosity = 1e-4\n", name="t", where="t").scenes
+    assert given.solve_viscosity == 1e-4
+    assert given.first_cell_height > 0.02 / 40

@@ -40,11 +40,19 @@ class Flow(Part):
     """speed 10 h above the flat bed at which the flow over a pile is solved; the stress is scaled
     from it"""
     viscosity: Annotated[
-        Viscosity,
-        Info("viscosity of the solve", "ν", "m²/s", "solve_nu_m2_s", "solved flows", "answer"),
-    ] = 1e-5
+        Viscosity | None,
+        Info(
+            "viscosity of the solve",
+            "ν",
+            "m²/s",
+            "solve_nu_m2_s",
+            "solved flows",
+            "answer",
+            read="solve_viscosity",
+        ),
+    ] = None
     """kinematic viscosity of that solve: the wall is rough, the fluid's own moves only the grain's
-    Re*"""
+    Re*; by default 1e-5, or less where the flow in the first cells would not be turbulent"""
     first_cell_height: Annotated[
         Length | None,
         Info(
@@ -57,7 +65,7 @@ class Flow(Part):
         ),
     ] = None
     """height of the mesh's cells on the bed; by default h/40, more on a very rough bed, 2.5 z₀, and
-    where the flow in them would not be turbulent"""
+    where the viscosity of the solve is given and the flow in them would not be turbulent"""
     cells_per_face: Annotated[
         int, Field(ge=10, le=400), Info("cells per face", scope="solved flows", about="answer")
     ] = 40
