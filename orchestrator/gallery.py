@@ -9,7 +9,7 @@ from orchestrator import face
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.report import FIGURES, PAGE, page
 from orchestrator.runs.claim import STUDY
-from orchestrator.runs.files import write_durably
+from orchestrator.runs.folder import Folder
 
 NAME = "gallery.html"
 PICTURES = ("bed-*.svg", "shields.svg")
@@ -52,7 +52,7 @@ def write(directory: Path) -> Path:
         remedy = "name the directory that holds directories of studies, such as results"
         raise InputError("there is no study with a page", where=str(directory), remedy=remedy)
     path = directory.absolute() / NAME
-    write_durably(path, page.fill("gallery.html.j2", title="Studies", cards=cards))
+    Folder(path.parent).put(NAME, page.fill("gallery.html.j2", title="Studies", cards=cards))
     return path
 
 

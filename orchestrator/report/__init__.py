@@ -1,11 +1,13 @@
 """Figures and page of a study."""
 
 import contextlib
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.errors import OrchestratorError
 from orchestrator.report import settings
 from orchestrator.report.guest import Guest
 
@@ -85,7 +87,11 @@ def write(
 
         results = Results(study, plan, tables, folder.root / "cases")
         folder.make(FIGURES)
-        figures = drawing.draw(results, folder, meanwhile)
+        drawn = drawing.draw(results, folder, meanwhile)
+    figures = [figure for figure in drawn if not figure.fault]
+    said["undrawn"] = [figure.fault for figure in drawn if figure.fault]
+    for fault in said["undrawn"]:
+        print(f"a figure could not be drawn: {fault}", file=sys.stderr)
     names = [figure.name for figure in figures]
     added = [one for one in (guest(study, tables, names) for guest in guests) if one]
     for name, text in (item for one in added for item in one.files.items()):
@@ -103,7 +109,7 @@ def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:
         return []
-    shown = [one for pile in bed.chosen(results) for one in pile.runs]
+    shown = [one for _, pile in bed.chosen(results) for one in pile.runs]
     return [*shown, *(pile.flow for pile in flow.chosen(results))]
 
 
@@ -113,4 +119,11 @@ def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
         from orchestrator.report import answer as found
         from orchestrator.report.results import Results
 
-    return found.text(Results(study, plan, tables, cases))
+    try:
+        return found.text(Results(study, plan, tables, cases))
+    except KeyError as error:
+        raise OrchestratorError(
+            f"its tables lack {error}: another version of this program wrote them",
+            where=str(cases.parent),
+            remedy="`orchestrator study` of the same file runs it again",
+        ) from None

@@ -11,8 +11,7 @@ from orchestrator.physics.log_law import log_law_speed
 from orchestrator.report import hills, labels
 from orchestrator.report.apart import varying
 from orchestrator.report.facts import Sheet
-from orchestrator.report.overview import nearest_fraction
-from orchestrator.report.results import Results, split, valid
+from orchestrator.report.results import Results, nearest_fraction, seeds_as_one, split, valid
 from orchestrator.study.closed_form import closed_form
 
 GAS_BELOW = 100.0
@@ -30,26 +29,20 @@ def sentences(results: Results) -> list[str]:
         found = list(hills.sentences(results))
         if valid(piles).any() or not found:
             telling = varying(piles, "alpha_deg", "d_m", "fraction")[:TOLD]
-            found += [_of_pile(row, results, telling) for row in _ends(piles)]
+            found += [_of_pile(row, results, telling) for row in _ends(results)]
         worth = _worth(piles, results.study.tolerance)
         return [*found, *_warnings(piles), *_frozen(piles), *_chosen(results), *worth]
     single = results.joined("single_grain")
     return [*map(_of_grain, _grain_ends(single)), *_warnings(single)] if len(single) else []
 
 
-def _ends(piles: pd.DataFrame) -> list[pd.Series]:
-    """The piles of the least and of the largest slope that the study's picture shows, too."""
-    here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
-    dem = here["answered_method"] == "dem"
-    order = here.assign(valid=valid(here), dem=dem).sort_values(
-        ["valid", "d_m", "dem", "z0_over_d"], ascending=[False, False, False, True], kind="stable"
-    )
-    firsts = order.drop_duplicates("alpha_deg").sort_values("alpha_deg")
-    return (
-        [row for _, row in firsts.iloc[sorted({0, len(firsts) - 1})].iterrows()]
-        if len(firsts)
-        else []
-    )
+def _ends(results: Results) -> list[pd.Series]:
+    """The piles of the least and of the largest slope in each fluid; pictures show them, too."""
+    ends = []
+    for _, piles in split(results.exemplars, "rho_f_kg_m3"):
+        firsts = piles.drop_duplicates("alpha_deg")
+        ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
+    return sorted(ends, key=lambda row: float(row["alpha_deg"]))
 
 
 def _of_pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
@@ -57,9 +50,16 @@ def _of_pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     ratio = f"{row['shields'] / single:.2g} times the stress of a single one"
     size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
     pile = ", ".join([_slope(row["alpha_deg"]), size, *others])
+    seeds = ""
+    if row["of_seeds"] > 1:
+        usable = "" if row["seeds"] == row["of_seeds"] else f" usable ones of {row['of_seeds']}"
+        seeds = (
+            f" in the mean of {row['seeds']}{usable} seeds ({row['least']:.3g} … "
+            f"{row['largest']:.3g})"
+        )
     return (
         f"{pile}: {row['fraction']:.0%} of the exposed grains move at {ratio}, τ_c = "
-        f"{row['shields']:.3g}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
+        f"{row['shields']:.3g}{seeds}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
     )
 
 
@@ -153,7 +153,8 @@ def sheet(results: Results) -> Sheet | None:
     piles = results.joined("pile_threshold")
     if len(piles):
         here = piles[piles["fraction"] == nearest_fraction(piles)]
-        return _each(here) if len(here) <= FEW else _ranges(here)
+        piles = seeds_as_one(here)
+        return _each(piles) if len(piles) <= FEW else _ranges(here)
     return grains(results)
 
 
@@ -163,6 +164,7 @@ HEAD = ("τ_c", "interval", "u*₀, m/s", "usable")
 
 def _each(rows: pd.DataFrame) -> Sheet:
     telling = varying(rows, "alpha_deg", "d_m", "force_law")
+    several = (rows["of_seeds"] > 1).any()
     cells = [
         (
             _slope(row["alpha_deg"]),
@@ -172,15 +174,23 @@ def _each(rows: pd.DataFrame) -> Sheet:
                 labels.value(one, row[one]) if labels.is_told(one, row[one]) else "—"
                 for one in telling
             ),
+            *([_seeds(row)] if several else []),
             *_threshold(row),
         )
         for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows()
     ]
     fraction = rows["fraction"].iloc[0]
     tau, interval, *others = HEAD
-    told = (labels.words(one).label for one in telling)
+    told = tuple(labels.words(one).label for one in telling)
+    told = (*told, "τ_c of each seed") if several else told
     head = ("slope", "d", "forces", *told, f"{tau} at n/N = {fraction:.0%}", interval, MODEL)
     return Sheet((*head, *others), tuple(cells))
+
+
+def _seeds(row: pd.Series) -> str:
+    """How many seeds a row is of, and their least and largest threshold."""
+    count = f"{row['seeds']} of {row['of_seeds']}"
+    return f"{count}: {row['least']:.4f} … {row['largest']:.4f}" if row["seeds"] > 1 else count
 
 
 def _threshold(row: pd.Series) -> tuple[str, str, str, str, str]:
@@ -200,13 +210,15 @@ def _model(row: pd.Series) -> str:
 
 def _ranges(rows: pd.DataFrame) -> Sheet:
     cells = []
-    for (alpha, law), own in split(rows, "alpha_deg", "force_law"):
+    fluids = _fluids(rows)
+    for (alpha, law, *fluid), own in split(rows, "alpha_deg", "force_law", *fluids):
         usable = own[valid(own)]
         cells.append(
             (
                 _slope(alpha),
                 _span(own["d_m"] * 1e3, "g") + " mm",
                 labels.value("force_law", law),
+                *_fluid(fluids, fluid),
                 _span(usable["shields"], ".4f"),
                 f"{usable['shields_low'].min():.4f} … {usable['shields_high'].max():.4f}"
                 if len(usable)
@@ -217,7 +229,8 @@ def _ranges(rows: pd.DataFrame) -> Sheet:
         )
     fraction = rows["fraction"].iloc[0]
     tau, *others = HEAD
-    return Sheet(("slope", "d", "forces", f"{tau} at n/N = {fraction:.0%}", *others), tuple(cells))
+    head = ("slope", "d", "forces", *_fluid_head(fluids), f"{tau} at n/N = {fraction:.0%}", *others)
+    return Sheet(head, tuple(cells))
 
 
 def grains(results: Results) -> Sheet | None:
@@ -225,7 +238,10 @@ def grains(results: Results) -> Sheet | None:
     rows, cells = results.joined("single_grain"), []
     if rows.empty:
         return None
-    for (alpha, law, method), own in split(rows, "alpha_deg", "force_law", "answered_method"):
+    fluids = _fluids(rows)
+    for (alpha, law, method, *fluid), own in split(
+        rows, "alpha_deg", "force_law", "answered_method", *fluids
+    ):
         usable = own[valid(own)]
         name = "shields_dem" if method == "dem" else "shields_closed_form"
         ustar = "ustar_m_s" if method == "dem" else "ustar_closed_form_m_s"
@@ -235,6 +251,7 @@ def grains(results: Results) -> Sheet | None:
                 _slope(alpha),
                 _span(own["d_m"] * 1e3, "g") + " mm",
                 labels.value("force_law", law),
+                *_fluid(fluids, fluid),
                 "DEM" if method == "dem" else "closed form",
                 _span(usable[name], ".4f"),
                 f"{usable[low].min():.4f} … {usable[high].max():.4f}" if len(usable) else "—",
@@ -243,7 +260,21 @@ def grains(results: Results) -> Sheet | None:
             )
         )
     tau, interval, ustar0, usable_ = HEAD
-    return Sheet(("slope", "d", "forces", "by", tau, interval, ustar0, usable_), tuple(cells))
+    told = ("slope", "d", "forces", *_fluid_head(fluids), "by")
+    return Sheet((*told, tau, interval, ustar0, usable_), tuple(cells))
+
+
+def _fluids(rows: pd.DataFrame) -> list[str]:
+    """The columns of fluids in which rows differ: they are never merged."""
+    return [one for one in ("rho_f_kg_m3", "nu_m2_s") if rows[one].nunique() > 1]
+
+
+def _fluid(columns: Sequence[str], values: Sequence[Any]) -> list[str]:
+    return [labels.value(*pair) for pair in zip(columns, values, strict=True)]
+
+
+def _fluid_head(columns: Sequence[str]) -> list[str]:
+    return [labels.words(one).symbol or labels.words(one).label for one in columns]
 
 
 def _span(values: pd.Series, form: str) -> str:

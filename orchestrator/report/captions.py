@@ -267,11 +267,16 @@ def flow(piles: list[Pile]) -> str:
     """Describe the picture of the flow."""
     return (
         f"Steady turbulent flow by OpenFOAM ({_values('turbulence_model', piles)}, rough wall), at "
-        f"the last iteration, for U_e = {_values('solve_u_e_m_s', piles)}; the fields of other "
-        "speeds are taken to be similar. White: streamlines, the closed ones "
+        f"the last iteration, for U_e = {_values('solve_u_e_m_s', piles)} at 10 h; the fields of "
+        "other speeds are taken to be similar. White: streamlines, the closed ones "
         "around the flow that runs back, at arbitrary spacing. Only the part near "
-        "the pile is shown: the lid is far above. To scale."
+        f"the pile is shown. {_lid(piles)}To scale."
     )
+
+
+def _lid(piles: Iterable[Pile]) -> str:
+    """A flow without a surface ends at a lid, beyond the picture."""
+    return "" if any(pile.scene.flow.depth for pile in piles) else "The lid is far above. "
 
 
 def wear() -> str:
@@ -292,8 +297,8 @@ def mesh(pile: Pile) -> str:
         "After Fig. 11 of the paper, which has triangles. Hexahedra, one cell deep, by gmsh: "
         f"{flow.cells_per_face} along each face of the pile; the first cells are "
         f"{flow.first_cell_m / z0:.3g} z₀ high, as the log law of the rough wall needs, and grow "
-        "away from the bed and from the pile. Above: near the pile, the lid is far above; below: "
-        "the crest, as boxed. To scale. No grains: the flow sees the smooth faces."
+        "away from the bed and from the pile. Above: near the pile; below: "
+        f"the crest, as boxed. {_lid([pile])}To scale. No grains: the flow sees the smooth faces."
     )
 
 
@@ -313,11 +318,16 @@ def bed(results: Results, pile: Pile) -> str:
         else ""
     )
     strip = f"all rows of a strip of {pile.bed.width:g} d from the side, " * bool(pile.bed.width)
+    flow = (
+        "The shade of blue is the speed of the flow by OpenFOAM over the bed without grains, over "
+        "that of the approaching flow at 10 h. "
+        if pile.model.cases
+        else ""
+    )
     return (
         f"After Fig. 13 of the paper. Grains {strip}{when}; orange: {moved}; pale "
-        "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. The shade of blue is "
-        "the speed of the flow by OpenFOAM over the whole pile, over that at the lid; it does not "
-        f"see the grains. {wears}d is one diameter. {_pile(results, pile)}"
+        "yellow: exposed, has not moved; beige: mobile under it; grey: fixed. "
+        f"{flow}{wears}d is one diameter. {_pile(results, pile)}"
     )
 
 

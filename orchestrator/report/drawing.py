@@ -2,7 +2,7 @@
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -117,7 +117,21 @@ _shared: list[Results] = []
 
 def _section(number: int, folder: Folder) -> list[Figure]:
     _, draws = SECTIONS[number]
-    return [saved(figure, folder) for draw in draws for figure in draw(_shared[0])]
+    return [figure for draw in draws for figure in _drawn(draw, folder)]
+
+
+def _drawn(draw: Draw, folder: Folder) -> Iterator[Figure]:
+    """The figures of a function; one that fails has its fault in its place.
+
+    The answer of a study does not depend on its pictures: none of them may cost the page.
+    """
+    figures = draw(_shared[0])
+    try:
+        for figure in figures:
+            yield saved(figure, folder)
+    except Exception as error:  # of any cause, such as too little memory
+        what = f"{draw.__module__.rpartition('.')[2]}: {type(error).__name__}: {error}"
+        yield Figure("", "", "", (), None, fault=what)
 
 
 def saved(figure: Figure, folder: Folder) -> Figure:

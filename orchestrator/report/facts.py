@@ -95,14 +95,14 @@ def single_grains(results: Results) -> Sheet | None:
     width = (found["ustar_high_m_s"] - found["ustar_low_m_s"]) / found["ustar_closed_form_m_s"] / 2
     table = found.assign(holds=valid(found), held=held(found), ratio=ratio, width=width)
     rows = []
-    for (law_name, holds, waiting_time), own in split(table, "force_law", "holds", "held"):
+    for (law_name, holds, waits), own in split(table, "force_law", "holds", "held"):
         equation = labels.value("force_law", law_name)
         far = (own["ratio"] - 1).abs()
         rows.append(
             (
                 equation,
                 "yes" if holds else "no",
-                "holds" if waiting_time else "ramps",
+                "holds" if waits else "ramps",
                 str(len(own)),
                 str(int(own["ratio"].isna().sum())),
                 f"{own['ratio'].mean() - 1:+.3%}",

@@ -28,6 +28,8 @@ class Figure:
         Whether the page shows it on demand alone.
     first : bool
         Whether it answers the study's question and stands before all others.
+    fault : str
+        Why it could not be drawn, in place of all else; empty of a figure.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Figure:
     data: Any = None
     fold: bool = False
     first: bool = False
+    fault: str = ""
 
     @property
     def leads(self) -> bool:

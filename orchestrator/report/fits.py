@@ -64,8 +64,8 @@ class Fit:
 
     def law_line(self, reynolds: FloatArray) -> FloatArray:
         """Tau at some Re*; NaN where the law does not hold."""
-        load_steps = theory.load_steps(self.law, reynolds, self.bed)
-        return np.where(load_steps, theory.shields(self.law, reynolds, self.bed), np.nan)
+        holds = theory.law_holds(self.law, reynolds, self.bed)
+        return np.where(holds, theory.shields(self.law, reynolds, self.bed), np.nan)
 
     def line(self, reynolds: FloatArray) -> FloatArray:
         """The same, NaN also where the study has no grains."""

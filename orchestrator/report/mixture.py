@@ -15,7 +15,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.physics import measured
 from orchestrator.report import labels, style
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, split
+from orchestrator.report.results import Results, drawable, split
 
 SHOWN = 45.0
 """Longest part of a bed that is drawn in one row, d: of a longer one its middle."""
@@ -45,7 +45,9 @@ def _beds(results: Results) -> Iterator[Figure]:
     firsts = rows.drop_duplicates("answered_method").sort_values("answered_method")["scene_id"]
     shown = rows[rows["scene_id"].isin(firsts)]
     # one that its pocket does not hold goes at no flow at all
-    reached = shown["ustar0_m_s"][np.isfinite(shown["ustar0_m_s"]) & (shown["ustar0_m_s"] > 0)]
+    reached = shown["ustar0_m_s"][drawable(shown, "ustar0_m_s")]
+    if reached.empty:
+        return
     norm = LogNorm(reached.min(), reached.max() * 1.001)
     for scene_id in firsts:
         yield _bed(results.plan.piles[scene_id], shown[shown["scene_id"] == scene_id], norm)

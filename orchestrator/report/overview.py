@@ -1,6 +1,7 @@
 """The extended Shields diagram: piles, single grains, force laws and measurements in one frame."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +14,23 @@ from orchestrator.report import captions, fits, labels, laws, shields, style, th
 from orchestrator.report.apart import SHAPES, varying
 from orchestrator.report.figure import Figure
 from orchestrator.report.fits import Fit
-from orchestrator.report.results import Results, by_dem, held, split, valid
+from orchestrator.report.results import (
+    Results,
+    by_dem,
+    drawable,
+    held,
+    nearest_fraction,
+    split,
+    valid,
+)
 
 NAME = "shields"
-FRACTION = 0.3
-"""n/N of the piles where there are many."""
 SAID = ("alpha_deg", "d_m", "z0_over_d", "force_law", "fraction")
 """Columns that a point tells of its scene."""
 FEW = 8
 """Piles of which every fraction is drawn."""
+BED = ("beta_deg", "z0_over_d", "alpha_s")
+"""Columns of all that a line depends on beside its law, on a flat bed."""
 LAWS = 3
 """Laws beyond which only the nearest to the measurements are drawn."""
 GRAIN = ("shields_dem", "shields_dem_low", "shields_dem_high")
@@ -50,7 +59,8 @@ def draw(results: Results) -> Iterator[Figure]:
     reach = [*theory.span(scenes), *_known(piles, "reynolds"), *_known(grains, "reynolds")]
     low, high = min(reach) / 1.6, max(reach) * 1.6
     reynolds = np.geomspace(low / 2, high * 2, theory.POINTS)
-    lines = [_law(ax, fit, reynolds) for fit in fits_]
+    thin = [[one.law for one in fits_[:at]].count(fit.law) for at, fit in enumerate(fits_)]
+    lines = [_law(ax, fit, reynolds, 1.4 / (1 + n)) for fit, n in zip(fits_, thin, strict=True)]
     shields.prepare([ax], [scenes], (low, high))
     tau = [*_known(piles, "shields"), *_known(grains, "shields_dem")]
     bottom, top = ax.get_ylim()
@@ -69,13 +79,7 @@ def shown_piles(results: Results) -> pd.DataFrame:
         return found
     if found["scene_id"].nunique() > FEW:
         found = found[found["fraction"] == nearest_fraction(found)]
-    return found[found["shields"].notna()]
-
-
-def nearest_fraction(thresholds: pd.DataFrame) -> float:
-    """The fraction nearest to 30 %."""
-    fractions = thresholds["fraction"].unique().tolist()
-    return float(min(fractions, key=lambda one: abs(one - FRACTION)))
+    return found[drawable(found, "reynolds", "shields")]
 
 
 def _grains(results: Results) -> pd.DataFrame:
@@ -84,19 +88,35 @@ def _grains(results: Results) -> pd.DataFrame:
     if grains.empty:
         return grains
     here = held(grains) & (grains["alpha_deg"] == grains["alpha_deg"].min())
-    chosen: pd.DataFrame = grains[here & grains["shields_dem"].notna()]
+    chosen: pd.DataFrame = grains[here & drawable(grains, "reynolds", "shields_dem")]
     return chosen
 
 
 def _lines(results: Results) -> list[Fit]:
-    """A line for each law: where a study has a flat bed, on the bed that fits best."""
-    flat = fits.best(fits.fits(results))
-    used = set(results.scenes["force_law"])
-    if flat:
-        return flat if len(flat) <= LAWS else [one for one in flat if one.decades > 0] or flat
-    scenes = results.scenes.assign(alpha_deg=0.0)
-    groups = ((name, scenes[scenes["force_law"] == name]) for name in laws.drawn(used))
-    return [Fit(name, theory.bed_of(own), *theory.span(own)) for name, own in groups if len(own)]
+    """The closed form of a flat bed as lines, of no other roughness than the points beside them.
+
+    The laws of piles have lines for the entrainment angle and the z0/d of the piles, of many z0/d
+    for the least and the largest. Other laws have one line, on the bed that fits the measurements
+    best. The two laws of the paper are one model: both have the same bed.
+    """
+    beds = [own for _, own in split(results.beds("pile").assign(alpha_deg=0.0), *BED)]
+    beds = beds if len(beds) <= 2 else [beds[0], beds[-1]]
+    of_piles = [
+        Fit(name, theory.bed_of(own), *theory.span(own))
+        for own in beds
+        for name in laws.drawn(own["force_law"])
+    ]
+    ranked = fits.fits(results)
+    best = fits.best(ranked)
+    best = best if len(best) <= LAWS else [fit for fit in best if fit.decades > 0] or best
+    shared = next((fit.bed for fit in best if fit.law in laws.PAIR), None)
+    drawn = {fit.law for fit in of_piles}
+    others = [
+        replace(fit, bed=shared) if shared and fit.law in laws.PAIR else fit
+        for fit in best
+        if fit.law not in drawn
+    ]
+    return [*of_piles, *others]
 
 
 def _known(table: pd.DataFrame, column: str) -> list[Any]:
@@ -170,15 +190,15 @@ def _said(row: pd.Series, columns: Sequence[str], extra: Sequence[str]) -> list[
     return [scene, threshold, str(row["why_not"]), case]
 
 
-def _law(ax: Axes, fit: Fit, reynolds: theory.FloatArray) -> Line2D:
+def _law(ax: Axes, fit: Fit, reynolds: theory.FloatArray, width: float) -> Line2D:
     """The line of a law on one bed; returns its entry for a legend."""
     colour, dash = laws.look(fit.law)
     tau, holds = (
         theory.shields(fit.law, reynolds, fit.bed),
-        theory.load_steps(fit.law, reynolds, fit.bed),
+        theory.law_holds(fit.law, reynolds, fit.bed),
     )
     own: style.Look = {"color": colour, "gid": shields.RESULT[0]}
-    ax.plot(reynolds, np.where(holds, tau, np.nan), ls=dash, lw=1.4, **own)
+    ax.plot(reynolds, np.where(holds, tau, np.nan), ls=dash, lw=width, **own)
     if fit.law not in laws.PAIR:
         ax.plot(reynolds, np.where(holds, np.nan, tau), ls=":", lw=0.9, **own)
-    return Line2D([], [], color=colour, ls=dash, lw=1.4, label=fit.name)
+    return Line2D([], [], color=colour, ls=dash, lw=width, label=fit.name)

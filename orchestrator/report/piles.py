@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator.report import captions, labels, laws, reference, shields, style, theory
 from orchestrator.report.apart import SHAPE, parted
 from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, split
+from orchestrator.report.results import Results, drawable, split
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
@@ -29,11 +29,9 @@ MARKERS = 30
 def fractions(results: Results) -> Iterator[Figure]:
     """Fig. 14: n/N against tau, figures of each slope."""
     curve = results.tables.get("pile_curve", pd.DataFrame())
-    curves = (
-        {str(one): own for (one,), own in split(curve[curve["moved"] > 0], "scene_id")}
-        if len(curve)
-        else {}
-    )
+    if len(curve):
+        curve = curve[(curve["moved"] > 0) & drawable(curve, "shields")]
+    curves = {str(one): own for (one,), own in split(curve, "scene_id")}
     scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
@@ -55,7 +53,7 @@ def fractions(results: Results) -> Iterator[Figure]:
 def extended(results: Results) -> Iterator[Figure]:
     """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
     found = results.joined("pile_threshold")
-    reached = found[found["shields"].notna()] if len(found) else found
+    reached = found[drawable(found, "reynolds", "shields")] if len(found) else found
     colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
     for (ratio,), rows in split(reached, "z0_over_d"):
         written = labels.ratio_of(float(str(ratio)), "d")

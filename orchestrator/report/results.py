@@ -5,16 +5,24 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan
 from orchestrator.runs.case import is_whole
+from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables
 
+FRACTION = 0.3
+"""n/N at which one threshold stands for all of its pile."""
 RAMP_BELOW = 3.0
 """Quiet time, sqrt(d/g'), below which a sequence of load steps is a ramp."""
+
+
+MEANS = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
+"""Columns of a threshold of which many seeds have the mean."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,25 @@ class Results:
         check = self.plan.checks.get(scene_id)
         return check if check and self.has_files(check) else self.plan.piles[scene_id]
 
+    @cached_property
+    def exemplars(self) -> pd.DataFrame:
+        """The piles of each slope at the fraction of the sentences, those that stand for it first.
+
+        Usable thresholds come first, then the largest grains, answers by DEM, a bed that changes,
+        and the least z0. Sentences and pictures are of the same scene.
+        """
+        piles = self.joined("pile_threshold")
+        if piles.empty:
+            return piles
+        here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
+        here = seeds_as_one(here)
+        order = here.assign(
+            valid=valid(here), dem=here["answered_method"] == "dem", wears=here["update"] > 0
+        )
+        by = ["valid", "d_m", "dem", "wears", "z0_over_d"]
+        order = order.sort_values(by, ascending=[False] * 4 + [True], kind="stable")
+        return order.sort_values("alpha_deg", kind="stable")
+
     def asked(self, pile: Pile) -> pd.Series:
         """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""
         found = next(asked for asked, one in self.plan.piles.items() if one is pile)
@@ -81,12 +108,51 @@ class Results:
         return {flow.name: pile for pile in piles for flow in pile.model.cases if flow.name in done}
 
 
+def nearest_fraction(thresholds: pd.DataFrame) -> float:
+    """The fraction of the sentences: the nearest to 30 %."""
+    fractions = thresholds["fraction"].unique().tolist()
+    return float(min(fractions, key=lambda fraction: abs(fraction - FRACTION)))
+
+
 def split(
     table: pd.DataFrame, *columns: str
 ) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
     """The parts of a table that agree in some columns, with what they agree in, in rising order."""
     if len(table):
         yield from table.groupby(list(columns), sort=True, dropna=False)
+
+
+def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
+    """Thresholds of piles that differ in their seed alone as one row, with all others as they are.
+
+    The row has the means over the usable seeds, over all where none is usable; the interval holds
+    those of all these seeds. The column ``seeds`` has their number, ``of_seeds`` that of all.
+    """
+    if rows.empty or rows["seed"].nunique() < 2:
+        return (
+            rows.assign(least=rows["shields"], largest=rows["shields"], seeds=1, of_seeds=1)
+            if len(rows)
+            else rows
+        )
+    merged = []
+    for _, twins in rows.groupby(
+        [*fields.others(rows, "seed"), "fraction"], dropna=False, sort=False
+    ):
+        chosen = twins[valid(twins)] if valid(twins).any() else twins
+        row = chosen.iloc[0].copy()
+        row[MEANS] = chosen[MEANS].mean()
+        row["least"], row["largest"] = chosen["shields"].min(), chosen["shields"].max()
+        row["shields_low"] = chosen[["shields_low", "shields_high"]].min(axis=None)
+        row["shields_high"] = chosen[["shields_low", "shields_high"]].max(axis=None)
+        row["seeds"], row["of_seeds"] = len(chosen), len(twins)
+        merged.append(row)
+    return pd.DataFrame(merged)
+
+
+def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
+    """Which rows have a place on logarithmic axes of some columns: finite and above zero."""
+    values = table[list(columns)]
+    return ((values > 0) & (values < np.inf)).all(axis=1)
 
 
 def held(table: pd.DataFrame) -> pd.Series:

@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from orchestrator.bed.line import BedLine
 from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
@@ -33,6 +34,10 @@ GRAINS: Look = {"color": "#f0a35e", "lw": 3.0}
 REVERSED: Look = {"color": "0.85", "lw": 0}
 BEFORE, BEHIND = 4.0, 10.0
 """Bed shown before the windward and behind the lee toe, h."""
+GAP = 3.0
+"""Distance of neighbouring counted grains, over the median one, across which no line joins them."""
+FLAT = 0.05
+"""Height over the level beside a form up to which the bed belongs to that level, h."""
 Kind = tuple[float, float, str]
 SOLVED = [name for name, one in fields.COLUMNS.items() if one.info.scope == "solved flows"]
 NOTABLE_RATIO = 1.5
@@ -124,10 +129,16 @@ def _draw_grains(ax: Axes, results: Results, pile: Pile) -> None:
     grains = results.joined("pile_grain")
     if grains.empty:
         return
-    own = grains[grains["flow_case"] == pile.flow.name].sort_values(["stress", "scene_id", "s_m"])
+    own = grains[grains["flow_case"] == pile.flow.name]
+    if own.empty:
+        return
+    own = own.sort_values(["stress", "scene_id", "s_m"])
     one = own[own["scene_id"].isin(own["scene_id"].tail(1))]
-    x = one["x_m"] / pile.bed.height
-    ax.plot(x, one["ustar_over_ustar0"], gid="grains", zorder=1.5, **GRAINS)
+    x, felt = (one[name].to_numpy(float) for name in ("x_m", "ustar_over_ustar0"))
+    step = np.diff(one["s_m"].to_numpy(float), prepend=np.nan)
+    first = step > GAP * np.nanmedian(step)  # of the counted grains behind a gap
+    x, felt = (np.insert(values, np.flatnonzero(first), np.nan) for values in (x, felt))
+    ax.plot(x / pile.bed.height, felt, gid="grains", zorder=1.5, **GRAINS)
 
 
 def _profile(ax: Axes, x: FloatArray, z: FloatArray) -> None:
@@ -140,10 +151,29 @@ def _profile(ax: Axes, x: FloatArray, z: FloatArray) -> None:
 
 def _mark_corners(axes: tuple[Axes, Axes], pile: Pile) -> None:
     line, h = pile.model.line, pile.bed.height
-    for x, name in ((0.0, "toe"), (line.crest[0] / h, "crest"), (line.x[-2] / h, "lee toe")):
+    for name, at in corners(line).items():
+        x = line.x[at] / h
         for ax in axes:
             ax.axvline(x, color="0.6", lw=0.6, ls=(0, (4, 2)), zorder=0, gid=name)
         style.upright_note(axes[0], x - 0.1, name, at="top")
+
+
+def corners(line: BedLine) -> dict[str, int]:
+    """The corners of a bed line where its forms begin, are highest and end; none of a level bed.
+
+    Before the toe the bed stays near the level of its first end, behind the lee toe near that of
+    its last one; a step has one foot only.
+    """
+    z, near = np.array(line.z), FLAT * line.h
+    if np.ptp(z) == 0:
+        return {}
+    toe = int(np.argmax(np.abs(z - z[0]) > near)) - 1
+    lee = len(z) - int(np.argmax(np.abs(z - z[-1])[::-1] > near))
+    highest = np.flatnonzero(z == z.max())
+    crest = int(highest[0] if highest[0] > 0 else highest[-1])
+    marked = {"toe": toe, "crest": crest, "lee toe": lee}
+    none = {"toe": toe >= crest, "lee toe": lee <= crest}
+    return {name: at for name, at in marked.items() if not none.get(name)}
 
 
 def _legend(figure: Canvas, felt: bool) -> None:

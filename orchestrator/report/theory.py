@@ -70,7 +70,7 @@ def branch(law: str, scenes: pd.DataFrame, reynolds: FloatArray) -> Branch:
     """The line of a law at some Re*, for the bed of some scenes."""
     bed, here = bed_of(scenes), scenes[scenes["force_law"] == law]
     first, last = span(here) if len(here) else (np.inf, 0.0)
-    valid = load_steps(law, reynolds, bed)
+    valid = law_holds(law, reynolds, bed)
     near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
     return Branch(law, reynolds, shields(law, reynolds, bed), valid, near & ~valid)
 
@@ -103,7 +103,7 @@ def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
     )
 
 
-def load_steps(law: str, reynolds: FloatArray, bed: Bed) -> NDArray[np.bool_]:
+def law_holds(law: str, reynolds: FloatArray, bed: Bed) -> NDArray[np.bool_]:
     """Whether a law holds at some Re*."""
     return LAWS[law].valid(reynolds, _unit(bed.roughness_ratio, bed.lift_coefficient))
 

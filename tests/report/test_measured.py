@@ -77,8 +77,8 @@ def test_ranges_are_where_a_law_is_between_the_percentiles(law: str) -> None:
     for low, high in fits.runs(fit.met):
         inside |= (low < fits.GRID) & (high > fits.GRID)
     tau = theory.shields(law, fits.GRID, BED)
-    load_steps = theory.load_steps(law, fits.GRID, BED)
-    for x, y, valid, found in zip(fits.GRID, tau, load_steps, inside, strict=True):
+    holds = theory.law_holds(law, fits.GRID, BED)
+    for x, y, valid, found in zip(fits.GRID, tau, holds, inside, strict=True):
         (one,) = [b for b in BUFFINGTON_MONTGOMERY if b.low <= x < b.high]
         assert found == (valid and one.tenth <= y <= one.ninetieth)
     assert fit.decades == pytest.approx(

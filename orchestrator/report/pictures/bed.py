@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from numpy.typing import NDArray
 from PIL import Image
 
 from orchestrator.bed.line import BedLine
@@ -20,11 +19,12 @@ from orchestrator.grains.method import Dem
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.report import captions, labels, page
+from orchestrator.report.apart import varying
 from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import flow
-from orchestrator.report.results import Results, split, valid
+from orchestrator.report.results import Results, split
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
 Window = tuple[float, float, float, float]
 """Left, right, bottom, top, d."""
 
@@ -34,67 +34,89 @@ LONG = 100.0
 """Length of a face, d, beyond which its upper end is shown alone: grains must be seen."""
 MOST = 4.0
 """Length of a whole bed over that: the faces of a train of short forms are many."""
+STOPS = 300
+"""Most stops of the slider of a bed without dynamics."""
 SHIFT = 0.02
 """Grains that have moved by less since they were last drawn stay, d."""
 
 
 @dataclass(frozen=True)
 class Steps:
-    """The n grains of a pile at the end of each of its K load steps, lengths in d.
+    """The n drawn grains of a pile at K + 1 stops of the slider, lengths in d.
 
     Attributes
     ----------
     pile : Pile
         The pile.
+    grains : ndarray of int, shape (n,)
+        The drawn grains, as the packing numbers them.
     places : ndarray, shape (K + 1, n, 2)
         x and z, first as packed; NaN of a grain that has left the box.
     level : ndarray of int, shape (n,)
-        Load step in which a grain moved; 0 if it never did, or is not counted.
+        Stop by which a grain has moved; 0 if it never does, or is not counted.
     flow : ndarray, shape (K + 1,)
         Undisturbed friction velocity, m/s.
+    totals : ndarray of int, shape (K + 1,)
+        How many of the counted grains, drawn or not, have moved.
     lines : tuple of (int, BedLine)
-        The bed lines, each with the first load step under its flow; one, on a frozen bed.
+        The bed lines, each with the first stop under its flow; one, on a frozen bed.
     """
 
     pile: Pile
+    grains: IntArray
     places: FloatArray
-    level: NDArray[np.int64]
+    level: IntArray
     flow: FloatArray
+    totals: IntArray
     lines: tuple[tuple[int, BedLine], ...]
 
-    def moved(self, step: int) -> int:
-        """How many of the counted grains have moved by the end of a load step."""
-        return int(((self.level > 0) & (self.level <= step)).sum())
+    def moved(self, stop: int) -> int:
+        """How many of the counted grains have moved at a stop."""
+        return int(self.totals[stop])
 
     def first(self, fraction: float) -> int:
-        """The first load step at whose end a fraction has moved; the last if none has."""
-        needed = fraction * self.pile.packing.count - 1e-9
-        steps = range(len(self.places))
-        return next((k for k in steps if self.moved(k) >= needed), len(self.places) - 1)
+        """The first stop at which a fraction of the counted grains has moved, or the last."""
+        enough = self.totals >= fraction * self.pile.packing.count - 1e-9
+        return int(np.argmax(enough)) if enough.any() else len(self.totals) - 1
 
 
 def read(pile: Pile, cases: Path) -> Steps:
-    """Read where the grains of a finished pile are: without DEM, where they were packed."""
-    packing = pile.packing
-    found, level = pile.motion(cases), np.zeros(len(packing.centres), np.int64)
-    level[packing.windward] = found.level
+    """Read where the grains of a finished pile are: without DEM, where they were packed.
+
+    Only grains within the picture are read, at `STOPS` of the load steps if there are more: all
+    grains of a long bed at all load steps would need many gigabytes.
+    """
+    packing, found = pile.packing, pile.motion(cases)
+    (left, right, bottom, _), (x, z) = window(pile), packing.centres.T
+    inside = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
+    rolling = packing.mobile if isinstance(pile.method, Dem) else False
+    grains = np.flatnonzero(inside | rolling)
+    counted = np.zeros(len(x), np.int64)
+    counted[packing.windward] = found.level
     if isinstance(pile.method, Dem):
         after = [_by_dem(pile, cases / run.name) for run in pile.method.runs]
-        places = np.concatenate([packing.centres[None], *after])
+        every = np.concatenate([packing.centres[None], *after])
+        places, stops = every[:, grains], np.arange(len(every))
     else:
-        places = np.broadcast_to(packing.centres, (len(found.flow), *packing.centres.shape))
-    lines = ((0, pile.line), *_lines(pile, found, cases))
+        share = int(np.argmax(found.moved >= FRACTION * found.count - 1e-9))
+        spaced = np.linspace(0, len(found.flow) - 1, min(STOPS, len(found.flow)))
+        stops = np.unique([*spaced.round().astype(int), share])
+        places = np.broadcast_to(packing.centres[grains], (len(stops), len(grains), 2))
+    lines = ((0, pile.line), *_lines(pile, found, stops, cases))
+    level = np.where(counted > 0, np.searchsorted(stops, counted), 0)[grains]
     if len(lines) > 1:
-        gone = (level > 0) & (level <= np.arange(len(places))[:, None])
+        gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
         places = np.where(gone[..., None], np.nan, places)
-    return Steps(pile, places, level, found.flow[: len(places)], lines)
+    return Steps(pile, grains, places, level, found.flow[stops], found.moved[stops], lines)
 
 
-def _lines(pile: Pile, found: Motion, cases: Path) -> Iterator[tuple[int, BedLine]]:
-    """Each bed line with the step at which the first grain moves under its flow."""
+def _lines(
+    pile: Pile, found: Motion, stops: IntArray, cases: Path
+) -> Iterator[tuple[int, BedLine]]:
+    """Each bed line with the stop at which the first grain moves under its flow."""
     for worn in pile.flows[1:]:
         left = wear.grains(pile, worn, cases).left
-        before = int(np.searchsorted(found.moved, np.isfinite(left).sum(), side="right"))
+        before = int(np.searchsorted(found.moved[stops], np.isfinite(left).sum(), side="right"))
         yield before, wear.line(pile, worn, cases)
 
 
@@ -113,14 +135,16 @@ def _by_dem(pile: Pile, directory: Path) -> FloatArray:
 
 def draw(results: Results) -> Iterator[Figure]:
     """One figure for each slope, by rising slope; the first stands for the study."""
-    for number, pile in enumerate(chosen(results)):
+    if results.exemplars.empty:
+        return
+    telling = varying(results.exemplars, "alpha_deg", "d_m")
+    for number, (row, pile) in enumerate(chosen(results)):
         steps = read(pile, results.cases)
         shown = steps.first(FRACTION)
         yield Figure(
             f"bed-alpha{pile.bed.slope_deg:g}",
             f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
-            f"{labels.plain('alpha_deg', pile.bed.slope_deg)}, "
-            f"{labels.plain('d_m', pile.scene.grain.diameter)}",
+            + ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling])),
             captions.bed(results, pile) + _part(pile),
             tuple(one.name for one in reversed(pile.runs)),
             None,
@@ -130,19 +154,14 @@ def draw(results: Results) -> Iterator[Figure]:
         )
 
 
-def chosen(results: Results) -> Iterator[Pile]:
-    """The pile that stands for all of its slope: of the largest grains, usable if any is.
+def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
+    """The threshold of each slope that the sentences are about, with the pile that shows it.
 
-    One by DEM comes before others, one that changes before one that is frozen; one whose files were
-    pruned stands for nothing.
+    Where the files of that pile were pruned, the next one has its place.
     """
-    for _, rows in split(results.joined("pile_threshold"), "alpha_deg"):
-        order = rows.assign(valid=valid(rows)).sort_values(
-            ["valid", "d_m", "z0_over_d"], ascending=[False, False, True], kind="stable"
-        )
-        piles = [results.shown(str(scene_id)) for scene_id in order["scene_id"]]
-        piles.sort(key=lambda pile: (not pile.by_dem, not pile.scene.protocol.update))
-        yield from itertools.islice(filter(results.has_files, piles), 1)
+    for _, rows in split(results.exemplars, "alpha_deg"):
+        piles = ((row, results.shown(str(row["scene_id"]))) for _, row in rows.iterrows())
+        yield from itertools.islice((pair for pair in piles if results.has_files(pair[1])), 1)
 
 
 def data(steps: Steps, shown: int) -> dict[str, Any]:
@@ -150,7 +169,7 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
 
     ``frames`` has three numbers for each such grain: its number, x and -z; null if it has left.
     """
-    mobile = steps.pile.packing.mobile
+    mobile = steps.pile.packing.mobile[steps.grains]
     last, frames = steps.places[0, mobile].copy(), []
     for places in steps.places[1:, mobile]:
         gone = np.isnan(places[:, 0])
@@ -162,7 +181,7 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         "shown": shown,
         "count": steps.pile.packing.count,
         "flow": [float(f"{flow:.4g}") for flow in steps.flow],
-        "moved": [steps.moved(k) for k in range(len(steps.places))],
+        "moved": steps.totals.tolist(),
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
         "frames": [list(itertools.chain(*frame)) for frame in frames],
@@ -221,9 +240,10 @@ def _is_short(pile: Pile) -> bool:
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
     pile, (left, right, bottom, top) = steps.pile, window(steps.pile)
     packing, places = pile.packing, steps.places[shown]
-    here = np.where(np.isnan(places), packing.centres, places)
-    inside = (packing.centres[:, 0] > left - 1) & (packing.centres[:, 1] > bottom - 1)
-    base = np.where(packing.windward, "e", "m")
+    centres, sizes = packing.centres[steps.grains], packing.sizes[steps.grains]
+    mobile, counted = packing.mobile[steps.grains], packing.windward[steps.grains]
+    here = np.where(np.isnan(places), centres, places)
+    base = np.where(counted, "e", "m")
     moved = (steps.level > 0) & (steps.level <= shown)
     look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
     return page.fill(
@@ -238,11 +258,11 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         line=[path for step, path in _paths(steps) if step <= shown][-1],
         wears=len(steps.lines) > 1,
         flow=_flow(pile, cases, (left, right, bottom, top)),
-        fixed=_circles(packing.centres, packing.sizes, ~packing.mobile & inside),
+        fixed=_circles(centres, sizes, ~mobile),
         mobile=zip(
-            _circles(here, packing.sizes, packing.mobile),
-            look[packing.mobile],
-            base[packing.mobile],
+            _circles(here, sizes, mobile),
+            look[mobile],
+            base[mobile],
             strict=True,
         ),
         bar=_bar(right - left),
@@ -254,7 +274,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
 
 
 def _circles(
-    places: FloatArray, sizes: FloatArray, chosen: NDArray[np.bool_]
+    places: FloatArray, sizes: FloatArray, chosen: BoolArray
 ) -> list[tuple[str, str, str]]:
     rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
     return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]

@@ -25,6 +25,7 @@ BEFORE, BEHIND, ABOVE = 2.0, 8.0, 3.0
 MOST = 6
 """Panels of a figure."""
 COLUMNS = 1000
+SPEED = r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$"
 SMOOTHED = 6.0
 """Standard deviation of the smoothing of streamlines along x, columns."""
 
@@ -60,7 +61,7 @@ def _window(piles: list[Pile]) -> Window:
 
 
 def sampled(pile: Pile, cases: Path, window: Window, unit: float) -> FloatArray:
-    """The velocity over a pile in a window over the one at the lid; the window is in a unit, m."""
+    """The velocity over a pile in a window, over U_e; the window is in units of `unit`, m."""
     left, right, bottom, top = window
     rows = round(COLUMNS * (top - bottom) / (right - left))
     metres = left * unit, right * unit, bottom * unit, top * unit
@@ -80,7 +81,7 @@ def _frame(results: Results, piles: list[Pile]) -> Canvas:
         ax.set_title(stress.title(results, pile), loc="left")
     axes[-1].set_xlabel("$x/h$ from the windward toe")
     bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
-    bar.set_label(r"speed over that at the lid, $|\mathbf{u}|/U_e$")
+    bar.set_label(SPEED)
     return figure
 
 
