@@ -68,7 +68,9 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     assert all(len(row) == len(sheet.head) for row in sheet.rows)
     without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
     exact = replace(grains, tables={**grains.tables, "single_grain": without})
-    (method,) = {row[3] for row in getattr(answer.sheet(exact), "rows", ())}
+    sheet = answer.sheet(exact)
+    assert sheet is not None
+    (method,) = {row[sheet.head.index("by")] for row in sheet.rows}
     assert method == "closed form"
     assert "One grain" in answer.sentences(exact)[0]
 
