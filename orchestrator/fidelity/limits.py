@@ -22,7 +22,7 @@ from orchestrator.flow.theory import half_length, seen_by_the_flow
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study.parts import PileBed, UnfitError
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import MOST_GRAINS, Scene
 from orchestrator.study.study import Study
 
 
@@ -124,6 +124,10 @@ def _bed_line(scene: Scene) -> str | None:
         line = of_bed(bed)
         if bed.packing == "poured" and bed.obstacles:
             return "no grains can be poured around obstacles"
+        length = line.x[-2] - line.x[1]
+        if length > MOST_GRAINS * scene.grain.diameter:
+            count = length / scene.grain.diameter
+            return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
         if not bed.is_wedge and bed.packing != "poured":
             _ = LoadedBed(scene).packing
     except UnfitError as error:

@@ -42,7 +42,7 @@ MOST_POURED_STIFFNESS = 1e5
 LEAST_WIDTH = 3.0
 """Least width of a strip, diameters of its largest grain: none touches another from both sides."""
 MOST_GRAINS = 1e5
-"""Length of a profile, diameters."""
+"""Largest length of a bed, diameters."""
 NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 """Least distance of two points of a profile, over the diameter and over the height of the first
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg

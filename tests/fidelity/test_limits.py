@@ -146,3 +146,19 @@ def test_a_frozen_bed_is_known_to_move_a_row() -> None:
     for other in (PILE.replace("solve", "hill"), PILE + "[protocol]\nupdate = 0.1\n"):
         (scene,) = _parse(other).scenes
         assert math.isnan(limits.frozen_bed(scene, 0.7))
+
+
+@pytest.mark.parametrize(
+    "bed",
+    [
+        'shape = "flat", length = 1e4',
+        "slope_deg = 15.0, forms = 2, spacing = 1e4",
+        'shape = "dune", slope_deg = 12.0, height = 20.0',
+        'slope_deg = 20.0, obstacles = [{ kind = "fence", x = -500.0, height = 0.01 }]',
+    ],
+)
+def test_the_length_of_a_bed_in_grains_is_limited(bed: str) -> None:
+    text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ kind = "pile", {bed} }}\n'
+    asked = study.parse(text.replace("1e-3", "1e-4"), name="long", where="long.toml")
+    with pytest.raises(InputError, match=r"m of bed are .* grains, more than 100000"):
+        limits.check_study(asked)
