@@ -27,6 +27,7 @@ from orchestrator.study.scene import default_first_cell_height
 from tests.flow.conftest import PILE, SLOW, Solve, allrun
 from tests.flow.test_mesh import edit
 
+MESH_FILES = ("points", "faces", "owner", "neighbour", "boundary")
 FACE = PILE.height_m / np.sin(np.radians(PILE.slope_deg))
 
 
@@ -374,3 +375,23 @@ def test_the_default_first_cell() -> None:
     assert default_first_cell_height(0.02, 4e-4) == pytest.approx(1e-3)
     assert default_first_cell_height(0.02, 1e-6, viscous=4e-4) == pytest.approx(1e-3)
     assert default_first_cell_height(0.02, 5e-3) == pytest.approx(5e-3)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small file system")
+def test_a_mesh_that_a_full_disk_cuts_is_not_solved_on(template: Path, tmp_path: Path) -> None:
+    """On a part of a mesh setExprFields ends with a signal, or runs without an end."""
+    small = tmp_path / "small"
+    small.mkdir()
+    for size in range(896, 936, 4):
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(small)]
+        if subprocess.run(mount, capture_output=True).returncode != 0:
+            pytest.skip("no file system can be mounted here")
+        try:
+            copy = Path(shutil.copytree(template, small / "pile"))
+            subprocess.run(["./Allrun"], cwd=copy, timeout=60, capture_output=True)
+            mesh = copy / "constant" / "polyMesh"
+            files = [mesh / name for name in MESH_FILES]
+            whole = all(f.is_file() and f.read_text().rstrip().endswith("* //") for f in files)
+            assert whole or not (copy / "log.setExprFields").exists()
+        finally:
+            subprocess.run(["umount", str(small)], check=True)
