@@ -4,13 +4,7 @@ A study file goes in; OpenFOAM and LIGGGHTS cases, tables, figures and a page co
 functions are public: `threshold`, `run` and `open`.
 """
 
-import os
-import re
 from typing import TYPE_CHECKING, Any
-
-# of builds; but libraries read it when they are imported, and fail where it is no time
-if not re.fullmatch("[0-9]{1,11}", os.environ.get("SOURCE_DATE_EPOCH", "0")):
-    del os.environ["SOURCE_DATE_EPOCH"]
 
 if TYPE_CHECKING:
     from orchestrator.face import open, run, threshold

@@ -15,7 +15,13 @@ from typing import TYPE_CHECKING, Any
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
-from orchestrator.errors import OrchestratorError, is_of_import, of_shortage, of_system
+from orchestrator.errors import (
+    OrchestratorError,
+    is_of_import,
+    is_of_shortage,
+    of_shortage,
+    of_system,
+)
 from orchestrator.runs import signals, streams
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
@@ -29,7 +35,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
     signals.listen()
     streams.take()
+    # numpy raises at import where this variable is not an integer
+    if not re.fullmatch("[0-9]{1,11}", os.environ.get("SOURCE_DATE_EPOCH", "0")):
+        del os.environ["SOURCE_DATE_EPOCH"]
     warnings.showwarning = _show_warning
+    # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
+    warnings.simplefilter("default", UserWarning)
     options = _parser().parse_args(arguments)
     code = _code(options)
     lost = streams.lost()
@@ -45,14 +56,16 @@ def _code(options: argparse.Namespace) -> int:
     except OrchestratorError as error:
         print(f"orchestrator: {error}", file=sys.stderr)
         return error.exit_code
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("orchestrator: stopped; the same command continues", file=sys.stderr)
+        if is_of_import(stop):  # OpenBLAS raises SIGINT where it can start no thread
+            print("orchestrator: or no thread can be started: see ulimit -u", file=sys.stderr)
         return INTERRUPTED
     except OSError as error:
         print(f"orchestrator: {of_system(error)}", file=sys.stderr)
         return 1
     except Exception as error:
-        if not isinstance(error, MemoryError | ImportError) and not is_of_import(error):
+        if not is_of_shortage(error) and not is_of_import(error):
             raise
         print(f"orchestrator: {of_shortage(error)}", file=sys.stderr)
         return 1

@@ -119,14 +119,26 @@ def _path(name: str | bytes | int | None) -> str:
     return "" if name is None or isinstance(name, int) else os.fsdecode(name)
 
 
-def is_of_import(error: Exception) -> bool:
+def is_of_import(error: BaseException) -> bool:
     """Whether an exception came from a module that was being imported."""
     frames = traceback.extract_tb(error.__traceback__)
     return isinstance(error, SyntaxError) or any(one.name == "<module>" for one in frames)
 
 
+_NO_THREAD = "can't start new thread"
+
+
+def is_of_shortage(error: Exception) -> bool:
+    """Whether memory or threads are lacking, or a library does not load."""
+    return isinstance(error, MemoryError | ImportError) or _NO_THREAD in str(error)
+
+
 def of_shortage(error: Exception) -> OrchestratorError:
-    """The message of memory that is not there, or of a library that does not load."""
+    """The message of memory or threads that are lacking, or of a library that does not load."""
+    if _NO_THREAD in str(error):
+        return OrchestratorError(
+            "no more threads can be started", remedy="fewer --workers, or a higher limit: ulimit -u"
+        )
     if not isinstance(error, MemoryError) and "failed to map" not in str(error):
         return OrchestratorError(
             f"a library does not load: {error}", remedy="`orchestrator doctor` says what is missing"

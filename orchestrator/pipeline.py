@@ -109,11 +109,25 @@ def run(
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
-    """Say in the directory what is asked for; whether it is something else than before."""
+    """Write into the directory what is asked for; whether it is something else than before.
+
+    Raises
+    ------
+    InputError
+        If the directory is of another study file of the same name, which is still there.
+    """
     about = {"study": study.text, "tolerance": study.tolerance}
     before = told(space.root, STUDY) or {}
-    space.describe(STUDY, study.name, list(planned.cases), **about)
-    return any(before.get(key, value) != value for key, value in about.items())
+    changed = any(before.get(key, value) != value for key, value in about.items())
+    file = str(before.get("file", ""))
+    if changed and file not in ("", study.file) and Path(file).is_file():
+        raise InputError(
+            f"the directory holds the study of another file, {file}",
+            where=str(space.root),
+            remedy="choose another with --out",
+        )
+    space.describe(STUDY, study.name, list(planned.cases), **about, file=study.file)
+    return changed
 
 
 def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
@@ -155,10 +169,12 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
-    with space.held(STUDY, study.name):
+    with space.held(STUDY, study.name, new=False):
+        states = planned.done(space.cases)
+        space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, planned.done(space.cases), failures, guests)
+        draw(study, planned, space, states, failures, guests)
         return Finished(space.page, 0, failures, (), _answer(study, planned, space))
 
 
@@ -178,7 +194,7 @@ def prune(directory: Path) -> pruning.Pruned:
     """
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
-    with space.held(STUDY, study.name):
+    with space.held(STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}

@@ -158,6 +158,7 @@ def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s
     write_json(
         directory / DONE,
         {
+            "id": case.id,
             "ended": "done",
             "solver_s": solver_s,
             "cpu_s": cpu_s,
@@ -210,34 +211,29 @@ def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
     identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
     if not isinstance(identity, dict) or identity.get("id") != case.id:
         return None
-    return state if isinstance(state, dict) and _vouched(directory, state) else None
+    if not isinstance(state, dict) or state.get("id") != case.id:
+        return None
+    return state if _vouched(case, directory, state) else None
 
 
 def prune(case: Case, cases: Path) -> None:
     """Drop the bulky files of a case that is done: those that its run left, no others.
 
-    Their digests stay in the marker, beside a list of what was dropped, and in `CHECKSUMS`: a
-    rerun by hand is still compared with the run that the tables were made of.
-
-    Raises
-    ------
-    InputError
-        If a link stands in the place of a file or directory of the run.
+    Their digests stay in the marker and in `CHECKSUMS`: a rerun by hand is still compared with the
+    run that the tables were made of. No link is followed. A disk without any room is no obstacle.
     """
     directory, state = cases / case.name, done_state(case, cases)
     if state is None:
         return
-    names = [name for name in state.get("stamps", {}) if _fits(name, case.bulky)]
-    found = (Folder(directory).path(name) for name in names)
-    files = [path for path in found if path.is_file()]
-    pruned = sorted({*names, *state.get("pruned", [])})
-    marker = directory / DONE
-    left = size_of(directory) - sum(path.stat().st_size for path in (*files, marker))
-    # first what makes up for the files: killed in between, the case is still done
-    write_json(marker, {**state, "pruned": pruned, "bytes": left})
+    left_by_run = {directory / name for name in state["stamps"]}
+    files = [path for path in _matching(directory, case.bulky) if path in left_by_run]
     for path in files:
         path.unlink()
     remove_empty_folders(directory, (path.parent for path in files))
+    marker = directory / DONE
+    size_without_marker = size_of(directory) - marker.stat().st_size
+    if state["bytes"] != size_without_marker:
+        write_json(marker, {**state, "bytes": size_without_marker})
 
 
 def size(directory: Path, state: Mapping[str, Any]) -> int:
@@ -254,7 +250,7 @@ def is_whole(case: Case, cases: Path) -> bool:
     state = read_json(cases / case.name / DONE)
     if not isinstance(state, dict):
         return False
-    return all((cases / case.name / name).is_file() for name in state.get("pruned", []))
+    return all((cases / case.name / name).is_file() for name in state.get("stamps", {}))
 
 
 def names_in(cases: Path) -> list[str]:
@@ -274,20 +270,18 @@ def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def _vouched(directory: Path, state: dict[str, Any]) -> bool:
+def _vouched(case: Case, directory: Path, state: dict[str, Any]) -> bool:
+    """Whether the files of a case are those of its marker; bulky files may be missing."""
+    digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
     try:
-        digests = {**state["results_sha256"], **state["derived_sha256"]}
-        if not state["wall_s"] >= state["solver_s"] >= 0:
-            return False
-        dropped = {name for name in state.get("pruned", []) if not (directory / name).exists()}
-        stamps, marked = state.get("stamps", {}), (directory / DONE).stat().st_mtime_ns
+        marked = (directory / DONE).stat().st_mtime_ns
         return bool(digests) and all(
-            name in dropped
+            (_fits(name, case.bulky) and not os.path.lexists(directory / name))
             or _untouched(directory / name, stamps.get(name), marked)
             or digest_file(directory / name) == digest
             for name, digest in digests.items()
         )
-    except (AttributeError, KeyError, TypeError, OSError):
+    except OSError:
         return False
 
 

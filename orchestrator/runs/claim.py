@@ -58,7 +58,7 @@ KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 
 
 @contextlib.contextmanager
-def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
+def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[Folder]:
     """Make a directory, or take it up again, and hold it while the block runs.
 
     Parameters
@@ -69,6 +69,8 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
         What is to be written there.
     name : str
         The one thing of that kind: of a study its name, of results their solver.
+    new : bool, optional
+        Whether a directory without a marker gets one.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def claimed(root: Path, kind: Kind, name: str) -> Iterator[Folder]:
             ) from None
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(LOCK, RECORD, kind.marker, *kind.names)
-        if told(root, kind) is None:
+        if new and told(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
         yield folder
 

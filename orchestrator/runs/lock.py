@@ -159,7 +159,8 @@ def _refusal(other: Holder | None, path: Path) -> OrchestratorError:
 
 @contextlib.contextmanager
 def _by_system(stream: IO[str]) -> Iterator[None]:
-    _write(stream, _text(this_process()))
+    with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
+        _write(stream, _text(this_process()))
     try:
         yield
     finally:

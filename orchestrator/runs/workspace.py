@@ -1,5 +1,6 @@
 """A study's directory on disk: what it is called inside, which study it is."""
 
+import csv
 from collections.abc import Container
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -7,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator import __version__
-from orchestrator.errors import InputError, of_system
+from orchestrator.errors import InputError, OrchestratorError, of_system
 from orchestrator.runs import lock
 from orchestrator.runs.case import names_in
 from orchestrator.runs.claim import LOCK, STUDY, Kind, claimed, told
@@ -51,9 +52,32 @@ class Workspace:
         """Where `STATE` is."""
         return self.root / STATE
 
-    def held(self, kind: Kind, name: str) -> AbstractContextManager[Folder]:
+    def held(self, kind: Kind, name: str, *, new: bool = True) -> AbstractContextManager[Folder]:
         """Hold the directory, as `claim.claimed` does."""
-        return claimed(self.root, kind, name)
+        return claimed(self.root, kind, name, new=new)
+
+    def check_cases_of_tables(self, done: Container[str]) -> None:
+        """See that the cases that the tables were made of are still done.
+
+        Raises
+        ------
+        OrchestratorError
+            If any is not: new tables would lack its results.
+        """
+        table = self.root / "timings" / "timings.csv"
+        if not table.is_file():
+            return
+        with table.open(encoding="utf-8", newline="") as stream:
+            names = [row.get("case", "") for row in csv.DictReader(stream)]
+        lost = [name for name in names if name not in done]
+        if lost:
+            raise OrchestratorError(
+                f"{len(lost)} of the {len(names)} cases that the tables were made of are not here "
+                f"as this version makes them, {lost[0]} for one: the tables stay as they are",
+                where=str(self.root),
+                remedy="`orchestrator study` runs them again; to draw the others, first move "
+                "tables and timings elsewhere",
+            )
 
     def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
         """Say which study this is, and of which cases; only who holds the directory may.

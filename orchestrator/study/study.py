@@ -80,6 +80,8 @@ class Study:
         Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str
         The file itself, and the profiles that it names.
+    file : str
+        Absolute path of the file; empty if the text came from elsewhere.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Study:
     tolerance: float | None
     cluster: dict[str, Any]
     text: str
+    file: str = ""
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -139,7 +142,7 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":
         raise InputError("a file of dots names no study", where=source, remedy="rename it")
-    return parse(text, name=name, where=source)
+    return replace(parse(text, name=name, where=source), file=str(path.absolute()))
 
 
 def _is_file(path: Path) -> bool:
