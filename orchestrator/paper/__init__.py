@@ -1,6 +1,6 @@
-"""The paper: its studies, and the report card of what it claims.
+"""The paper: its studies, and the report card of its claims.
 
-Only the command line and the Python face ask it.
+Only the command line and the Python face import it.
 """
 
 from collections.abc import Sequence
@@ -29,9 +29,9 @@ def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Add
     Parameters
     ----------
     study : Study
-        One of the paper's is a preset of this package, word for word.
+        The paper's studies are the presets of this package, word for word.
     tables : mapping of str to DataFrame
-        What came of it.
+        Its tables.
     figures : sequence of str
         Names of the page's figures, in its order.
     """
@@ -40,6 +40,5 @@ def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Add
     from orchestrator.paper import claims
 
     judged = claims.judge(tables)
-    return Addition(
-        claims.section(judged, figures), {CLAIMS: claims.frame(judged).to_csv(index=False)}
-    )
+    section = claims.section(judged, figures, bool(study.tolerance))
+    return Addition(section, {CLAIMS: claims.frame(judged).to_csv(index=False)})

@@ -1,0 +1,139 @@
+"""The claims of the paper, and the report card: what a study finds of each."""
+
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+from markupsafe import Markup
+
+from orchestrator.paper import measures
+from orchestrator.paper.comparison import RULE, Comparison, Verdict, combined
+from orchestrator.paper.evidence import Evidence
+from orchestrator.report import page
+from orchestrator.tables import Tables
+
+FILE = Path(__file__).with_name("claims.toml")
+WORDS: dict[Verdict, str] = {
+    "reproduced": "reproduced",
+    "partly": "partly",
+    "not": "not reproduced",
+}
+"""The verdicts as the page has them."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper.
+
+    Attributes
+    ----------
+    says, where : str
+        The paper's words in short, and its section or figure.
+    measure : callable
+        The comparisons that judge it, from the tables of a study.
+    verdict : {"reproduced", "partly", "not"}
+        The verdict on the data of the preset ``paper``, which `why` explains.
+    why : str
+        The physics behind that verdict.
+    figures : tuple of str
+        How the names of the page's figures that show it begin.
+    """
+
+    says: str
+    where: str
+    measure: Callable[[Evidence], Iterator[Comparison]]
+    verdict: Verdict
+    why: str
+    figures: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim with the comparisons of a study, and the verdict by them."""
+
+    claim: Claim
+    comparisons: tuple[Comparison, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """By the comparisons that count."""
+        return combined(one.verdict for one in self.comparisons if one.is_decisive)
+
+    @property
+    def why(self) -> str:
+        """The explanation of the claim, if it explains this verdict."""
+        if self.verdict == self.claim.verdict:
+            return self.claim.why
+        if self.verdict == "no data":
+            lines = (one for one in self.comparisons if one.is_decisive)
+            lacking = "; ".join(one.name for one in lines if one.verdict == "no data")
+            return f"The study has no scenes for: {lacking or 'any of its comparisons'}."
+        return (
+            f"Not explained: on the preset `paper` without a tolerance it is {self.claim.verdict}."
+        )
+
+
+def judge(tables: Tables) -> list[Judged]:
+    """Judge every claim of the paper by the tables of a study."""
+    evidence = Evidence(tables)
+    return [Judged(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
+
+
+def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: bool) -> Markup:
+    """The report card as a section of the page; empty where no claim could be judged.
+
+    Parameters
+    ----------
+    judged : sequence of Judged
+        As `judge` gives them.
+    figures : sequence of str
+        Names of the page's figures, in its order.
+    has_tolerance : bool
+        Whether the study was answered with a tolerance, which takes scenes away from DEM.
+    """
+    entries = [one for one in judged if one.verdict != "no data"]
+    counts = Counter(one.verdict for one in entries)
+    shown = [
+        [number for number, name in enumerate(figures, 1) if name.startswith(one.claim.figures)]
+        for one in entries
+    ]
+    values = {
+        "entries": list(zip(entries, shown, strict=True)),
+        "counts": [f"{count} {WORDS[verdict]}" for verdict, count in counts.items()],
+        "words": WORDS,
+        "rule": RULE,
+        "lacking": [one for one in judged if one.verdict == "no data"],
+        "has_tolerance": has_tolerance,
+    }
+    return Markup(page.fill("card.html.j2", Path(__file__).parent, **values))
+
+
+def frame(judged: Sequence[Judged]) -> pd.DataFrame:
+    """The claims as a table; the comparisons are one text, a line for each."""
+    rows = [
+        {
+            "claim": one.claim.says,
+            "where": one.claim.where,
+            "measured": "\n".join(map(str, one.comparisons)),
+            "verdict": one.verdict,
+            "rule": RULE,
+            "why": one.why,
+        }
+        for one in judged
+    ]
+    return pd.DataFrame(rows)
+
+
+def _claims() -> Iterator[Claim]:
+    for entry in tomllib.loads(FILE.read_text(encoding="utf-8"))["claim"]:
+        pairs, measure = entry.pop("pairs", None), entry.pop("measure", "")
+        function = partial(measures.along, **pairs) if pairs else getattr(measures, measure)
+        yield Claim(**{**entry, "measure": function, "figures": tuple(entry["figures"])})
+
+
+CLAIMS: tuple[Claim, ...] = tuple(_claims())
+"""In the paper's order, then those on its method."""
