@@ -123,7 +123,8 @@ def test_harmed_files_of_a_case(
         for path in paths:
             whole = path.read_bytes()
             HARMS[how](path)
-            assert not _done(cells), path.name
+            # a large file that no table needs may be missing, as after `prune`
+            assert _done(cells) == (how == "removed" and path.suffix == ".dump"), path.name
             if path.is_dir():
                 path.rmdir()
             path.write_bytes(whole)
