@@ -215,7 +215,7 @@ def _experiment(name: str, options: argparse.Namespace) -> int:
     from orchestrator import paper
     from orchestrator.study import study
 
-    experiment = import_module(f"orchestrator.experiments.{name}.run")
+    experiment = import_module(f"orchestrator.experiments.{name}")
     asked = study.load(options.source, [paper.PRESETS])
     out = options.out or Path("results") / name
     finished = experiment.run(asked, out, workers=options.workers)
@@ -223,7 +223,7 @@ def _experiment(name: str, options: argparse.Namespace) -> int:
 
 
 def _stability(options: argparse.Namespace) -> int:
-    from orchestrator.experiments.stability.run import run
+    from orchestrator.experiments.stability import run
 
     out = options.out or Path("results") / "stability"
     return _end(run(out, workers=options.workers).page, {})

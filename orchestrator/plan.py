@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import checks, limits
-from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
+from orchestrator.fidelity import decision, limits
+from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
@@ -94,12 +94,13 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
     limits.check_study(study)
     bounds = above or {}
     decisions = {
-        scene.id: _decide(scene, study.tolerance, bounds.get(scene.id)) for scene in study.scenes
+        scene.id: _decide(scene, study.tolerance, bounds.get(scene.id, NO_BOUND))
+        for scene in study.scenes
     }
     return of(decisions, study.name, study.tolerance, cases)
 
 
-def _decide(scene: Scene, tolerance: float | None, above: Bound | None) -> Decision:
+def _decide(scene: Scene, tolerance: float | None, above: Bound) -> Decision:
     return by_default(scene, above) if tolerance is None else decide(scene, tolerance, above)
 
 
@@ -113,7 +114,7 @@ def of(
 
     With a tolerance, answers without DEM are checked by it.
     """
-    checked = checks.decisions(decisions, tolerance) if tolerance else {}
+    checked = decision.checks(decisions, tolerance) if tolerance else {}
     piles, check_piles = _piles(decisions, cases), _piles(checked, cases)
     grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
     cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
@@ -149,9 +150,10 @@ def settled(study: Study, directory: Path) -> Plan:
 def _failed(planned: Plan, directory: Path) -> dict[str, Bound]:
     """The piles that are not answered as they were asked and whose runs failed."""
     return {
-        asked: Bound(decision.levels, f"a run on {decision.levels_text} failed")
-        for asked, decision in planned.decisions.items()
-        if not decision.is_as_asked
+        asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
+        for asked, answer in planned.decisions.items()
+        if answer.levels
+        and not answer.is_as_asked
         and any(failure(directory / run.name) for run in planned.runs(asked))
     }
 
@@ -159,7 +161,7 @@ def _failed(planned: Plan, directory: Path) -> dict[str, Bound]:
 def _overruled(planned: Plan, tolerance: float, directory: Path) -> dict[str, Bound]:
     done = planned.done(directory)
     found = (planned.decisions, planned.piles, planned.checks)
-    return checks.overruled(*found, tolerance, directory, done)
+    return decision.overruled(*found, tolerance, directory, done)
 
 
 def _in_order(cases: Iterable[Case]) -> dict[str, Case]:

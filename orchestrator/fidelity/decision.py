@@ -1,26 +1,40 @@
-"""The decision how a scene is answered: its fidelity levels, their known error, the reason."""
+"""The decision how a scene is answered: its fidelity levels, their known error, the reason.
+
+A study with a tolerance is answered on the cheapest levels that are known to meet it. Of the piles
+of each slope, packing and force law that are answered without DEM, the cheapest by DEM is answered
+by DEM as well; where the two differ by more than the tolerance, all of them go to higher levels.
+"""
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import NamedTuple
+from pathlib import Path
 
-from orchestrator.fidelity import calibration, levels, spread
+from orchestrator.fidelity import calibration
 from orchestrator.fidelity.calibration import UNKNOWN, Known
-from orchestrator.fidelity.levels import FLAT, LEVELS, Levels, Part, changed
+from orchestrator.fidelity.levels import (
+    FLAT,
+    FLOW,
+    GRAINS,
+    PEELING,
+    Level,
+    Pair,
+    changed,
+    level,
+    pair_of,
+    solved_model,
+)
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study import fields
-from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
-QUIET_ENOUGH = 6.0
-"""A protocol that waits at least this long, sqrt(d/g'), holds the flow; a faster one is a ramp, and
-its rate is a part of what is asked."""
-LIFT_OFF = 0.95
-"""Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
-piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
+LEAST_HELD = 6.0
+"""Waiting time, sqrt(d/g'), from which load steps hold the flow. Shorter ones make a ramp, whose
+rate is a part of what is asked."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +45,10 @@ class Decision:
     ----------
     asked, scene : Scene
         As the study asks for it, and as it is answered.
-    levels : mapping of str to str
-        The fidelity level of each part of a pile, by name; empty for a single grain.
+    levels : Pair or None
+        The fidelity levels of a pile; None for a single grain.
     known : Known
-        The error of tau_c on these levels and its uncertainty, at the fraction of the scene where
-        the two together are largest; infinite where it is not known.
+        The error of tau_c on these levels and its uncertainty.
     why : str
         The reason, for people.
     by_default : bool
@@ -44,7 +57,7 @@ class Decision:
 
     asked: Scene
     scene: Scene
-    levels: Levels
+    levels: Pair | None
     known: Known
     why: str
     by_default: bool = False
@@ -55,49 +68,52 @@ class Decision:
         return self.scene == self.asked
 
     @property
-    def levels_text(self) -> str:
-        """The names of the levels in one text."""
-        return " | ".join(self.levels.values())
-
-    @property
     def error_estimate(self) -> float | None:
         """The known error with its uncertainty; None where it is not known."""
         return self.known.total if math.isfinite(self.known.total) else None
 
+    @property
+    def is_unchecked(self) -> bool:
+        """Whether it is a pile that the tool chose to answer without DEM."""
+        method = self.scene.protocol.method
+        return self.levels is not None and not self.is_as_asked and method != "dem"
+
 
 @dataclass(frozen=True)
 class Bound:
-    """Levels that are not good enough for a scene: dearer ones are chosen.
+    """Levels that are not good enough for a scene: higher ones are chosen.
 
     Attributes
     ----------
-    levels : mapping of str to str
-        By part, the name of the dearest one that is not.
+    flow, grains : Level or None
+        The highest of each that is not good enough.
     because : str
-        What they fail in, for people.
+        The reason, for people.
     """
 
-    levels: Levels
-    because: str
+    flow: Level | None = None
+    grains: Level | None = None
+    because: str = ""
 
 
-LIFTED = Bound({"grains": "peeling"}, "the lift carries grains off, which DEM alone shows")
-NO_BOUND = Bound({}, "")
-DEAREST_THEORY = "waves"
-"""Level of the flow above which it is solved."""
-NONE = "cheapest that errs less than the reference is uncertain: none is"
-"""How the reason begins where no levels are within a tolerance."""
+NO_BOUND = Bound()
+THEORY = Bound(flow=level("flow", "waves"))
+"""Above it the flow is solved."""
+CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
+"""Above it are the levels that check an answer without DEM."""
+NONE_WITHIN = "cheapest whose error is below the uncertainty of the reference: none is"
+"""How the reason begins where no levels meet the tolerance."""
 
 
-def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) -> Decision:
-    """Choose the cheapest levels that are known to be within a tolerance of the dearest ones.
+def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> Decision:
+    """Choose the cheapest levels that are known to be within a tolerance of the best ones.
 
     Parameters
     ----------
     scene : Scene
         Resolved.
     tolerance : float or None
-        Relative error of tau_c at each of the scene's fractions, the uncertainty of the reference
+        Relative error of tau_c at the scene's fractions, the uncertainty of the reference
         included; None or 0: the scene as it is asked.
     above : Bound, optional
         Levels that turned out to be not good enough.
@@ -105,47 +121,46 @@ def decide(scene: Scene, tolerance: float | None, above: Bound | None = None) ->
     Returns
     -------
     Decision
-        Where none is within the tolerance, on the cheapest levels that err less than their
-        reference is uncertain; as asked where nothing is known, or where the way to the answer is
-        a part of what is asked.
+        Where no levels are within the tolerance, on the cheapest whose error is below the
+        uncertainty of their reference; as asked where nothing is known, or where the way to the
+        answer is a part of what is asked.
     """
     if not tolerance:
         return as_asked(scene)
     if why := _asks_for(scene):
         return as_asked(scene, why)
     if not isinstance(scene.bed, PileBed):
+        if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
+            return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
         exact = changed(scene, {"protocol.method": "pivot"})
         why = "the closed form is exact for a single grain in a held flow"
-        return Decision(scene, exact, {}, UNKNOWN, why)
-    bound = above or _own_bound(scene)
-    named, why = _cheapest(
-        tuple((part, calibration.scene_class(part, scene)) for part in LEVELS),
-        scene.protocol.fractions,
-        tuple(bound.levels.items()),
-        tolerance,
-    )
-    why = f"{why}; {bound.because}" if bound.because else why
-    return on_levels(scene, dict(named), why) if named else as_asked(scene, why)
+        return Decision(scene, exact, None, UNKNOWN, why)
+    if name := calibration.unmeasured(scene):
+        return as_asked(scene, f"no error is known for {name}: as the study asks")
+    offered = (tuple(one for one in levels if one.takes(scene)) for levels in (FLOW, GRAINS))
+    pair, why = _cheapest(*offered, *calibration.scene_classes(scene), above, tolerance)
+    why = f"{why}; {above.because}" if above.because else why
+    return on_levels(scene, pair, why) if pair else as_asked(scene, why)
 
 
-def by_default(scene: Scene, above: Bound | None = None) -> Decision:
-    """The decision on a scene of a study that says nothing of how to answer.
+def by_default(scene: Scene, above: Bound = NO_BOUND) -> Decision:
+    """The decision on a scene of a study that says nothing about how to answer.
 
     A pile whose file sets no field about the answer is answered on the cheapest levels whose known
-    error is below the model's own spread. The flow is solved: whoever wants a theory of it names a
-    tolerance. The bound is one for all kinds of scenes, so that what stands in one figure was found
-    in one way. All else is answered as asked: single grains, poured beds, and what is set.
+    error is below the model's own spread. The flow is solved: a theory of it needs a tolerance. The
+    spread is the lowest of all classes of scenes, so that all scenes in one figure are answered
+    alike. Single grains, poured beds, classes without a measured spread, and all that sets a field
+    about the answer are answered as asked.
     """
-    if not leaves_open(scene):
+    if not leaves_open(scene) or math.isnan(calibration.floor(calibration.model_class(scene))):
         return as_asked(scene)
-    floor = spread.lowest_floor()
-    bound = above or _own_bound(scene)
-    chosen = decide(scene, floor, Bound({"flow": DEAREST_THEORY, **bound.levels}, bound.because))
+    floor = calibration.lowest_floor()
+    chosen = decide(scene, floor, replace(above, flow=above.flow or THEORY.flow))
     if chosen.is_as_asked or not chosen.levels:
         return chosen
-    which = "cheapest" if chosen.known.total <= floor else NONE
+    which = "cheapest" if chosen.known.total <= floor else NONE_WITHIN
     why = f"chosen by default: {which} within the model's own spread of {floor:.0%}"
-    because = f"; {bound.because}" if bound.because else ""
+    because = f"; {above.because}" if above.because else ""
     return replace(chosen, why=why + because, by_default=True)
 
 
@@ -155,100 +170,164 @@ def leaves_open(scene: Scene) -> bool:
         return False
     return not any(
         field in getattr(scene, part).model_fields_set
-        for one in fields.FIELDS
-        if one.info.about == "answer"
-        for part, _, field in (one.name.partition("."),)
+        for quantity in fields.FIELDS
+        if quantity.info.about == "answer"
+        for part, _, field in (quantity.name.partition("."),)
     )
 
 
 def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:
     """The decision to answer a scene as it is."""
     if not isinstance(scene.bed, PileBed):
-        return Decision(scene, scene, {}, UNKNOWN, why)
-    held = levels.holding(scene)
-    return Decision(scene, scene, held, _known(scene, held), why)
+        return Decision(scene, scene, None, UNKNOWN, why)
+    pair, name = pair_of(scene), calibration.unmeasured(scene)
+    if name and name not in why:
+        why = f"{why}; no error is known for {name}"
+    return Decision(scene, scene, pair, calibration.known(pair, scene), why)
 
 
-def on_levels(scene: Scene, named: Levels, why: str) -> Decision:
-    """The decision to answer a pile on some levels."""
-    answered = scene
-    for part, name in named.items():
-        answered = levels.level(part, name).answer(answered)
-    return Decision(scene, answered, named, _known(scene, named), why)
-
-
-def _known(scene: Scene, named: Levels) -> Known:
-    classes = {part: calibration.scene_class(part, scene) for part in named}
-    found = calibration.known(named, classes, scene.protocol.fractions)
-    return max(found, key=lambda one: one.total)
+def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
+    """The decision to answer a pile on a pair of levels."""
+    return Decision(scene, pair.answer(scene), pair, calibration.known(pair, scene), why)
 
 
 def _asks_for(scene: Scene) -> str:
     """How a scene wants to be answered; empty where the tool may choose.
 
-    It may where DEM in a held, solved flow is asked for, which is what the levels approximate. Over
+    It may choose where DEM in a held, solved flow is asked for, which the levels approximate. Over
     a level bed no flow is solved.
     """
     if scene.protocol.method != "dem":
         return f"the study asks for the method {scene.protocol.method}"
-    if scene.flow.model not in ("solve", levels.solved_model(scene)):
+    if scene.flow.model not in ("solve", solved_model(scene)):
         return f"the study asks for the flow model {scene.flow.model}"
     if scene.protocol.update:
         return "the study asks for a bed that changes, for which no error is known"
-    if scene.protocol.waiting_time < QUIET_ENOUGH:
+    if scene.protocol.waiting_time < LEAST_HELD:
         return "the study asks for a ramp of the flow"
     return ""
 
 
-def _own_bound(scene: Scene) -> Bound:
-    return LIFTED if lifts_off(scene) else NO_BOUND
-
-
-def lifts_off(scene: Scene) -> bool:
-    """Whether the lift carries a grain off before it rolls, which DEM alone shows."""
-    return float(closed_form(scene).lift) >= LIFT_OFF * scene.weight
-
-
-Named = tuple[tuple[Part, str], ...]
-"""The items of a mapping by part, in a form that can be cached by."""
+Names = tuple[str, ...]
 
 
 @cache  # a study has thousands of scenes of a few classes
 def _cheapest(
-    classes: Named, fractions: tuple[float, ...], above: Named, tolerance: float
-) -> tuple[Named, str]:
-    """A level for each part, and why; no levels where nothing is known."""
-    offered = _pairs(classes, fractions, dict(above))
-    pairs = sorted(offered, key=lambda pair: pair.known.cost_core_s)
-    within = next((pair for pair in pairs if pair.known.total <= tolerance), None)
+    flow: tuple[Level, ...],
+    grains: tuple[Level, ...],
+    flow_classes: Names,
+    grain_classes: Names,
+    above: Bound,
+    tolerance: float,
+) -> tuple[Pair | None, str]:
+    """The cheapest pair of some levels, and why; None where nothing is known."""
+    # over a level bed there is no other flow
+    level_bed = flow_classes == (calibration.LEVEL_BED,)
+    flows = (FLAT,) if level_bed else _above(flow, above.flow)
+    known = {
+        Pair(*pair): calibration.known_of_classes(*pair, flow_classes, grain_classes)
+        for pair in itertools.product(flows, _above(grains, above.grains))
+    }
+    pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
+    within = next((pair for pair in pairs if known[pair].total <= tolerance), None)
     if within:
-        return within.levels, "cheapest within the tolerance"
-    best = min(pairs, key=lambda pair: pair.known.total, default=None)
-    if best is None or math.isinf(best.known.total):
-        return (), "no error is known: as the study asks"
-    # against a reference that is no better known, a dearer pair is not known to be nearer
-    enough = next(pair for pair in pairs if pair.known.error <= best.known.total)
-    return enough.levels, f"{NONE} within the tolerance"
+        return within, "cheapest within the tolerance"
+    best = min((known[pair].total for pair in pairs), default=math.inf)
+    if math.isinf(best):
+        return None, "no error is known: as the study asks"
+    # errors below the uncertainty of the reference cannot be ranked
+    enough = next(pair for pair in pairs if known[pair].error <= best)
+    return enough, f"{NONE_WITHIN} within the tolerance"
 
 
-class _Pair(NamedTuple):
-    levels: Named
-    known: Known
+def _above(levels: tuple[Level, ...], bound: Level | None) -> Iterator[Level]:
+    start = levels.index(bound) + 1 if bound in levels else 0
+    return (level for level in levels[start:] if level.same_model)
 
 
-def _pairs(classes: Named, fractions: tuple[float, ...], above: Levels) -> Iterator[_Pair]:
-    parts = [part for part, _ in classes]
-    offered = (_above(part, found, above.get(part)) for part, found in classes)
-    for names in itertools.product(*offered):
-        named = tuple(zip(parts, names, strict=True))
-        found = calibration.known(dict(named), dict(classes), fractions)
-        yield _Pair(named, max(found, key=lambda one: one.total))
+def check_group(scene: Scene) -> str:
+    """The key that the piles of one check share."""
+    assert isinstance(scene.bed, PileBed)
+    return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.forces.law}"
 
 
-def _above(part: Part, scene_class: str, name: str | None) -> list[str]:
-    """The levels above one; over a level bed there is no other flow."""
-    if scene_class == calibration.LEVEL:
-        return [FLAT]
-    listed = [one.name for one in LEVELS[part]]
-    start = 0 if name is None else listed.index(name) + 1
-    return [one.name for one in LEVELS[part][start:] if one.same_model]
+def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decision]:
+    """The decisions on the piles by DEM that check answers without it.
+
+    Parameters
+    ----------
+    answers : mapping of str to Decision
+        By the id of the scene asked for.
+    tolerance : float
+        Relative error of tau_c.
+
+    Returns
+    -------
+    dict of str to Decision
+        By the id of the scene asked for whose answer it checks.
+    """
+    groups: dict[str, list[tuple[float, str, Decision]]] = {}
+    for asked, answer in answers.items():
+        if answer.is_unchecked:
+            scene = answer.scene
+            dem = changed(scene, {"protocol.method": "dem", "flow.model": solved_model(scene)})
+            check = decide(dem, tolerance, CHECK)
+            member = (Pile(check.scene).case.cost_s, asked, check)
+            groups.setdefault(check_group(scene), []).append(member)
+    cheapest = (min(members, key=lambda member: member[:2]) for members in groups.values())
+    return {asked: check for _, asked, check in cheapest}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An answer without DEM and that of DEM, at one fraction of one pile."""
+
+    cheap: PileThreshold
+    dem: PileThreshold
+    agree: bool
+
+
+def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator[Comparison]:
+    """Compare a pile's two answers at each fraction, from the finished cases.
+
+    They agree where the answer without DEM lies in the interval of DEM, widened by the tolerance,
+    or where neither reaches the fraction.
+    """
+    fractions = cheap.scene.protocol.fractions
+    answers = (pile.thresholds(cases, fractions) for pile in (cheap, check))
+    for answer, dem in zip(*answers, strict=True):
+        within = dem.tau_low * (1 - tolerance) <= answer.tau <= dem.tau_high * (1 + tolerance)
+        neither = math.isnan(answer.tau) and math.isnan(dem.tau)
+        yield Comparison(answer, dem, within or neither)
+
+
+def ready(
+    piles: Mapping[str, Pile], checking: Mapping[str, Pile], done: Container[str]
+) -> dict[str, Pile]:
+    """The checks whose runs are done, and those of the answers that they check."""
+    return {
+        asked: check
+        for asked, check in checking.items()
+        if check.is_run(done) and piles[asked].is_run(done)
+    }
+
+
+def overruled(
+    answers: Mapping[str, Decision],
+    piles: Mapping[str, Pile],
+    checking: Mapping[str, Pile],
+    tolerance: float,
+    cases: Path,
+    done: Container[str],
+) -> dict[str, Bound]:
+    """For each pile of a group whose check disagrees, the levels that are not good enough."""
+    lost = {
+        check_group(piles[asked].scene)
+        for asked, check in ready(piles, checking, done).items()
+        if not all(row.agree for row in compare(piles[asked], check, tolerance, cases))
+    }
+    return {
+        asked: Bound(*answer.levels, f"DEM overruled {answer.levels.text}")
+        for asked, answer in answers.items()
+        if answer.levels and answer.is_unchecked and check_group(answer.scene) in lost
+    }

@@ -1,10 +1,9 @@
 """Where the methods hold: what a study refuses, and what it is warned of.
 
-Each limit was read off a map of `orchestrator stability`, which runs scenes beyond it; the map's
-table lies in ``calibration/maps.csv``.
+Each limit was read off a map of `orchestrator stability`, which runs scenes beyond it; the tables
+of the maps lie in ``calibration/maps.csv``.
 """
 
-import math
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ import numpy as np
 from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.shapes import of_bed
 from orchestrator.errors import InputError
-from orchestrator.fidelity import spread
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import model
 from orchestrator.flow.stress import undisturbed_ustar
@@ -24,6 +22,19 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import MOST_GRAINS, Scene
 from orchestrator.study.study import Study
+
+FROZEN_BED = 0.05
+"""Known change of a threshold, relative, up to which the flow of the whole pile may act on."""
+PILE_SLOPES_DEG = (10.0, 35.0)
+"""Slopes of piles that the mesh and the packing have been tried for."""
+TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
+"""Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
+LEAST_DAMPING = 0.03
+WAITING_TIME = 3.0
+"""Least time without a passage, sqrt(d/g')."""
+COARSE_STEP = 0.05
+CLOSE_PACKED_DEG = 59.0
+"""Entrainment angle from which the grains of a row hold each other."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +48,7 @@ class Limit:
     field : str
         The field of a study file to change.
     beyond : callable
-        What is wrong with a scene, or nothing.
+        What is wrong with a scene, or None.
     says : str
         The limit in a sentence.
     remedy : str
@@ -91,12 +102,58 @@ def of_map(name: str) -> Iterator[Limit]:
     return (limit for limit in LIMITS if limit.map == name)
 
 
-def _pile(scene: Scene) -> PileBed | None:
-    return scene.bed if isinstance(scene.bed, PileBed) else None
+def largest_timestep(damping: float) -> float:
+    """The largest safe time step at a damping ratio, sqrt(m/K)."""
+    return next(step for most, step in TIMESTEPS if damping <= most)
 
 
-def _solved(scene: Scene) -> PileBed | None:
-    return _pile(scene) if scene.flow.model == "solve" else None
+def _pile(scene: Scene, *models: str) -> PileBed | None:
+    """The bed of a pile, under one of some flow models if they are given."""
+    is_pile = isinstance(scene.bed, PileBed) and (not models or scene.flow.model in models)
+    return scene.bed if is_pile and isinstance(scene.bed, PileBed) else None
+
+
+def _dem_pile(scene: Scene) -> bool:
+    return isinstance(scene.bed, PileBed) and scene.protocol.method == "dem"
+
+
+def _bed_line(scene: Scene) -> str | None:
+    """A fault of the bed line, or a slope down which its grains roll or slide without a flow.
+
+    A bed that is poured slumps wherever it is too steep, counted or not.
+    """
+    bed = _pile(scene)
+    if not bed:
+        return None
+    poured, limit = bed.packing == "poured", scene.limiting_slope_deg
+    if poured:
+        limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
+    try:
+        line = of_bed(bed)
+        if poured and bed.obstacles:
+            return "no grains can be poured around obstacles"
+        length = line.x[-2] - line.x[1]
+        if length > MOST_GRAINS * scene.grain.diameter:
+            count = length / scene.grain.diameter
+            return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
+        if not bed.is_wedge and not poured:
+            _ = LoadedBed(scene).packing
+    except UnfitError as error:
+        return str(error)
+    if bed.is_wedge and not poured:
+        return None
+    slopes = np.abs(line.slopes_deg)
+    if not poured:
+        slopes = np.where(counted_segments(line, bed.counts), slopes, 0.0)
+    for start, end in line.bare:
+        slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
+    steep = int(np.argmax(slopes))
+    if slopes[steep] <= limit + 1e-6:
+        return None
+    where = f"{slopes[steep]:.3g} deg at x = {line.x[steep]:.4g} ... {line.x[steep + 1]:.4g} m"
+    if poured:
+        return f"{where} is beyond what poured grains hold, min(friction angle, 35 deg) = {limit:g}"
+    return f"{where} is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
 
 
 def _slope(scene: Scene) -> str | None:
@@ -111,46 +168,28 @@ def _slope(scene: Scene) -> str | None:
 
 def _pile_slope(scene: Scene) -> str | None:
     bed, (low, high) = _pile(scene), PILE_SLOPES_DEG
-    if not bed or not bed.is_wedge:
-        return None
-    return None if low <= bed.slope_deg <= high else f"a pile of {bed.slope_deg:g} deg"
+    beyond = bed and bed.is_wedge and not low <= bed.slope_deg <= high
+    return f"a pile of {scene.bed.slope_deg:g} deg" if beyond else None
 
 
-def _bed_line(scene: Scene) -> str | None:
-    """A fault of the bed line, if there is one."""
-    if not (bed := _pile(scene)):
+def _half_way(scene: Scene) -> str | None:
+    slope, angle = scene.bed.slope_deg, scene.bed.entrainment_angle_deg
+    if _pile(scene) or slope <= angle:
         return None
-    try:
-        line = of_bed(bed)
-        if bed.packing == "poured" and bed.obstacles:
-            return "no grains can be poured around obstacles"
-        length = line.x[-2] - line.x[1]
-        if length > MOST_GRAINS * scene.grain.diameter:
-            count = length / scene.grain.diameter
-            return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
-        if not bed.is_wedge and bed.packing != "poured":
-            _ = LoadedBed(scene).packing
-    except UnfitError as error:
-        return str(error)
-    limit = scene.limiting_slope_deg
-    slopes = np.where(counted_segments(line, bed.counts), np.abs(line.slopes_deg), 0.0)
-    for start, end in line.bare:
-        slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
-    steep = int(np.argmax(slopes))
-    if bed.is_wedge or bed.packing == "poured" or slopes[steep] <= limit + 1e-6:
-        return None
-    where = f"{slopes[steep]:.3g} deg at x = {line.x[steep]:.4g} ... {line.x[steep + 1]:.4g} m"
-    return f"{where} is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
+    return (
+        f"{slope:g} deg is beyond the entrainment angle, {angle:g} deg: a grain may come to rest "
+        "half-way over its neighbour, and DEM and the closed form differ by up to a third"
+    )
 
 
 def _theory(scene: Scene) -> str | None:
-    bed = _pile(scene)
-    if not bed or scene.flow.model not in THEORIES:
+    bed = _pile(scene, "hill", "waves")
+    if not bed:
         return None
     try:
         seen = seen_by_the_flow(of_bed(bed))
-    except UnfitError:  # said elsewhere
-        return None
+    except UnfitError:
+        return None  # `_bed_line` refuses it
     steep = int(np.argmax(seen.slopes))
     slope = float(np.degrees(np.arctan(seen.slopes[steep])))
     if slope <= PILE_SLOPES_DEG[1] + 1e-6:
@@ -159,22 +198,20 @@ def _theory(scene: Scene) -> str | None:
 
 
 def _hill(scene: Scene) -> str | None:
-    bed = _pile(scene)
-    if not bed or scene.flow.model != "hill" or _bed_line(scene):
-        return None
-    if half_length(of_bed(bed)) is not None:
+    bed = _pile(scene, "hill")
+    if not bed or _bed_line(scene) or half_length(of_bed(bed)) is not None:
         return None
     return "the bed does not fall to half of its height before and behind its top"
 
 
 def _flat(scene: Scene) -> str | None:
-    bed = _solved(scene)
+    bed = _pile(scene, "solve")
     level = bed and bed.is_level
     return "over a flat bed there is nothing to solve: u* is u*_0 everywhere" if level else None
 
 
 def _first_cell(scene: Scene) -> str | None:
-    if not _solved(scene) or scene.solve_roughness <= scene.first_cell_height:
+    if not _pile(scene, "solve") or scene.solve_roughness <= scene.first_cell_height:
         return None
     return (
         f"z0 = {scene.solve_roughness:g} m is above twice z_e ="
@@ -183,7 +220,7 @@ def _first_cell(scene: Scene) -> str | None:
 
 
 def _laminar(scene: Scene) -> str | None:
-    bed = _solved(scene)
+    bed = _pile(scene, "solve")
     if not bed:
         return None
     ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, scene.solve_roughness)
@@ -197,18 +234,10 @@ def _laminar(scene: Scene) -> str | None:
 
 
 def _timestep(scene: Scene) -> str | None:
-    if scene.protocol.method != "dem":
-        return None
-    most = largest_timestep(scene.grain.damping)
-    step = scene.protocol.time_step
-    if step <= most:
+    step, most = scene.protocol.time_step, largest_timestep(scene.grain.damping)
+    if scene.protocol.method != "dem" or step <= most:
         return None
     return f"{step:g} sqrt(m/K) is above {most:g} at a damping of {scene.grain.damping:g}"
-
-
-def largest_timestep(damping: float) -> float:
-    """The largest safe time step at a damping ratio, sqrt(m/K)."""
-    return next(step for least, step in TIMESTEPS if damping <= least)
 
 
 def _undamped(scene: Scene) -> str | None:
@@ -218,27 +247,26 @@ def _undamped(scene: Scene) -> str | None:
 
 
 def _ramp(scene: Scene) -> str | None:
-    rules = scene.protocol
-    if not _pile(scene) or rules.method != "dem" or rules.waiting_time >= WAITING_TIME:
+    waiting = scene.protocol.waiting_time
+    if not _dem_pile(scene) or waiting >= WAITING_TIME:
         return None
-    waited = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
+    waited = f"load steps that wait {waiting:g} sqrt(d/g')"
     return f"{waited} end before slow grains pass: it is a ramp"
 
 
 def _coarse(scene: Scene) -> str | None:
     step = scene.protocol.load_increment
-    if not _pile(scene) or scene.protocol.method != "dem" or step <= COARSE_STEP:
+    if not _dem_pile(scene) or step <= COARSE_STEP:
         return None
     return f"load steps {step:.0%} apart leave the threshold that wide an interval"
 
 
 def _wedged(scene: Scene) -> str | None:
-    bed = _pile(scene)
-    if not bed or bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
+    if not _pile(scene) or scene.bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
         return None
     return (
-        f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those"
-        " under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
+        f"a pile of {scene.bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, "
+        "those under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
     )
 
 
@@ -249,43 +277,20 @@ def _forced(scene: Scene) -> str | None:
 
 
 def _scheme(scene: Scene) -> str | None:
-    if not _solved(scene) or scene.flow.convection_scheme == "linearUpwind":
+    if not _pile(scene, "solve") or scene.flow.convection_scheme == "linearUpwind":
         return None
     return f"{scene.flow.convection_scheme} does not converge to the same answer, or not at all"
 
-
-def frozen_bed(scene: Scene, fraction: float) -> float:
-    """How far the threshold is known to move on a bed that changes, relative; NaN if not known.
-
-    The largest over the scenes of the class: of one packing, on a smooth, transitional or rough
-    bed. A scene whose bed changes has no frozen one, and neither has a flow that is not solved.
-    """
-    if scene.protocol.update or not _solved(scene):
-        return math.nan
-    return spread.of_choice(scene, fraction, spread.FROZEN)
-
-
-FROZEN_BED = 0.05
-"""Known change of a threshold, relative, up to which the flow of the whole pile may act on."""
-PILE_SLOPES_DEG = (10.0, 35.0)
-"""Slopes of piles that the mesh and the packing have been tried for."""
-THEORIES = ("hill", "waves")
-TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
-"""Damping ratio, and the largest safe time step up to it."""
-LEAST_DAMPING = 0.03
-WAITING_TIME = 3.0
-"""Least time without a passage, sqrt(d/g')."""
-COARSE_STEP = 0.05
-CLOSE_PACKED_DEG = 59.0
-"""Entrainment angle from which the grains of a row hold each other."""
 
 LIMITS = (
     Limit(
         "slope",
         "bed",
         _bed_line,
-        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope.",
-        "smooth a profile, give forms room, or count another part of the bed",
+        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope; a "
+        "poured bed is nowhere beyond its friction angle and 35 deg.",
+        "smooth a profile, give forms room, or count another part of the bed; lower a poured bed's "
+        "slopes",
     ),
     Limit(
         "slope",
@@ -301,6 +306,14 @@ LIMITS = (
         "Piles of 10 to 35 deg: others are refused.",
         f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg, and no more than"
         " min(friction angle, 90 deg - entrainment angle)",
+    ),
+    Limit(
+        "slope",
+        "bed.slope_deg",
+        _half_way,
+        "Beyond the entrainment angle a single grain may come to rest half-way: a warning.",
+        "read it by DEM, or lower the slope",
+        refused=False,
     ),
     Limit(
         "slope",

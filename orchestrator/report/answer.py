@@ -5,8 +5,8 @@ from typing import Any
 
 import pandas as pd
 
+from orchestrator.fidelity.calibration import lowest_floor
 from orchestrator.fidelity.limits import FROZEN_BED
-from orchestrator.fidelity.spread import lowest_floor
 from orchestrator.physics.log_law import log_law_speed
 from orchestrator.report import hills, labels
 from orchestrator.report.apart import varying
@@ -111,7 +111,7 @@ def _chosen(results: Results) -> Iterator[str]:
     """Which levels answered where the study file says nothing of them."""
     chosen = [d for d in results.plan.decisions.values() if d.by_default]
     if chosen:
-        names = ", ".join(dict.fromkeys(one.levels_text for one in chosen))
+        names = ", ".join(dict.fromkeys(one.levels.text for one in chosen if one.levels))
         error = max(one.known.total for one in chosen)
         yield (
             f"Answered by default on the levels {names}: at most {error:.0%} off DEM, less than "

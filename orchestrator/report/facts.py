@@ -282,7 +282,7 @@ def levels(results: Results) -> Sheet | None:
         rows.append(
             (
                 f"{flow} | {grains}",
-                fidelity.meaning({"flow": str(flow), "grains": str(grains)}),
+                fidelity.meaning([str(flow), str(grains)]),
                 str(why),
                 str(own["scene_id"].nunique()),
                 "not known" if pd.isna(known) else f"{100 * known:.1f} %",

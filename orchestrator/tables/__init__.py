@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.fidelity import checks
+from orchestrator.fidelity import decision
 from orchestrator.plan import Plan
 from orchestrator.runs.folder import Folder
 from orchestrator.study.study import Study
@@ -64,7 +64,7 @@ def _checks(
     study: Study, plan: Plan, cases: Path, done: Container[str]
 ) -> Iterator[dict[str, Any]]:
     if study.tolerance:
-        ready = checks.ready(plan.piles, plan.checks, done)
+        ready = decision.ready(plan.piles, plan.checks, done)
         yield from piles.check_rows(plan.decisions, plan.piles, ready, study.tolerance, cases)
 
 

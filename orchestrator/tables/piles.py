@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.fidelity import checks, limits
+from orchestrator.fidelity import calibration, decision
 from orchestrator.fidelity.decision import Decision
-from orchestrator.fidelity.spread import spread
+from orchestrator.fidelity.levels import Pair
 from orchestrator.flow.channel import mean_speed
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
@@ -169,9 +169,9 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "stress": scene.forces.stress,
             "fraction": fraction,
             "shields": shields(scene, found.tau),
-            **_interval(scene, found, answer.decision.error_estimate or 0.0),
+            **_interval(scene, found, answer.decision.error_estimate),
             **_model_interval(answer.decision.asked, fraction, shields(scene, found.tau)),
-            "frozen_bed": limits.frozen_bed(answer.decision.asked, fraction),
+            "frozen_bed": calibration.frozen_bed(answer.decision.asked, fraction),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
@@ -182,18 +182,24 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
-            **_levels(answer.decision),
+            **_levels(answer.decision.levels),
             "error_estimate": answer.decision.error_estimate,
             "case": pile.runs[-1].name if pile.runs else None,
         }
 
 
-def _levels(decision: Decision) -> Row:
-    return {"flow_level": decision.levels["flow"], "grain_level": decision.levels["grains"]}
+def _levels(levels: Pair | None) -> Row:
+    assert levels
+    return {f"{part}_level": one.name for part, one in zip(("flow", "grain"), levels, strict=True)}
 
 
-def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
-    """The interval of load steps and count; at least the known error, as a factor both ways."""
+def _interval(scene: Scene, found: PileThreshold, error: float | None) -> Row:
+    """The interval of load steps and count; at least the known error, as a factor both ways.
+
+    It is empty where no error is known.
+    """
+    if error is None:
+        return {"shields_low": np.nan, "shields_high": np.nan}
     return {
         "shields_low": shields(scene, min(found.tau_low, found.tau / (1 + error))),
         "shields_high": shields(scene, max(found.tau_high, found.tau * (1 + error))),
@@ -202,7 +208,7 @@ def _interval(scene: Scene, found: PileThreshold, error: float) -> Row:
 
 def _model_interval(scene: Scene, fraction: float, shields: float) -> Row:
     """The interval of the choices that all levels share; never a part of the numerical one."""
-    found = spread(scene, fraction)
+    found = calibration.spread(scene, fraction)
     return {
         "shields_model_low": shields * (1 - found.low),
         "shields_model_high": shields * (1 + found.high),
@@ -220,13 +226,13 @@ def check_rows(
     """The piles that DEM checked: both answers at each fraction."""
     for asked, pile in check.items():
         scene = cheap[asked].scene
-        for one in checks.compare(cheap[asked], pile, tolerance, cases):
+        for one in decision.compare(cheap[asked], pile, tolerance, cases):
             yield {
                 "scene_id": asked,
                 **point(scene),
                 "packing": pile.bed.packing,
                 "fraction": one.cheap.fraction,
-                **_levels(decisions[asked]),
+                **_levels(decisions[asked].levels),
                 "shields": shields(scene, one.cheap.tau),
                 "shields_dem": shields(scene, one.dem.tau),
                 "shields_dem_low": shields(scene, one.dem.tau_low),

@@ -23,6 +23,9 @@ EXPOSED_FROM = 0.25
 """Part of a grain over the tops of its neighbours from which it is an exposed one."""
 CARRIED_OFF = 0.1
 """Share of the moved grains from which a threshold is one of lift-off."""
+ROW_HOLD = 1.05
+"""u*_0 at which the first grain leaves, over that of the first grain by itself, from which a row
+is held by its neighbours."""
 Reason = tuple[NDArray[np.bool_], list[str]]
 """Which rows it is true of, and what it says of each row."""
 
@@ -70,8 +73,8 @@ def _reasons(rows: pd.DataFrame, tolerance: float | None) -> Iterator[Reason]:
             share > CARRIED_OFF,
             [f"lift carried off {one:.0%} of the moved grains" for one in share],
         )
-        if tolerance:
-            yield _inexact(rows["error_estimate"].to_numpy(float), tolerance)
+        yield from _inexact(rows["error_estimate"].to_numpy(float), tolerance)
+        yield from _grains(rows)
 
 
 def _unreached(row: Mapping[object, object]) -> str:
@@ -137,12 +140,30 @@ def _hidden(rows: pd.DataFrame) -> Reason:
     return part < EXPOSED_FROM, texts
 
 
-def _inexact(error: NDArray[np.float64], tolerance: float) -> Reason:
+def _inexact(error: NDArray[np.float64], tolerance: float | None) -> Iterator[Reason]:
     """Levels whose error is not known, or known to be above the tolerance."""
+    text = "no interval: the error of its levels on such a pile is not known"
+    yield np.isnan(error), [text] * len(error)
+    if tolerance:
+        texts = [
+            f"known error {one:.1%} is above the tolerance of {tolerance:.3g}" for one in error
+        ]
+        yield error > tolerance * (1 + 1e-9), texts
+
+
+def _grains(rows: pd.DataFrame) -> Iterator[Reason]:
+    """Fractions of less than one grain, and rows that their neighbours hold."""
+    fraction, count = (rows[name].to_numpy(float) for name in ("fraction", "count"))
     texts = [
-        "no reference: the error of its levels is not known"
-        if np.isnan(one)
-        else f"known error {one:.1%} is above the tolerance of {tolerance:.3g}"
-        for one in error
+        f"{at:.3g} of {n:.0f} grains is less than one"
+        for at, n in zip(fraction, count, strict=True)
     ]
-    return ~(error <= tolerance * (1 + 1e-9)), texts
+    yield fraction * count < 1 - 1e-9, texts
+    if "row_hold" in rows:
+        held = rows["row_hold"].to_numpy(float)
+        texts = [
+            f"the row has no end: its neighbours hold the first grain up to {hold:.2g} times the "
+            "u* of a single one"
+            for hold in held
+        ]
+        yield held > ROW_HOLD, texts

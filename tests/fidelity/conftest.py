@@ -13,10 +13,17 @@ MakePile = Callable[..., Scene]
 
 @pytest.fixture(scope="session")
 def pile() -> MakePile:
-    """A pile as it is asked for by DEM on a solved flow, with some fields of its bed changed."""
+    """A pile as it is asked for by DEM on a solved flow, with some fields changed.
+
+    Fields of its bed are keywords; other fields, as a study file names them, are in a dictionary.
+    """
     text = """
         grain = { diameter = 1e-3 }
         bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
     """
     (scene,) = study.parse(text, name="one", where="test").scenes
-    return lambda **bed: changed(scene, {f"bed.{name}": value for name, value in bed.items()})
+
+    def make(fields: dict[str, object] | None = None, **bed: object) -> Scene:
+        return changed(scene, {**{f"bed.{k}": v for k, v in bed.items()}, **(fields or {})})
+
+    return make

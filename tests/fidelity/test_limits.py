@@ -1,6 +1,6 @@
 """What a plan refuses, what it is warned of, and what a study file may still ask for."""
 
-import math
+import re
 from pathlib import Path
 
 import pytest
@@ -9,8 +9,10 @@ from orchestrator import cli, plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.fidelity.decision import as_asked
+from orchestrator.fidelity.levels import changed
 from orchestrator.study import study
 from orchestrator.study.study import Study
+from tests.fidelity.conftest import MakePile
 
 GRAIN = """
 [grain]
@@ -140,14 +142,6 @@ def test_the_theories_are_of_low_beds(model: str, bed: str, what: str) -> None:
         limits.check_study(asked)
 
 
-def test_a_frozen_bed_is_known_to_move_a_row() -> None:
-    (pile,) = _parse(PILE).scenes
-    assert limits.frozen_bed(pile, 0.1) < limits.FROZEN_BED < limits.frozen_bed(pile, 0.7)
-    for other in (PILE.replace("solve", "hill"), PILE + "[protocol]\nupdate = 0.1\n"):
-        (scene,) = _parse(other).scenes
-        assert math.isnan(limits.frozen_bed(scene, 0.7))
-
-
 @pytest.mark.parametrize(
     "bed",
     [
@@ -162,3 +156,59 @@ def test_the_length_of_a_bed_in_grains_is_limited(bed: str) -> None:
     asked = study.parse(text.replace("1e-3", "1e-4"), name="long", where="long.toml")
     with pytest.raises(InputError, match=r"m of bed are .* grains, more than 100000"):
         limits.check_study(asked)
+
+
+@pytest.mark.parametrize(
+    ("bed", "phi"),
+    [
+        ('shape = "trapezoid", slope_deg = 45.0, height = 0.015', 20.0),
+        ('shape = "trapezoid", slope_deg = 45.0, height = 0.015', 35.0),
+        ('shape = "step up", slope_deg = 60.0', 35.0),
+        ('shape = "dune", slope_deg = 15.0, lee_slope_deg = 33.0', 30.0),
+        ("slope_deg = 25.0", 24.0),
+    ],
+)
+def test_a_poured_bed_beyond_its_repose_is_refused(bed: str, phi: float) -> None:
+    """It settled at 35 to 39 deg, some grains 4.4 d under the line that the flow was found over."""
+    text = f"""
+        grain = {{ diameter = 1e-3, friction_angle_deg = {phi} }}
+        bed = {{ kind = "pile", packing = "poured", {bed} }}
+    """
+    with pytest.raises(InputError, match=r"what poured grains hold|is beyond min"):
+        limits.check_study(study.parse(text, name="t", where="t"))
+    gentle = re.sub("(45|60|33).0", "30.0", text).replace(f"= {phi}", "= 35.0")
+    limits.check_study(study.parse(gentle, name="t", where="t"))
+
+
+def test_a_grain_that_may_rest_half_way_is_warned_of() -> None:
+    text = """
+        grain = { diameter = 1e-3, friction_angle_deg = 80.0 }
+        bed = { kind = "grain", slope_deg = 69.0, entrainment_angle_deg = 20.0 }
+    """
+    with pytest.warns(UserWarning, match="half-way"):
+        limits.check_study(_parse(text))
+
+
+WARNED = {
+    "protocol.waiting_time": 2.0,
+    "protocol.load_increment": 0.1,
+    "forces.loaded_grains": "all but crest",
+    "flow.convection_scheme": "upwind",
+}
+REFUSED = {
+    "protocol.time_step": 0.5,
+    "grain.damping": 0.01,
+    "bed.entrainment_angle_deg": 55.0,
+}
+
+
+@pytest.mark.parametrize("field", [*WARNED, *REFUSED])
+def test_a_field_beyond_a_limit_is_named_with_its_map(field: str, pile: MakePile) -> None:
+    scene = changed(pile(), {field: {**WARNED, **REFUSED}[field]})
+    if field in WARNED:
+        with pytest.warns(UserWarning, match=f"{field}.*map"):
+            limits.check(scene, "test")
+        return
+    with pytest.raises(InputError, match="map") as caught:
+        limits.check(scene, "test")
+    assert caught.value.where == f"test: {field}"

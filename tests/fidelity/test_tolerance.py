@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from orchestrator import cli, pipeline
 from orchestrator.fidelity import calibration, decision
-from orchestrator.fidelity.calibration import Known
 from orchestrator.fidelity.levels import LEVELS
 from orchestrator.study import study
 
@@ -70,15 +70,17 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
 def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # told that the pivot of each grain is good for level rows, which it is not
-    wrong: dict[tuple[str, str, str], dict[float, Known]] = {
-        (part, one.name, like): {0.5: Known(0.01, 0.0, cost)}
+    # data that call the pivot of each grain good for level rows, which it is not
+    wrong = {
+        (part, one.name, like): np.tile([[0.01], [0.0], [float(cost)]], 4)
         for part, like in (("flow", "wall"), ("grains", "horizontal"))
-        for cost, one in enumerate(LEVELS[part])  # type: ignore[index]
+        for cost, one in enumerate(LEVELS[part])
         if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
     }
+    wrong |= {(part, name, f"{like}, limiting slope"): v for (part, name, like), v in wrong.items()}
     monkeypatch.setattr(calibration, "measured", lambda: wrong)
-    monkeypatch.setattr(decision, "_cheapest", decision._cheapest.__wrapped__)
+    for cached in (calibration.known_of_classes, decision._cheapest):
+        monkeypatch.setattr(cached.__module__ + "." + cached.__name__, cached.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     found = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])
     by_hand = found["group"] == "asked for by the pivot"

@@ -18,6 +18,7 @@ SOUND = {
     "force_law": "bridged",
     "reynolds": 60.0,
     "shields": 0.05,
+    "fraction": 0.3,
     "count": 65,
     "highest_fraction": 0.8,
     "share_carried_off": 0.0,
@@ -54,6 +55,8 @@ def test_nothing_speaks_against_a_sound_threshold() -> None:
         ({"force_law": "high", "reynolds": 20.0}, "Re* 20 is below 30"),
         ({"force_law": "high", "reynolds": 400.0}, "Schiller and Naumann"),
         ({"reynolds": 29 * SMOOTH_BELOW}, "hydraulically smooth bed: u* z0/nu 0.16"),
+        ({"count": 3}, "0.3 of 3 grains is less than one"),
+        ({"row_hold": 2.3}, "hold the first grain up to 2.3 times"),
         ({"share_carried_off": 0.76}, "lift carried off 76% of the moved grains"),
         (
             {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN},
@@ -69,8 +72,10 @@ def test_each_reason_is_named(changes: dict[str, Any], said: str) -> None:
 
 
 def test_a_known_error_above_the_tolerance_speaks_against_it() -> None:
-    assert _judged(error_estimate=NAN) == (True, "")
-    assert _judged(0.05, error_estimate=NAN)[1].startswith("no reference")
+    for tolerance in (None, 0.05):
+        usable, why = _judged(tolerance, error_estimate=NAN)
+        assert not usable
+        assert why.startswith("no interval")
     assert _judged(0.02) == (False, "known error 3.0% is above the tolerance of 0.02")
 
 

@@ -1,39 +1,60 @@
-"""Calibration data: the known errors of the fidelity levels, by class of scene.
+"""Known errors of the fidelity levels and the spread of the model, by class of scene.
 
-``levels.csv`` holds what ``orchestrator ladder`` measured against the dearest levels, ``maps.csv``
-what ``orchestrator stability`` found.
+The numbers are tables beside this module: ``levels.csv`` holds what ``orchestrator ladder``
+measured against the most expensive levels, ``budget.csv`` what ``orchestrator budget`` measured of
+the choices that all levels share, ``maps.csv`` what ``orchestrator stability`` found.
 """
 
-import csv
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, reduce
-from operator import add
+from functools import cache
 from pathlib import Path
 
-from orchestrator.fidelity.levels import FLAT, Levels, Part, packing
+import numpy as np
+import pandas as pd
+
+from orchestrator.fidelity.levels import AS_ASKED, FLAT, LEVELS, Level, Pair, packing, value_of
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
+from orchestrator.study.parts import Flow, Forces, PileBed, Protocol
+from orchestrator.study.scene import Scene, default_first_cell_height
+from orchestrator.types import FloatArray
 
 FOLDER = Path(__file__).parent
 DISORDERS = (0.02, 0.05, 0.2)
-"""Sizes of disorder up to which errors are known together, d."""
-
-
+"""Ends of the ranges of disorder that share their known errors, d."""
 VISCOUS, ROUGH = 3.0, 30.0
 """Re* below which a bed is hydraulically smooth, and from which it is rough."""
+LIFT_OFF = 0.95
+"""Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
+piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
+LEVEL_BED = "level bed"
+"""The class for the flow of beds over which u* is u*_0 everywhere."""
+LIMITING = ", limiting slope"
+BETWEEN_DEG = 5.0
+"""Degrees below the limiting slope from which slopes were measured as below it."""
+DEFAULTS = {
+    f"{part}.{name}": kind.model_fields[name].default
+    for part, kind, names in (
+        ("flow", Flow, ("turbulence_model", "convection_scheme", "lid", "upstream", "downstream")),
+        ("forces", Forces, ("averaging_length", "loaded_grains", "exposure")),
+        ("protocol", Protocol, ("displacement_criterion",)),
+    )
+    for name in names
+}
+"""Fields that move an answer and that the ladder keeps at their defaults."""
+AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")
+SAME_CELL = 0.02
+"""Relative difference from the default height of the first cell that changes no known error."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """Known error of a level, or of one for each part, on a class of scenes at a fraction.
+    """Known error of a level, or of a pair of levels, on a scene.
 
     Attributes
     ----------
     error : float
-        Largest relative error of tau_c against the reference.
+        Relative error of tau_c against the reference.
     uncertainty : float
         How far the reference itself moved when its numbers were changed.
     cost_core_s : float
@@ -44,47 +65,184 @@ class Known:
     uncertainty: float
     cost_core_s: float
 
-    def __add__(self, other: "Known") -> "Known":
-        """Known error of both parts together.
-
-        Each number is the largest over the scenes of a class, and each has a cause of its own. So
-        they add up as the shares of the model do: by their squares.
-        """
-        return Known(
-            math.hypot(self.error, other.error),
-            math.hypot(self.uncertainty, other.uncertainty),
-            self.cost_core_s + other.cost_core_s,
-        )
-
     @property
     def total(self) -> float:
-        """Error and uncertainty together, by their squares."""
+        """Error and uncertainty together: the root of the sum of their squares."""
         return math.hypot(self.error, self.uncertainty)
 
 
 UNKNOWN = Known(math.inf, 0.0, math.inf)
-EXACT = Known(0.0, 0.0, 0.0)
-LEVEL = "level bed"
-"""The class for the flow of beds over which u* is u*_0 everywhere."""
 
 
-def scene_class(part: Part, scene: Scene) -> str:
-    """The class of scenes that share the known error of a level.
+@dataclass(frozen=True)
+class Spread:
+    """Effect of the choices that all levels share on a threshold.
 
-    The flow's depends on how the stress is read, the grains' on their packing; both on whether the
-    slope is the limiting one, on which a row waits for a touch, and on the shape.
+    Attributes
+    ----------
+    low, high : float
+        How far they lower and raise the Shields number, relative; NaN where nothing is known.
+    dominant : str
+        The choice with the widest share; empty where nothing is known.
     """
-    assert isinstance(scene.bed, PileBed)
-    ending = ", limiting slope" if scene.bed.slope_deg > scene.limiting_slope_deg - 1 else ""
-    ending += _shape(scene.bed)
-    if part == "flow" and scene.bed.is_level:
-        return LEVEL
+
+    low: float
+    high: float
+    dominant: str
+
+
+FROZEN = "frozen bed"
+"""The choice that the flow of the whole pile acts until the last grain has gone."""
+STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
+"""Choices whose values a study file states."""
+
+
+def scene_class(part: str, scene: Scene) -> str:
+    """The class under which the known error of a level is measured on a scene.
+
+    The class for the flow names how the stress is read and what is above the water; the class for
+    the grains names their packing. Both name the form, and the limiting slope, on which a row
+    waits for a touch.
+    """
+    bed = scene.bed
+    assert isinstance(bed, PileBed)
+    if part == "flow" and bed.is_level:
+        return LEVEL_BED
+    name = packing(bed)
     if part == "flow":
-        return scene.forces.stress + ending
-    if scene.bed.packing == "disordered":
-        size = next(size for size in DISORDERS if scene.bed.disorder <= size)
-        return f"disordered up to {size:g} d{ending}"
-    return packing(scene.bed) + ending
+        name = scene.forces.stress + ("" if scene.flow.top == "boundary layer" else ", channel")
+    elif name == "disordered":
+        end = next(end for end in DISORDERS if bed.disorder <= end)
+        name = f"disordered up to {end:g} d"
+    if not bed.is_triangle:
+        return name + _form(bed)
+    return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
+
+
+def classes(part: str, scene: Scene) -> tuple[str, ...]:
+    """The measured classes that a scene belongs to; its known error is the largest of theirs.
+
+    A slope between those that were measured belongs to both of its neighbours. So do level rows on
+    any slope: which grain of a chain goes first is chaotic, and no slope is known better than
+    another.
+    """
+    bed, name = scene.bed, scene_class(part, scene)
+    assert isinstance(bed, PileBed)
+    base = name.removesuffix(LIMITING)
+    between = 1 <= scene.limiting_slope_deg - bed.slope_deg < BETWEEN_DEG
+    if bed.is_triangle and (between or base == "horizontal"):
+        return base, base + LIMITING
+    return (name,)
+
+
+def _form(bed: PileBed) -> str:
+    """Ending of a class: what was measured on triangles is not known of other forms.
+
+    On a curved bed a row has no edge where it could begin to leave, on straight faces it has.
+    """
+    if bed.obstacles:
+        return ", obstacles"
+    if bed.shape == "flat" and not bed.profile:
+        return ", flat"
+    rounded = bed.profile or bed.brink_radius or bed.windward == "curved"
+    curved = rounded or bed.shape in ("cosine", "gaussian", "rushil")
+    return ", curved forms" if curved else ", straight forms"
+
+
+def unmeasured(scene: Scene) -> str:
+    """The property of a pile for which no level was measured, in words; empty if there is none.
+
+    A known error holds for the settings at which it was measured.
+    """
+    if lifts_off(scene):
+        return "lift that carries grains off before they roll"
+    solved = scene.flow.model == "solve"
+    for name, default in DEFAULTS.items():
+        value = value_of(scene, name)
+        if name.startswith("flow.") and not solved:
+            continue
+        if value < default if name in AT_LEAST else value != default:
+            return f"{name} = {value:.4g}" if isinstance(value, float) else f"{name} = {value}"
+    if solved:
+        assert isinstance(scene.bed, PileBed)
+        default = default_first_cell_height(scene.bed.relief, scene.solve_roughness)
+        if abs(scene.first_cell_height / default - 1) > SAME_CELL:
+            return f"first cells of {scene.first_cell_height:.3g} m in place of {default:.3g} m"
+    roughness = scene.flow.roughness
+    if roughness and abs(math.log2(roughness / scene.bed.roughness)) > 0.5 + 1e-6:
+        return f"flow.roughness = {roughness:.3g} m"
+    return ""
+
+
+def lifts_off(scene: Scene) -> bool:
+    """Whether the lift carries a grain off before it rolls, which DEM alone shows."""
+    return float(closed_form(scene).lift) >= LIFT_OFF * scene.weight
+
+
+def known(pair: Pair, scene: Scene) -> Known:
+    """Known error of a pair of levels on a pile, at the fraction where it is largest.
+
+    Errors and uncertainties of the two parts have a cause each and add up by their squares;
+    docs/ladder.md says how often the sum holds. Numbers of a study file that are on no level have
+    the error of the most expensive level that is no finer than they are.
+
+    Returns
+    -------
+    Known
+        `UNKNOWN` where it was not measured.
+    """
+    if unmeasured(scene):
+        return UNKNOWN
+    return known_of_classes(
+        *(
+            _nearest(level, levels, scene)
+            for level, levels in zip(pair, LEVELS.values(), strict=True)
+        ),
+        *scene_classes(scene),
+    )
+
+
+def _nearest(level: Level, levels: tuple[Level, ...], scene: Scene) -> Level:
+    if level is not AS_ASKED:
+        return level
+    bounds = (other for other in reversed(levels) if other.same_model and other.bounds(scene))
+    return next(bounds, AS_ASKED)
+
+
+def scene_classes(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The classes of a pile for the flow and for the grains."""
+    return classes("flow", scene), classes("grains", scene)
+
+
+@cache  # a study has thousands of scenes of a few classes
+def known_of_classes(
+    flow: Level, grains: Level, flow_classes: tuple[str, ...], grain_classes: tuple[str, ...]
+) -> Known:
+    """Known error of two levels on scenes of some classes; arguments as in `known`."""
+    exact = flow is FLAT and flow_classes == (LEVEL_BED,)
+    keys = [] if exact else [[("flow", flow.name, name) for name in flow_classes]]
+    keys.append([("grains", grains.name, name) for name in grain_classes])
+    table = measured()
+    if not all(key in table for part in keys for key in part):
+        return UNKNOWN
+    # of several classes the worst; then both parts at each fraction, and the worst fraction
+    parts = [np.max([table[key] for key in part], axis=0) for part in keys]
+    error, uncertainty = (np.sqrt(sum(part[row] ** 2 for part in parts)) for row in (0, 1))
+    worst = int(np.argmax(np.hypot(error, uncertainty)))
+    cost = sum(float(part[2, 0]) for part in parts)
+    return Known(float(error[worst]), float(uncertainty[worst]), cost)
+
+
+@cache
+def measured() -> dict[tuple[str, str, str], FloatArray]:
+    """The measured errors, by part, name of the level and class of scene.
+
+    Each is an array with the rows error, uncertainty and cost (core-s), a column for each fraction.
+    """
+    table = pd.read_csv(FOLDER / "levels.csv").sort_values("fraction")
+    numbers = ["error", "uncertainty", "cost_core_s"]
+    groups = table.groupby(["part", "level", "scene_class"])
+    return {key: rows[numbers].to_numpy(float).T for key, rows in groups}  # type: ignore[misc]
 
 
 def model_class(scene: Scene) -> str:
@@ -92,49 +250,69 @@ def model_class(scene: Scene) -> str:
     assert isinstance(scene.bed, PileBed)
     reynolds = float(closed_form(scene).reynolds)
     names = {VISCOUS: "viscous", ROUGH: "transitional", math.inf: "rough"}
-    name = next(name for end, name in names.items() if reynolds < end)
-    return f"{scene.bed.packing}, {name}{_shape(scene.bed)}"
+    regime = next(name for end, name in names.items() if reynolds < end)
+    bed = scene.bed
+    shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
+    return f"{bed.packing}, {regime}{shape}"
 
 
-def _shape(bed: PileBed) -> str:
-    """A suffix of the class: measurements on triangles hold for no other bed."""
-    return "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
+def spread(scene: Scene, fraction: float) -> Spread:
+    """The spread of the threshold of a pile at a fraction of its grains."""
+    shares = _shares(model_class(scene), fraction)
+    if shares.empty:
+        return Spread(math.nan, math.nan, "")
+    low, high = together(shares)
+    widest = (shares["shields_low"] + shares["shields_high"]).to_numpy().argmax()
+    return Spread(low, high, str(shares["choice"].iloc[int(widest)]))
 
 
-def known(levels: Levels, classes: Mapping[Part, str], fractions: Sequence[float]) -> list[Known]:
-    """Known error of a level for each part, together, at each fraction.
+def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
+    """Shares of independent choices as one, down and up: the root of the sum of their squares.
 
-    Parameters
-    ----------
-    levels, classes : mapping
-        By part: the level's name, and the class of the scene.
-    fractions : sequence of float
-        n/N.
+    Nothing falls below zero, however many choices lower it.
     """
-    return [
-        reduce(add, (known_at(part, name, classes[part], at) for part, name in levels.items()))
-        for at in fractions
-    ]
+    low, high = (float(np.hypot.reduce(shares[f"{quantity}_{end}"])) for end in ("low", "high"))
+    return min(low, 1.0), high
 
 
-def known_at(part: Part, level: str, scene_class: str, fraction: float) -> Known:
-    """Known error of one level at a fraction; infinite where nothing is known."""
-    if (level, scene_class) == (FLAT, LEVEL):
-        return EXACT
-    rows = measured().get((part, level, scene_class), {})
-    if fraction in rows or not rows:
-        return rows.get(fraction, UNKNOWN)
-    # between the fractions that were measured the worst of them has to do
-    return max(rows.values(), key=lambda row: row.error)
+def frozen_bed(scene: Scene, fraction: float) -> float:
+    """How far a threshold is known to move on a bed that changes, relative; NaN if not known.
+
+    The largest over the scenes of the class: of one packing, on a smooth, transitional or rough
+    bed. It is not known of a bed that changes already, nor of a flow that is not solved.
+    """
+    if scene.protocol.update or scene.flow.model != "solve":
+        return math.nan
+    shares = _shares(model_class(scene), fraction)
+    row = shares[shares["choice"] == FROZEN]
+    return math.nan if row.empty else float(row[["shields_low", "shields_high"]].to_numpy().max())
 
 
 @cache
-def measured() -> dict[tuple[str, str, str], dict[float, Known]]:
-    """The measured errors, by part, level and class of scene, then by fraction."""
-    found: dict[tuple[str, str, str], dict[float, Known]] = {}
-    with (FOLDER / "levels.csv").open(encoding="utf-8", newline="") as stream:
-        for row in csv.DictReader(stream):
-            key = (row["part"], row["level"], row["scene_class"])
-            numbers = (float(row[name]) for name in ("error", "uncertainty", "cost_core_s"))
-            found.setdefault(key, {})[float(row["fraction"])] = Known(*numbers)
-    return found
+def _shares(model: str, fraction: float) -> pd.DataFrame:
+    """The shares of a class at the measured fraction that is nearest."""
+    rows = _budget()[_budget()["model_class"] == model]
+    apart = (rows["fraction"] - fraction).abs()
+    nearest: pd.DataFrame = rows[apart == apart.min()]
+    return nearest
+
+
+def floor(model: str) -> float:
+    """Half the interval of the model's choices, of scenes of a class whose file's values are sure.
+
+    It is relative, the smallest over the fractions; NaN if not known. Below it, an error of the
+    numerics is hidden by the uncertainty of the model.
+    """
+    rows = _budget()[(_budget()["model_class"] == model) & ~_budget()["choice"].isin(STATED)]
+    return min((sum(together(own)) / 2 for _, own in rows.groupby("fraction")), default=math.nan)
+
+
+@cache
+def lowest_floor() -> float:
+    """The smallest floor of all measured classes, relative."""
+    return min(floor(model) for model in _budget()["model_class"].unique())
+
+
+@cache
+def _budget() -> pd.DataFrame:
+    return pd.read_csv(FOLDER / "budget.csv")

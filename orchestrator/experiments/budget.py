@@ -1,0 +1,449 @@
+"""The budget: how far the choices that all fidelity levels share move a threshold.
+
+A choice is changed alone, within what measurements and good practice leave open. Each is answered
+on the cheapest levels that feel it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from orchestrator import plan
+from orchestrator.errors import InputError
+from orchestrator.experiments import experiment
+from orchestrator.experiments.experiment import Runs, Tables, label
+from orchestrator.fidelity import calibration, limits
+from orchestrator.fidelity.calibration import FROZEN
+from orchestrator.fidelity.decision import Decision, on_levels
+from orchestrator.fidelity.levels import (
+    AS_ASKED,
+    PEELING,
+    Fields,
+    Level,
+    Pair,
+    changed,
+    level,
+    value_of,
+)
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.threshold import PileThreshold
+from orchestrator.physics.laws import LAWS
+from orchestrator.pipeline import Finished
+from orchestrator.report import document
+from orchestrator.report.document import Section
+from orchestrator.study.closed_form import law_holds
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene, roughness_length
+from orchestrator.study.study import Study
+
+COARSE = level("flow", "coarse")
+"""The level of a solved flow; another flow model is kept."""
+DYNAMIC, DYNAMIC_POURED = level("grains", "1 layer, fast"), level("grains", "4 layers, fast")
+"""Levels for a choice that dynamics alone feel; on poured beds, with more layers."""
+SEEDS = (1, 2, 3)
+"""Other draws of a random packing that are as good."""
+QUANTITIES = ("shields", "ustar0")
+"""The Shields number of the mean stress on the moved grains, and the undisturbed friction velocity
+at which they moved."""
+ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
+BASE = "as asked"
+Alternatives = Mapping[str, Fields]
+"""Values of fields by the name of the alternative."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One choice that the levels share.
+
+    Attributes
+    ----------
+    name : str
+        What tables and figures call it.
+    why : str
+        Why its alternatives are as good.
+    others : callable
+        The alternatives for a scene, or their fields.
+    of_solved_flow : bool
+        Whether it moves nothing under a flow that is not solved.
+    dynamic : bool
+        Whether DEM alone feels it.
+    """
+
+    name: str
+    why: str
+    others: Callable[[Scene], Alternatives]
+    of_solved_flow: bool = False
+    dynamic: bool = False
+
+    def levels(self, scene: Scene) -> Pair:
+        """The levels on which it is changed in a scene."""
+        grains: Level = PEELING
+        if self.dynamic:
+            grains = DYNAMIC_POURED if scene.is_poured else DYNAMIC
+        return Pair(COARSE if scene.flow.model == "solve" else AS_ASKED, grains)
+
+    def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
+        """The scene with each alternative that it can have, by the alternative's name."""
+        if self.of_solved_flow and scene.flow.model != "solve":
+            return
+        for name, fields in self.others(scene).items():
+            other = _with(scene, fields)
+            if other is not None and other != scene:
+                yield f"{self.name}: {name}", other
+
+
+def _with(scene: Scene, fields: Fields) -> Scene | None:
+    """A scene with some fields changed; None where they are refused."""
+    try:
+        return changed(scene, fields)
+    except InputError:
+        return None
+
+
+def _values(field: str, *values: Any) -> Callable[[Scene], Alternatives]:
+    return lambda scene: {f"{value}": {field: value} for value in values}
+
+
+def _times(field: str, *factors: float) -> Callable[[Scene], Alternatives]:
+    return lambda scene: {f"{by:g} times": {field: by * value_of(scene, field)} for by in factors}
+
+
+def _beside(field: str, *steps: float) -> Callable[[Scene], Alternatives]:
+    return lambda scene: {f"{by:+g}°": {field: value_of(scene, field) + by} for by in steps}
+
+
+def _first_cells(scene: Scene) -> Alternatives:
+    height = scene.first_cell_height
+    return {f"{by:g} times": {"flow.first_cell_height": by * height} for by in (0.5, 2.0)}
+
+
+def _roughness(scene: Scene) -> Alternatives:
+    d = scene.grain.diameter
+    return {part: {"bed.roughness": roughness_length(part, d)} for part in ("d/10", "d/30")}
+
+
+def _laws(scene: Scene) -> Alternatives:
+    """The laws that hold at the scene, without those that need a torque."""
+    named: dict[str, Fields] = {
+        law.label: {"forces.law": name} for name, law in LAWS.items() if not law.turns
+    }
+    others = {name: _with(scene, fields) for name, fields in named.items()}
+    return {name: named[name] for name, other in others.items() if other and law_holds(other)}
+
+
+def _pockets(scene: Scene) -> Alternatives:
+    """Angles of a lattice's pockets; the grains of a poured bed have their own."""
+    return {} if scene.is_poured else _beside("bed.entrainment_angle_deg", -5.0, 5.0)(scene)
+
+
+def _exposures(scene: Scene) -> Alternatives:
+    return _values("forces.exposure", "alike", "protrusion")(scene) if scene.is_poured else {}
+
+
+def _packings(scene: Scene) -> Alternatives:
+    """Other seeds of a poured bed; else the other packings of the plane, random gaps by seeds."""
+    if scene.is_poured:
+        return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
+    gaps = {"bed.packing": "disordered", "bed.disorder": 0.05}
+    return {
+        "rows along the slope": {"bed.packing": "aligned"},
+        "level rows": {"bed.packing": "horizontal"},
+        **{f"random gaps, seed {seed}": {**gaps, "bed.seed": seed} for seed in SEEDS},
+    }
+
+
+CHOICES = (
+    Choice(
+        "first cell",
+        "A wall function asks for no one height of the cells on the bed.",
+        _first_cells,
+        of_solved_flow=True,
+    ),
+    Choice(
+        "turbulence model",
+        "No model is right for all flows that separate.",
+        _values("flow.turbulence_model", "kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"),
+        of_solved_flow=True,
+    ),
+    Choice(
+        "reading of the stress",
+        "The paper reads it off the first cells by Eq. 10.",
+        _values("forces.stress", "wall", "eq10"),
+        of_solved_flow=True,
+    ),
+    Choice(
+        "averaging length",
+        "The stress at a sharp crest has no limit; it is averaged on a length.",
+        _times("forces.averaging_length", 0.5, 2.0),
+        of_solved_flow=True,
+    ),
+    Choice("force law", "All laws that hold at the Re* of the scene.", _laws),
+    Choice(
+        "roughness length",
+        "Measured ones of beds of equal grains are between d/30 and d/10.",
+        _roughness,
+    ),
+    Choice("entrainment angle", "The pockets of one bed differ by more than that.", _pockets),
+    Choice(
+        "lift coefficient",
+        "Saffman's is that of an unbounded shear; measured lifts on a bed scatter by more.",
+        _times("forces.lift_coefficient", 0.5, 1.5),
+    ),
+    Choice("packing", "Of a bed that was not seen neither rows nor gaps are known.", _packings),
+    Choice(
+        "exposure",
+        "The flow meets all grains of a poured bed at one height, or each at its own.",
+        _exposures,
+    ),
+    Choice(
+        "criterion of motion",
+        "What counts as moved is a convention: between a sixth and a half of a diameter.",
+        _values("protocol.displacement_criterion", 0.15, 0.5),
+    ),
+    Choice(
+        "friction angle",
+        "That of a sand is known to a few degrees. A poured bed is poured anew by it.",
+        _beside("grain.friction_angle_deg", -5.0, 5.0),
+        dynamic=True,
+    ),
+    Choice(
+        FROZEN,
+        "The paper, and every level, keeps the flow of the whole pile until the last grain has "
+        "gone. Else the bed line is drawn anew after each tenth.",
+        _values("protocol.update", 0.1),
+        of_solved_flow=True,
+    ),
+)
+"""Every shared choice."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """An alternative of a choice at a scene: the names of both piles in the plan."""
+
+    scene: Scene
+    choice: Choice
+    name: str
+    base: str
+    other: str
+
+
+def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
+    """The alternatives of each pile of a study, and the piles to be answered, by name."""
+    listed, asked = [], {}
+
+    def key_of(scene: Scene, name: str, pile: Scene, levels: Pair) -> str:
+        key = f"{scene.id} | {levels.text} | {name}"
+        asked[key] = on_levels(pile, levels, "the budget changes one choice")
+        return key
+
+    for scene in study.scenes:
+        for choice in CHOICES if isinstance(scene.bed, PileBed) else ():
+            levels = choice.levels(scene)
+            base = key_of(scene, BASE, scene, levels)
+            for name, other in choice.scenes(scene):
+                listed.append(Change(scene, choice, name, base, key_of(scene, name, other, levels)))
+    return listed, asked
+
+
+def run(study: Study, out: Path, *, workers: int) -> Finished:
+    """Change each shared choice alone, on the piles of a study, and draw what that moves.
+
+    Raises
+    ------
+    InputError
+        If the study has no pile or one is beyond a limit of the methods, or the directory cannot
+        be used.
+    SolverError
+        If a solver is missing.
+    OrchestratorError
+        If no run came to its end.
+    """
+    limits.check_study(study)
+    listed, asked = changes(study)
+    if not asked:
+        raise InputError(
+            "there is no pile in this study",
+            where=study.name,
+            remedy='give a group `bed.kind = "pile"`',
+        )
+    planned = plan.of(asked, study.name, cases=out.absolute() / "cases")
+
+    def make(runs: Runs) -> tuple[Tables, Callable[[], list[Section]]]:
+        moved = measure(listed, runs)
+        if moved.empty:
+            raise experiment.nothing_ran(out, "no run came to its end: no share is known")
+        shared = shares(moved)
+        tables = {"changes": moved, "shares": shared, "budget": known(shared)}
+        return tables, lambda: _sections(listed, tables, runs)
+
+    finished = experiment.run(
+        "budget",
+        "What a threshold is worth",
+        planned,
+        out,
+        make,
+        workers=workers,
+        limit_s=study.time_limit_s,
+    )
+    # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
+    needed = {run.name for change in listed for run in planned.piles[change.base].runs}
+    failures = {name: error for name, error in finished.failures.items() if name in needed}
+    return Finished(finished.page, finished.started, failures)
+
+
+def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
+    """A row for each scene, alternative and fraction: how far the threshold moved, relative."""
+    piles = runs.planned.piles
+    ready = {key for key, pile in piles.items() if pile.is_run(runs.done)}
+    found: dict[str, list[PileThreshold]] = {}
+
+    def thresholds(key: str) -> list[PileThreshold]:
+        if key not in found:
+            pile = piles[key]
+            found[key] = pile.thresholds(runs.cases, pile.scene.protocol.fractions)
+        return found[key]
+
+    return pd.DataFrame(
+        {
+            "scene_id": change.scene.id,
+            "scene": label(change.scene),
+            "model_class": calibration.model_class(change.scene),
+            "choice": change.choice.name,
+            "alternative": change.name.partition(": ")[2],
+            "fraction": before.fraction,
+            "shields": after.tau / before.tau - 1,
+            "ustar0": after.ustar0 / before.ustar0 - 1,
+        }
+        for change in listed
+        if {change.base, change.other} <= ready
+        for before, after in zip(thresholds(change.base), thresholds(change.other), strict=True)
+    )
+
+
+def shares(moved: pd.DataFrame) -> pd.DataFrame:
+    """A row for each scene, choice and fraction: how far down and up its alternatives move it.
+
+    Both signs are at least 0: of alternatives that all raise it the lower share is 0.
+    """
+    keys = ["scene_id", "scene", "model_class", "choice", "fraction"]
+    grouped = moved.dropna(subset=list(QUANTITIES)).groupby(keys, sort=False)
+    parts = {}
+    for name in QUANTITIES:
+        parts[f"{name}_low"] = 0.0 - grouped[name].min().clip(upper=0.0)
+        parts[f"{name}_high"] = grouped[name].max().clip(lower=0.0)
+    return pd.DataFrame(parts).reset_index()
+
+
+def known(shared: pd.DataFrame) -> pd.DataFrame:
+    """The largest share of each choice over the scenes of a class: what the package keeps."""
+    grouped = shared.groupby(["model_class", "choice", "fraction"], sort=False)
+    return grouped[ENDS].max().assign(scenes=grouped["scene_id"].nunique()).reset_index()
+
+
+def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]:
+    """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
+    from orchestrator.experiments import budget_figures as figures
+
+    moved, shared = tables["changes"], tables["shares"]
+    piles = runs.planned.piles
+    worn: list[tuple[Pile, Pile]] = [
+        (piles[change.base], piles[change.other])
+        for change in listed
+        if change.choice.name == FROZEN
+        and all(piles[key].is_run(runs.done) for key in (change.base, change.other))
+    ]
+    sections = [Section("All choices together", TEXT, (), (document.sheet(_all(shared)),), LIMITS)]
+    if worn:
+        rows = moved[moved["choice"] == FROZEN]
+        table = rows[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
+        table = table.assign(**{"θ, %": 100 * rows["shields"], "u*₀, %": 100 * rows["ustar0"]})
+        drawn = figures.curves(worn, runs.cases)
+        figure = experiment.figure("wear", "Frozen bed and bed that changes", WEAR, drawn)
+        title = "The bed that changes"
+        sections.append(Section(title, CHANGING, (figure,), (document.sheet(table),)))
+    for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
+        name, drawn = str(scene["scene"].iloc[0]), figures.tornado(scene)
+        figure = experiment.figure(f"tornado-{number}", name, CAPTION, drawn)
+        sections.append(Section(name, "", (figure,), (document.sheet(_by_fraction(scene)),)))
+    tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
+    kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
+    choices = pd.DataFrame(kept, columns=["choice", "alternatives", "why"])
+    lost = _lost(listed, runs)
+    text = "" if lost.empty else "The alternatives of the second table have no answer."
+    sheets = [document.sheet(table) for table in (choices, lost) if len(table)]
+    return [*sections, Section("The choices and their alternatives", text, tables=sheets)]
+
+
+def _lost(listed: list[Change], runs: Runs) -> pd.DataFrame:
+    """The alternatives that have no answer, and why: a flow model may refuse a bed."""
+    names = {change.other: change for change in listed}
+    names |= {change.base: change for change in listed}
+    rows = [
+        {
+            "scene": label(change.scene),
+            "alternative": key.rpartition(" | ")[2],
+            "why": "; ".join(
+                runs.failures[run.name].what for run in pile.runs if run.name in runs.failures
+            ),
+        }
+        for key, change in names.items()
+        for pile in (runs.planned.piles[key],)
+        if not pile.is_run(runs.done)
+    ]
+    return pd.DataFrame(rows).drop_duplicates() if rows else pd.DataFrame()
+
+
+def _all(shared: pd.DataFrame) -> pd.DataFrame:
+    """A row for each scene: the shares of all choices together."""
+    rows = []
+    for _, scene in shared.groupby("scene_id", sort=False):
+        largest = scene.groupby("choice")[ENDS].max()
+        row = {"scene": scene["scene"].iloc[0]}
+        for name, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
+            low, high = calibration.together(largest, name)
+            widest = (largest[f"{name}_low"] + largest[f"{name}_high"]).idxmax()
+            row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
+            row[f"{symbol}: largest share"] = widest
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _by_fraction(rows: pd.DataFrame) -> pd.DataFrame:
+    """A row for each choice, a column for each fraction: the share of the Shields number."""
+    low, high = 100 * rows["shields_low"], 100 * rows["shields_high"]
+    share = [f"−{a:.1f} … +{b:.1f}" for a, b in zip(low, high, strict=True)]
+    heads = [f"change of θ at {fraction:.0%}, %" for fraction in rows["fraction"]]
+    table = rows.assign(share=share, head=heads)
+    wide = table.pivot_table("share", "choice", "head", aggfunc="first", sort=False)
+    return wide.reset_index()
+
+
+TEXT = (
+    "The fidelity levels are measured against the best one. What all of them share does not show "
+    "there: it is changed here, one choice at a time. Each bar spans the largest change over the "
+    "fractions, downwards and upwards; the top bar is the root of the sum of squares, as if the "
+    "choices had nothing to do with one another."
+)
+CAPTION = (
+    "Quasi-static levels (coarse flow, peeling) except for the friction angle, which DEM alone "
+    "feels. The Shields number is that of the mean stress on the grains that moved; u*₀ is that of "
+    "the flow far from the bed."
+)
+CHANGING = (
+    "The levels keep the flow over the whole pile until the end, as the paper does. Here the bed "
+    "line is drawn anew after each tenth of the counted grains, the flow is solved again, and the "
+    "grains go on by peeling. The table has the threshold on the bed that changes over that on the "
+    "frozen one, less 1."
+)
+WEAR = (
+    "Left: the threshold at each n/N. Right: the bed line at the start and after each tenth, "
+    "darker as it wears; its edges are rounded over 2 d. Grains that come to light are not loaded."
+)
+LIMITS = (
+    "The ranges of the choices are judgements, with the reason beside each; no statistics.",
+    "Alternatives that are refused at a scene, or do not hold at its Re*, are left out.",
+)

@@ -1,1 +1,0 @@
-"""Maps of where each method fails; every cell is a run."""

@@ -1,0 +1,145 @@
+"""The budget: which alternatives a scene has, how changes become shares, and its page."""
+
+import math
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.experiments import budget
+from orchestrator.experiments.budget import BASE, CHOICES
+from orchestrator.fidelity.levels import changed
+from orchestrator.study import study
+from orchestrator.study.closed_form import law_holds
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
+
+SMALL = """
+grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }
+flow = { model = "solve" }
+[bed]
+kind = "pile"
+slope_deg = 25.0
+height = 0.007
+roughness = "d/30"
+packing = "poured"
+"""
+LEVEL = """
+grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }
+bed = { kind = "pile", shape = "flat", length = 0.02, packing = "poured" }
+flow = { model = "flat" }
+"""
+OF_LATTICES = "entrainment angle"
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    text = """
+        grain = { diameter = 1e-3 }
+        bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
+    """
+    return study.parse(text, name="one", where="test").scenes[0]
+
+
+def _others(choice: str, scene: Scene) -> dict[str, Scene]:
+    (one,) = (one for one in CHOICES if one.name == choice)
+    return {name.partition(": ")[2]: other for name, other in one.scenes(scene)}
+
+
+@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice.name)
+def test_an_alternative_changes_one_part_and_is_not_the_scene_itself(
+    choice: budget.Choice, scene: Scene
+) -> None:
+    for bed in ({}, {"bed.packing": "poured"}):
+        asked = changed(scene, bed)
+        for _, other in choice.scenes(asked):
+            parts = [p for p in Scene.model_fields if getattr(other, p) != getattr(asked, p)]
+            assert len(parts) == 1
+
+
+@pytest.mark.parametrize(
+    ("choice", "bed", "others"),
+    [
+        ("roughness length", {}, {"d/10"}),
+        # neighbours of a pocket of more than 60 degrees would overlap
+        ("entrainment angle", {}, {"-5°"}),
+        ("entrainment angle", {"bed.entrainment_angle_deg": 52.0}, {"-5°", "+5°"}),
+        ("entrainment angle", {"bed.packing": "poured"}, set()),
+        ("exposure", {}, set()),
+        ("exposure", {"bed.packing": "poured"}, {"protrusion"}),
+        ("packing", {"bed.packing": "poured"}, {f"poured, seed {seed}" for seed in (1, 2, 3)}),
+    ],
+)
+def test_the_alternatives_are_those_that_a_scene_can_have(
+    choice: str, bed: dict[str, object], others: set[str], scene: Scene
+) -> None:
+    assert set(_others(choice, changed(scene, bed))) == others
+
+
+def test_force_laws_are_those_that_hold(scene: Scene) -> None:
+    others = _others("force law", scene)
+    assert others
+    assert all(law_holds(other) and other.forces.law != "low" for other in others.values())
+
+
+def _moved(*changes: tuple[str, str, float], scene: str = "a") -> pd.DataFrame:
+    row = {"scene_id": scene, "scene": scene, "model_class": "aligned, rough", "fraction": 0.3}
+    return pd.DataFrame(
+        {**row, "choice": choice, "alternative": other, "shields": change, "ustar0": change / 2}
+        for choice, other, change in changes
+    )
+
+
+def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
+    moved = _moved(
+        ("law", "a", 0.2),
+        ("law", "b", 0.1),
+        ("law", "no threshold", math.nan),
+        ("cell", "half", -0.1),
+        ("cell", "twice", 0.3),
+    )
+    shares = budget.shares(moved).set_index("choice")
+    assert list(shares.loc["law", ["shields_low", "shields_high"]]) == [0.0, 0.2]
+    assert list(shares.loc["cell", ["shields_low", "shields_high"]]) == [0.1, 0.3]
+    assert shares.loc["cell", "ustar0_high"] == pytest.approx(0.15)
+    # of a class the largest is kept
+    worse = budget.shares(_moved(("law", "a", -0.4), scene="b"))
+    known = budget.known(pd.concat([shares.reset_index(), worse])).set_index("choice")
+    assert list(known.loc["law", ["shields_low", "shields_high", "scenes"]]) == [0.4, 0.2, 2.0]
+
+
+def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
+    asked = study.parse(SMALL, name="small", where="small")
+    finished = budget.run(asked, tmp_path / "out", workers=2)
+    assert not finished.failures
+    shared = pd.read_csv(tmp_path / "out" / "tables" / "shares.csv")
+    names = {one.name for one in CHOICES} - {OF_LATTICES}
+    assert set(shared["choice"]) == names
+    ends = shared.groupby("choice")[["shields_low", "shields_high"]].max()
+    largest = ends.sum(axis=1).to_dict()
+    # the drag on the grains grows with z0, and another seed is another bed
+    assert largest["roughness length"] > 0.1
+    assert largest["packing"] > 0.1
+    # a mean over a grain cannot feel half of 1/40 of the height
+    assert largest["averaging length"] < 0.05
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert all(name in page for name in names)
+    assert budget.run(asked, tmp_path / "out", workers=2).started == 0
+
+
+def test_a_flow_that_is_not_solved_has_no_choices_of_its_own() -> None:
+    listed, asked = budget.changes(study.parse(LEVEL, name="level", where="level"))
+    assert all(one.scene.flow.model == "flat" for one in asked.values())
+    assert {change.choice.name for change in listed} == {
+        one.name for one in CHOICES if not one.of_solved_flow and one.name != OF_LATTICES
+    }
+    seeds = {one.scene.bed.seed for one in asked.values() if isinstance(one.scene.bed, PileBed)}
+    assert seeds == {0, 1, 2, 3}
+    assert all(change.base.endswith(BASE) for change in listed)
+
+
+def test_a_study_without_piles(tmp_path: Path) -> None:
+    asked = study.parse("grain = { diameter = 1e-3 }", name="one", where="one")
+    with pytest.raises(InputError, match="there is no pile"):
+        budget.run(asked, tmp_path / "out", workers=1)
