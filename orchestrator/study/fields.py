@@ -8,7 +8,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.info import Info, Scope
+from orchestrator.study.part import Info, Scope
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import FIELDS_OF_SHAPES, Scene

@@ -1,8 +1,9 @@
 """One scene: a fluid, its grains, their bed, the flow and the protocol."""
 
 import re
+from collections.abc import Iterator
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
@@ -14,6 +15,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.log_law import log_law_ustar
 from orchestrator.physics.threshold import weight
 from orchestrator.runs.files import canonical_json, digest_text
+from orchestrator.study.part import Part, UnfitError
 from orchestrator.study.parts import (
     Bed,
     Flow,
@@ -21,12 +23,9 @@ from orchestrator.study.parts import (
     Forces,
     Grain,
     GrainBed,
-    Part,
     PileBed,
     Protocol,
-    UnfitError,
 )
-from orchestrator.study.profile import Profile
 from orchestrator.study.sizes import Sizes, largest, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
@@ -36,7 +35,8 @@ SOLVE_VISCOSITY = 1e-5
 VISCOUS_CELLS = 2.5
 """Height of the first cell over nu/(kappa u*_0): at its centre the flow is turbulent."""
 LEAST_DEPTH = 3.0
-"""Least depth of a channel, heights of the forms: the rows of its mesh are level at half of it."""
+"""Least depth of a flow over the height of forms and obstacles: the rows of its mesh are level at
+half of it."""
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: contacts give back 0.05 W d."""
 LEAST_WIDTH = 3.0
@@ -60,6 +60,8 @@ FIELDS_OF_SHAPES = {
     "spacing": FORMS,
 }
 """Fields that some shapes alone have."""
+Misfit = tuple[str, str, str]
+"""A field that does not go with others, why, and what would."""
 
 
 class Scene(Part):
@@ -80,66 +82,141 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        check_density(self.grain.density, self.fluid.density)
-        bed_grains = self.grain.diameter / self.bed.relative_size
-        check_roughness(self.bed, bed_grains * largest(self.grain.sizes, self.grain.diameter))
-        check_method(self.forces.law, self.protocol.method)
-        if self.grain.sizes is not None and not self.is_poured:
-            what = "a lattice has equal grains: a mixture needs a poured bed"
-            raise UnfitError("grain.sizes", what, 'bed.packing = "poured", or leave it out')
-        if isinstance(self.bed, PileBed) and self.bed.width:
-            self._check_strip(self.bed)
-        if self.is_poured and self.protocol.method == "dem":
-            check_poured_stiffness(self.grain.stiffness)
-        if self.forces.exposure == "protrusion":
-            check_protrusion(self.forces.law, is_poured=self.is_poured)
+        misfits = self._misfits_of_grains()
         if isinstance(self.bed, PileBed):
-            check_pile(self.bed, self.grain.diameter)
-            check_top(self.flow, self.bed)
-            if self.flow.model == "solve":
-                check_mesh(self.bed.relief, self.first_cell_height)
-            if self.bed.profile:
-                cell = self.first_cell_height if self.flow.model == "solve" else 0.0
-                check_points(self.bed.profile, self.grain.diameter, cell)
-        else:
-            check_grain(self.bed, self.grain.diameter)
-        if self.protocol.update:
-            self._check_update()
+            misfits = chain(
+                misfits, self._misfits_of_pile(self.bed), self._misfits_of_flow(self.bed)
+            )
+        for misfit in misfits:
+            raise UnfitError(*misfit)
         return self
 
-    def _check_strip(self, bed: PileBed) -> None:
-        """A strip in space is poured, wider than its grains, and known to few methods."""
-        if bed.packing != "poured":
-            what = "a lattice is one layer in the plane of the flow"
-            raise UnfitError("bed.width", what, 'bed.packing = "poured", or leave it out')
-        least = LEAST_WIDTH * largest(self.grain.sizes, self.grain.diameter)
-        if bed.width < least:
-            what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
-            raise UnfitError(
-                "bed.width", what, f"at least {least:.4g}, or 0 for a bed in the plane"
+    def _misfits_of_grains(self) -> Iterator[Misfit]:
+        grain, bed, law = self.grain, self.bed, LAWS.get(self.forces.law)
+        if grain.density <= self.fluid.density:
+            yield (
+                "grain.density",
+                f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3",
+                "the grain would float; raise it, or lower fluid.density",
             )
-        if self.protocol.method == "peeling":
-            what = "the method peeling knows grains in the plane of the flow alone"
-            raise UnfitError("bed.width", what, 'protocol.method = "dem" or "pivot", or width 0')
+        bed_grains = grain.diameter / bed.relative_size * largest(grain.sizes, grain.diameter)
+        if bed.roughness > ROUGHEST * bed_grains * (1 + 1e-9):
+            what = f"z0 = {bed.roughness:g} m is above a third of the bed's grains of"
+            what = f"{what} {bed_grains:g} m, rougher than any grains lie"
+            yield "bed.roughness", what, "typical: d/30"
+        if law and law.turns and self.protocol.method != "pivot":
+            what = f"{law.name} turns the grain about its centre, which the method"
+            what = f"{what} {self.protocol.method} leaves out"
+            yield "forces.law", what, 'choose the method "pivot", or a force law without torque'
+        if grain.sizes is not None and not self.is_poured:
+            what = "a lattice has equal grains: a mixture needs a poured bed"
+            yield "grain.sizes", what, 'bed.packing = "poured", or leave it out'
+        stiff = self.is_poured and grain.stiffness > MOST_POURED_STIFFNESS
+        if stiff and self.protocol.method == "dem":
+            what = "poured grains lie in one another by some 1e-3 d: springs of"
+            what = f"{what} {grain.stiffness:.3g} W/d throw them apart"
+            yield "grain.stiffness", what, f"at most {MOST_POURED_STIFFNESS:g}"
+        if self.forces.exposure == "protrusion" and not self.is_poured:
+            what = "the grains of a lattice stand alike"
+            yield "forces.exposure", what, 'bed.packing = "poured", or leave it out'
+        if self.forces.exposure == "protrusion" and law and not law.protrudes:
+            laws = ", ".join(name for name, each in LAWS.items() if each.protrudes)
+            what = f"{law.name} knows no height of a grain over the bed"
+            yield "forces.exposure", what, f"laws that do: {laws}"
+        if isinstance(bed, PileBed):
+            return
+        if bed.roughness >= grain.diameter:
+            yield "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
+        if pocket_cosine(bed) >= 1:
+            apart = 2 * cos(radians(bed.entrainment_angle_deg))
+            what = f"a grain of {bed.relative_size:g} d falls between neighbours that are"
+            what = f"{what} {apart:.3g} d apart"
+            yield "bed.relative_size", what, "raise it, or bed.entrainment_angle_deg"
         if self.protocol.update:
-            what = "a bed that changes is one layer in the plane of the flow"
-            raise UnfitError("bed.width", what, "leave it or protocol.update out")
+            what = "a single grain leaves no bed that changes"
+            yield "protocol.update", what, "leave it out"
 
-    def _check_update(self) -> None:
-        """A bed that changes needs a flow that sees a row go, and grains that free others."""
-        never = "leave it out"
-        if not isinstance(self.bed, PileBed):
-            raise UnfitError("protocol.update", "a single grain leaves no bed that changes", never)
-        if self.flow.model != "solve":
-            what = f'the flow model "{self.flow.model}" knows no bed that changes'
-            raise UnfitError("protocol.update", what, f'flow.model = "solve", or {never}')
-        if self.protocol.method == "pivot":
-            what = "each grain by itself frees no other"
-            raise UnfitError("protocol.update", what, f'the method "peeling" or "dem", or {never}')
-        if self.first_cell_height > self.grain.diameter:
-            what = f"the first cell, {self.first_cell_height:g} m, is higher than a grain"
-            remedy = f"set flow.first_cell_height to at most the diameter, or {never}"
-            raise UnfitError("protocol.update", what, remedy)
+    def _misfits_of_pile(self, bed: PileBed) -> Iterator[Misfit]:
+        d, method = self.grain.diameter, self.protocol.method
+        if bed.width:  # a strip in space
+            least = LEAST_WIDTH * largest(self.grain.sizes, d)
+            if bed.packing != "poured":
+                what = "a lattice is one layer in the plane of the flow"
+                yield "bed.width", what, 'bed.packing = "poured", or leave it out'
+            if bed.width < least:
+                what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
+                yield "bed.width", what, f"at least {least:.4g}, or 0 for a bed in the plane"
+            if method == "peeling":
+                what = "the method peeling knows grains in the plane of the flow alone"
+                yield "bed.width", what, 'protocol.method = "dem" or "pivot", or width 0'
+            if self.protocol.update:
+                what = "a bed that changes is one layer in the plane of the flow"
+                yield "bed.width", what, "leave it or protocol.update out"
+        if bed.relative_size != 1:
+            what = "it is of a single grain on its neighbours"
+            yield "bed.relative_size", what, "leave it out"
+        if bed.profile is None:
+            yield from _misfits_of_shape(bed)
+        elif (length := bed.profile.x[-1]) > MOST_GRAINS * d:
+            what = f"{length:g} m are {length / d:.0f} grains of {d:g} m"
+            yield "bed.profile", what, "are its columns in mm? or cut a part out of it"
+        else:
+            steps = np.hypot(np.diff(bed.profile.x), np.diff(bed.profile.z))
+            near = int(np.argmin(steps))
+            cell = self.first_cell_height if self.flow.model == "solve" else 0.0
+            least = max(NARROWEST_OVER_D * d, NARROWEST_OVER_CELL * cell)
+            if steps[near] < least:
+                lines = bed.profile.lines
+                line = f"line {lines[near + 1]}, " if lines else ""
+                what = f"{bed.profile.name}, {line}x = {bed.profile.x[near + 1]:.6g} m:"
+                what = f"{what} {steps[near]:.2g} m from the point before it, nearer than"
+                what = f"{what} {least:.2g} m"
+                more = "give" if lines else "raise"
+                yield "bed.profile", what, f"leave out one of the two, or {more} bed.smoothing"
+        for one, other in pairwise(sorted(bed.obstacles, key=lambda obstacle: obstacle.x)):
+            if other.x - one.x < one.reach + other.reach:
+                yield "bed.obstacles", f"{one} and {other} overlap", "move one of them"
+        if bed.height < 5 * d:
+            what = f"{bed.height:g} m is less than five grains of {d:g} m"
+            remedy = "a pile needs some rows, and lengths on a flat bed are parts of it: raise"
+            yield "bed.height", what, f"{remedy} bed.height or lower grain.diameter"
+
+    def _misfits_of_flow(self, bed: PileBed) -> Iterator[Misfit]:
+        flow, height = self.flow, bed.relief
+        top = flow.depth or flow.lid * height
+        for obstacle in bed.obstacles:
+            if top < LEAST_DEPTH * obstacle.height:
+                what = f"{obstacle} under a flow {top:g} m deep"
+                remedy = f"at most a part of 1/{LEAST_DEPTH:g} of that, or raise the depth or"
+                yield "bed.obstacles", what, f"{remedy} flow.lid"
+        if flow.top == "boundary layer":
+            if flow.depth:
+                remedy = 'leave it out, or choose flow.top = "open water"'
+                yield "flow.depth", "a boundary layer has none", remedy
+        elif not flow.depth:
+            yield "flow.depth", f"the depth of {flow.top} is missing", "give it, in m"
+        elif flow.depth < LEAST_DEPTH * height:
+            what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms,"
+            yield "flow.depth", f"{what} {height:g} m", "raise it, or lower bed.height"
+        elif flow.model not in ("solve", "flat"):
+            what = f"the theory {flow.model} is of a flow without a top"
+            yield "flow.model", what, 'choose "solve" or "flat"'
+        cell = self.first_cell_height
+        if flow.model == "solve" and cell > height / 4:
+            what = f"{cell:g} m is above a quarter of the pile's {height:g} m"
+            yield "flow.first_cell_height", what, "lower it, or raise bed.height"
+        if self.protocol.update:
+            never = "leave it out"
+            if flow.model != "solve":
+                what = f'the flow model "{flow.model}" knows no bed that changes'
+                yield "protocol.update", what, f'flow.model = "solve", or {never}'
+            if self.protocol.method == "pivot":
+                what = "each grain by itself frees no other"
+                yield "protocol.update", what, f'the method "peeling" or "dem", or {never}'
+            if cell > self.grain.diameter:
+                what = f"the first cell, {cell:g} m, is higher than a grain"
+                remedy = f"set flow.first_cell_height to at most the diameter, or {never}"
+                yield "protocol.update", what, remedy
 
     @cached_property
     def id(self) -> str:
@@ -218,163 +295,22 @@ def pocket_cosine(bed: Bed) -> float:
     return 2 * cos(radians(bed.entrainment_angle_deg)) / (1 + bed.relative_size)
 
 
-def check_roughness(bed: Bed, diameter: float) -> None:
-    """The roughness length belongs to the grains of the bed, the largest of which are given."""
-    if bed.roughness > ROUGHEST * diameter * (1 + 1e-9):
-        what = f"z0 = {bed.roughness:g} m is above a third of the bed's grains of {diameter:g} m"
-        raise UnfitError("bed.roughness", f"{what}, rougher than any grains lie", "typical: d/30")
-
-
-def check_grain(bed: Bed, diameter: float) -> None:
-    """A single grain must stand out of the roughness and lie on its neighbours."""
-    if bed.roughness >= diameter:
-        raise UnfitError("bed.roughness", "z0 is not below the grain's diameter", "typical: d/30")
-    if pocket_cosine(bed) >= 1:
-        raise UnfitError(
-            "bed.relative_size",
-            f"a grain of {bed.relative_size:g} d falls between neighbours that are"
-            f" {2 * cos(radians(bed.entrainment_angle_deg)):.3g} d apart",
-            "raise it, or bed.entrainment_angle_deg",
-        )
-
-
-def check_density(density: float, fluid_density: float) -> None:
-    """A grain must sink."""
-    if density <= fluid_density:
-        raise UnfitError(
-            "grain.density",
-            f"{density:g} kg/m3 is not above the fluid's {fluid_density:g} kg/m3",
-            "the grain would float; raise it, or lower fluid.density",
-        )
-
-
-def check_method(law: str, method: str) -> None:
-    """A grain feels forces in DEM and in peeling, no torque."""
-    if law in LAWS and LAWS[law].turns and method != "pivot":
-        raise UnfitError(
-            "forces.law",
-            f"{law} turns the grain about its centre, which the method {method} leaves out",
-            'choose the method "pivot", or a force law without torque',
-        )
-
-
-def check_poured_stiffness(stiffness: float) -> None:
-    """Grains that are poured lie in one another as far as their stiffness then lets them."""
-    if stiffness > MOST_POURED_STIFFNESS:
-        raise UnfitError(
-            "grain.stiffness",
-            f"poured grains lie in one another by some 1e-3 d: springs of {stiffness:.3g} W/d throw"
-            " them apart",
-            f"at most {MOST_POURED_STIFFNESS:g}",
-        )
-
-
-def check_protrusion(law: str, *, is_poured: bool) -> None:
-    """Grains stand at heights of their own on a poured bed alone, under some laws."""
-    if not is_poured:
-        what = "the grains of a lattice stand alike"
-        raise UnfitError("forces.exposure", what, 'bed.packing = "poured", or leave it out')
-    if law in LAWS and not LAWS[law].protrudes:
-        known = ", ".join(name for name, one in LAWS.items() if one.protrudes)
-        what = f"{law} knows no height of a grain over the bed"
-        raise UnfitError("forces.exposure", what, f"laws that do: {known}")
-
-
-def check_pile(bed: PileBed, diameter: float) -> None:
-    """Refuse piles whose mesh or packing cannot be built."""
-    if bed.relative_size != 1:
-        raise UnfitError(
-            "bed.relative_size", "it is of a single grain on its neighbours", "leave it out"
-        )
-    if not bed.profile:
-        check_shape(bed)
-    elif (length := bed.profile.x[-1]) > MOST_GRAINS * diameter:
-        what = f"{length:g} m are {length / diameter:.0f} grains of {diameter:g} m"
-        raise UnfitError("bed.profile", what, "are its columns in mm? or cut a part out of it")
-    for one, other in pairwise(sorted(bed.obstacles, key=lambda one: one.x)):
-        if other.x - one.x < one.reach + other.reach:
-            what = f"{one} and {other} overlap"
-            raise UnfitError("bed.obstacles", what, "move one of them")
-    if bed.height < 5 * diameter:
-        raise UnfitError(
-            "bed.height",
-            f"{bed.height:g} m is less than five grains of {diameter:g} m",
-            "a pile needs some rows, and lengths on a flat bed are parts of it: raise bed.height or"
-            " lower grain.diameter",
-        )
-
-
-def check_points(profile: Profile, diameter: float, first_cell: float) -> None:
-    """Two points of a profile lie no nearer to one another than grains and mesh can follow."""
-    steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
-    near = int(np.argmin(steps))
-    least = max(NARROWEST_OVER_D * diameter, NARROWEST_OVER_CELL * first_cell)
-    if steps[near] < least:
-        line = f"line {profile.lines[near + 1]}, " if profile.lines else ""
-        raise UnfitError(
-            "bed.profile",
-            f"{profile.name}, {line}x = {profile.x[near + 1]:.6g} m: {steps[near]:.2g} m from the"
-            f" point before it, nearer than {least:.2g} m",
-            f"leave out one of the two, or {'give' if line else 'raise'} bed.smoothing",
-        )
-
-
-def check_top(flow: Flow, bed: PileBed) -> None:
-    """The top of the flow is well above the forms and the obstacles."""
-    height = bed.relief
-    top = flow.depth or flow.lid * height
-    for obstacle in bed.obstacles:
-        if top < LEAST_DEPTH * obstacle.height:
-            what = f"{obstacle} under a flow {top:g} m deep"
-            remedy = f"at most a part of 1/{LEAST_DEPTH:g} of that, or raise the depth or flow.lid"
-            raise UnfitError("bed.obstacles", what, remedy)
-    if flow.top == "boundary layer":
-        if flow.depth:
-            remedy = 'leave it out, or choose flow.top = "open water"'
-            raise UnfitError("flow.depth", "a boundary layer has none", remedy)
-        return
-    if not flow.depth:
-        raise UnfitError("flow.depth", f"the depth of {flow.top} is missing", "give it, in m")
-    if flow.depth < LEAST_DEPTH * height:
-        what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms, {height:g} m"
-        raise UnfitError("flow.depth", what, "raise it, or lower bed.height")
-    if flow.model not in ("solve", "flat"):
-        what = f"the theory {flow.model} is of a flow without a top"
-        raise UnfitError("flow.model", what, 'choose "solve" or "flat"')
-
-
-def check_shape(bed: PileBed) -> None:
-    """Check the forms and their grains."""
-    low, high = BUILDABLE_DEG
-    rises = bed.shape not in ("flat", "step down")
+def _misfits_of_shape(bed: PileBed) -> Iterator[Misfit]:
+    (low, high), rises = BUILDABLE_DEG, bed.shape not in ("flat", "step down")
+    name = f"a {bed.shape}" if bed.shape != "flat" else "a flat bed"
     if rises and not low <= bed.slope_deg <= high:
-        raise UnfitError(
-            "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
-        )
+        what, remedy = f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
+        yield "bed.slope_deg", what, remedy
     if bed.smoothing:
-        raise UnfitError("bed.smoothing", "it is of a profile", "leave it out")
+        yield "bed.smoothing", "it is of a profile", "leave it out"
     for field, shapes in FIELDS_OF_SHAPES.items():
         if getattr(bed, field) != PileBed.model_fields[field].default and bed.shape not in shapes:
-            what = f"{_a(bed.shape)} has none"
-            raise UnfitError(f"bed.{field}", what, f"leave it out; it is of: {', '.join(shapes)}")
+            remedy = f"leave it out; it is of: {', '.join(shapes)}"
+            yield f"bed.{field}", f"{name} has none", remedy
     if not rises and bed.slope_deg:
-        raise UnfitError("bed.slope_deg", f"{_a(bed.shape)} does not rise", "leave it out")
+        yield "bed.slope_deg", f"{name} does not rise", "leave it out"
     if bed.spacing and bed.forms == 1:
-        raise UnfitError("bed.spacing", "one form has no neighbour", "raise bed.forms")
-
-
-def _a(shape: str) -> str:
-    return f"a {shape}" if shape != "flat" else "a flat bed"
-
-
-def check_mesh(height: float, first_cell_height: float) -> None:
-    """The mesh must resolve the pile."""
-    if first_cell_height > height / 4:
-        raise UnfitError(
-            "flow.first_cell_height",
-            f"{first_cell_height:g} m is above a quarter of the pile's {height:g} m",
-            "lower it, or raise bed.height",
-        )
+        yield "bed.spacing", "one form has no neighbour", "raise bed.forms"
 
 
 def default_first_cell_height(height: float, roughness: float, viscous: float = 0.0) -> float:

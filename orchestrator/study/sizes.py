@@ -4,21 +4,23 @@ from math import log
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from scipy.special import ndtr, ndtri
 
-FloatArray = NDArray[np.float64]
+from orchestrator.study.part import UnfitError
+from orchestrator.types import FloatArray
 
 Sieve = tuple[tuple[float, float], ...]
 """Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
 LARGEST_RATIO = 10.0
-"""Largest ratio of the largest to the smallest grain: neighbour lists reach as far as two of the
-largest, so that their length, and the time of a run, rise with its square."""
-HEAD = ("diameter_m", "fraction")
-"""Columns of a file with a sieve table."""
+"""Largest ratio of the largest to the smallest grain: the lists of neighbours in DEM reach as far
+as two of the largest, so that their length, and the time of a run, rise with its square."""
 SUM = 1e-6
-"""How far from 1 the fractions of a sieve table may add up."""
+"""Largest difference of the sum of a sieve table's fractions from 1."""
+OFF_MEDIAN = 0.01
+"""Largest difference of a log-normal mixture's d50 from the diameter, relative: Shields numbers and
+a roughness length of d/30 take the diameter."""
 
 
 class LogNormal(BaseModel):
@@ -35,6 +37,14 @@ class LogNormal(BaseModel):
         """Cut-offs over the median; by default two geometric standard deviations."""
         return self.smallest or self.sigma_g**-2, self.largest or self.sigma_g**2
 
+    def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
+        """Diameter over the median that a part of the mass (power 0) or number (3) is below."""
+        width = log(self.sigma_g)
+        middle = -power * width**2
+        low, high = (ndtr((log(end) - middle) / width) for end in self.ends)
+        sizes = np.exp(middle + width * ndtri(low + np.asarray(part) * (high - low)))
+        return np.asarray(np.clip(sizes, *self.ends))
+
     def __str__(self) -> str:
         low, high = self.ends
         return f"log-normal, sigma_g {self.sigma_g:g}, {low:.3g} to {high:.3g} d50"
@@ -43,25 +53,65 @@ class LogNormal(BaseModel):
 Sizes = LogNormal | Sieve
 
 
-def fault(sizes: Sizes) -> str | None:
-    """A fault of a mixture, if there is one."""
+def read(value: Any) -> Sizes | None:
+    """Sizes as a study file writes them: a list of rows, or a table with ``sigma_g``.
+
+    Raises
+    ------
+    UnfitError
+        If the value is neither.
+    """
+
+    def refused(what: str) -> UnfitError:
+        remedy = "write [[5e-4, 0.4], [1e-3, 0.6]], or { sigma_g = 1.3 }"
+        return UnfitError("grain.sizes", what, remedy)
+
+    if value is None or isinstance(value, LogNormal):
+        return value
+    if isinstance(value, dict):
+        try:
+            return LogNormal.model_validate(value)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise refused(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    if not isinstance(value, list | tuple) or not value:
+        raise refused("neither rows [diameter, mass fraction] nor { sigma_g = ... }")
+    for row in value:
+        if not isinstance(row, list | tuple) or len(row) != 2:
+            raise refused("a row is not [diameter, mass fraction]")
+        if not all(isinstance(number, int | float) and 0 < number < 100 for number in row):
+            raise refused("a diameter (m) or a mass fraction is no number above 0")
+    return tuple((float(diameter), float(fraction)) for diameter, fraction in value)
+
+
+def check(sizes: Sizes, diameter: float) -> None:
+    """See that a mixture is one that can be poured, and that the diameter (m) is its median.
+
+    Raises
+    ------
+    UnfitError
+        If it is not.
+    """
+    what, field, remedy = "", "grain.sizes", "look at the rows"
+    median = percentile(sizes, diameter, 0.5)
     if isinstance(sizes, LogNormal):
-        low, high = sizes.ends
-        return None if high / low <= LARGEST_RATIO else _too_wide(high / low)
-    diameters, fractions = np.array(sizes).T
-    if not np.all(np.diff(diameters) > 0):
-        return "the diameters do not rise from row to row"
-    if abs(fractions.sum() - 1) > SUM:
-        return f"the mass fractions add up to {fractions.sum():.6g}, not to 1"
-    ratio = diameters[-1] / diameters[0]
-    return None if ratio <= LARGEST_RATIO else _too_wide(ratio)
-
-
-def _too_wide(ratio: float) -> str:
-    return (
-        f"the largest grain is {ratio:.3g} times the smallest; the neighbour lists of LIGGGHTS bear"
-        f" {LARGEST_RATIO:g}"
-    )
+        if abs(median / diameter - 1) > OFF_MEDIAN:
+            what = f"between these cut-offs d50 is {median:.4g} m, not the diameter"
+            remedy = "write smallest = 1/largest"
+    else:
+        diameters, fractions = np.array(sizes).T
+        if not np.all(np.diff(diameters) > 0):
+            what = "the diameters do not rise from row to row"
+        elif abs(fractions.sum() - 1) > SUM:
+            what = f"the mass fractions add up to {fractions.sum():.6g}, not to 1"
+        elif abs(diameter / median - 1) > 1e-9:
+            field, remedy = "grain.diameter", "leave it out"
+            what = f"the d50 of grain.sizes is {median:.9g} m"
+    ratio = largest(sizes, diameter) / smallest(sizes, diameter)
+    if not what and ratio > LARGEST_RATIO:
+        what = f"the largest grain is {ratio:.3g} times the smallest, more than {LARGEST_RATIO:g}"
+    if what:
+        raise UnfitError(field, what, remedy)
 
 
 def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
@@ -79,12 +129,11 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     if sizes is None:
         return diameter
     if isinstance(sizes, LogNormal):
-        return diameter * float(_cut(sizes, part, power=0))
+        return diameter * float(sizes.quantile(part, power=0))
     diameters, fractions = np.array(sizes).T
     finer = np.cumsum(fractions) - fractions / 2
-    found = np.exp(np.interp(part, finer, np.log(diameters)))
     # the exponential of a logarithm is not the number itself to the last digit
-    return float(f"{found:.12g}")
+    return float(f"{np.exp(np.interp(part, finer, np.log(diameters))):.12g}")
 
 
 def largest(sizes: Sizes | None, diameter: float) -> float:
@@ -111,71 +160,10 @@ def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatA
     if sizes is None:
         return np.ones(count)
     if isinstance(sizes, LogNormal):
-        found = _cut(sizes, part, power=3)
+        each = sizes.quantile(part, power=3)
     else:
         diameters, fractions = np.array(sizes).T
         number = fractions / diameters**3
         classes = np.searchsorted(np.cumsum(number) / number.sum(), part)
-        found = diameters[np.minimum(classes, len(diameters) - 1)] / diameter
-    return np.random.default_rng(seed).permutation(found)
-
-
-def _cut(sizes: LogNormal, part: ArrayLike, *, power: int) -> FloatArray:
-    """Quantiles over the median by mass: of the mass for a power of 0, of the number for 3."""
-    width = log(sizes.sigma_g)
-    middle = -power * width**2
-    low, high = (ndtr((log(end) - middle) / width) for end in sizes.ends)
-    found = np.exp(middle + width * ndtri(low + np.asarray(part) * (high - low)))
-    return np.asarray(np.clip(found, *sizes.ends))
-
-
-def read(value: Any) -> Sizes | None:
-    """Sizes as a study file writes them: a table of rows, or that of a log-normal distribution.
-
-    Raises
-    ------
-    ValueError
-        Saying what is wrong.
-    """
-    if value is None or isinstance(value, LogNormal):
-        return value
-    if isinstance(value, dict):
-        try:
-            return LogNormal.model_validate(value)
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-    rows = [_row(row) for row in value] if isinstance(value, list | tuple) else []
-    if not rows:
-        raise ValueError("neither rows [diameter, mass fraction] nor { sigma_g = ... }")
-    return tuple(rows)
-
-
-def of_csv(text: str) -> list[list[float]]:
-    """The rows of a sieve table in a file: diameter and mass fraction, under a line that says so.
-
-    Raises
-    ------
-    ValueError
-        Naming the line.
-    """
-    head, *lines = text.lstrip("\ufeff").splitlines() or [""]
-    if [name.strip() for name in head.split(",")] != list(HEAD):
-        raise ValueError(f"line 1 is not {','.join(HEAD)}")
-    rows = []
-    for number, line in enumerate(lines, 2):
-        if line.strip():
-            try:
-                rows.append([float(cell) for cell in line.split(",")])
-            except ValueError:
-                raise ValueError(f"line {number} is no row of two numbers") from None
-    return rows
-
-
-def _row(row: Any) -> tuple[float, float]:
-    if not isinstance(row, list | tuple) or len(row) != 2:
-        raise ValueError("a row is not [diameter, mass fraction]")
-    if not all(isinstance(one, int | float) and 0 < one < 100 for one in row):
-        raise ValueError("a diameter (m) or a mass fraction is no number above 0")
-    diameter, fraction = (float(one) for one in row)
-    return diameter, fraction
+        each = diameters[np.minimum(classes, len(diameters) - 1)] / diameter
+    return np.random.default_rng(seed).permutation(each)

@@ -8,37 +8,56 @@ is one group.
 import itertools
 import math
 import os
-import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, unknown_key
 from orchestrator.runs import assets
-from orchestrator.runs.files import opened
 from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
-from orchestrator.study.parts import UnfitError
-from orchestrator.study.profiles import Profiles
-from orchestrator.study.refusals import GROUP_KEYS, TOP_KEYS, check_keys, explained
+from orchestrator.study.part import UnfitError
+from orchestrator.study.parts import PileBed
+from orchestrator.study.profile import Files, read_text
 from orchestrator.study.scene import Scene, roughness_length
-from orchestrator.study.sizes import Sizes
 
 TIME_LIMIT_S = 3600.0
 LONGEST_S = 1e8
-"""Three years."""
+"""Longest time limit: three years."""
 BED = {"kind": "grain", "roughness": "d/30"}
 """Fields of a bed that a file may leave out."""
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
 """Largest study file, bytes: one that lists every scene that there may be is smaller."""
 MOST_SEEDS = 1000
+GROUP_KEYS = (*PARTS, "axes", "name", "seeds")
+TOP_KEYS = (
+    *(*PARTS, "axes", "title", "time_limit", "tolerance", "cluster", "group", "profiles"),
+    "seeds",
+)
+RENAMED = {
+    "flow.closure": "forces.law",
+    "flow.lift_coefficient": "forces.lift_coefficient",
+    "flow.stress": "forces.stress",
+    "flow.average": "forces.averaging_length",
+    "flow.forced": "forces.loaded_grains",
+    "flow.growth": "flow.expansion_ratio",
+    "flow.correctors": "flow.non_orthogonal_correctors",
+    "flow.turbulence": "flow.turbulence_model",
+    "flow.convection": "flow.convection_scheme",
+    "protocol.step": "protocol.load_increment",
+    "protocol.quiet": "protocol.waiting_time",
+    "protocol.marker": "protocol.displacement_criterion",
+    "protocol.until": "protocol.final_fraction",
+    "protocol.timestep": "protocol.time_step",
+}
+"""Former names of keys, with the present ones."""
 
 
 @dataclass(frozen=True)
@@ -122,40 +141,31 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
     """
     brought = presets(folders)
     path = brought.get(source, Path(source))
-    if not _is_file(path):
-        known = ", ".join(sorted(brought))
+    if not os.path.isfile(path):
         raise InputError(
             "there is no such study file, nor a preset of this name",
             where=source,
-            remedy=f"presets: {known}; or give the path of a TOML file",
+            remedy=f"presets: {', '.join(sorted(brought))}; or give the path of a TOML file",
         )
-    try:
-        # some editors begin a text with a mark of its encoding
-        with opened(path) as stream:
-            content = stream.read(MOST_BYTES + 1) or b""  # nothing of what would wait
-        text = content.decode("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"not a readable text file: {error}", where=source) from None
-    if len(content) > MOST_BYTES:
-        raise InputError(f"it is larger than {MOST_BYTES // 2**20} MiB", where=source)
+    text = read_text(path, MOST_BYTES)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":
         raise InputError("a file of dots names no study", where=source, remedy="rename it")
-    return replace(parse(text, name=name, where=source), file=str(path.absolute()))
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name that is too long
-        return False
+    return parse(text, name=name, where=source)
 
 
 def parse(text: str, *, name: str, where: str) -> Study:
-    """Make a study of a TOML file's text; `where` names the file in messages.
+    """Make a study of the text of a TOML file.
 
     Only scenes that cannot be built are refused; a plan refuses those beyond the methods' limits.
+
+    Parameters
+    ----------
+    text, name : str
+        The text, and the name of the study.
+    where : str
+        Path of the file, for messages; profiles are looked for in its folder.
 
     Raises
     ------
@@ -168,200 +178,180 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError("tables or lists are nested too deeply", where=where) from None
     except ValueError as error:
         raise InputError(f"not TOML: {error}", where=where) from None
-    check_keys(data, TOP_KEYS, where)
-    limit = data.get("time_limit", TIME_LIMIT_S)
+    _check_keys(data, TOP_KEYS, where)
+    limit, title = data.get("time_limit", TIME_LIMIT_S), data.get("title", name)
     check_time(limit, f"{where}: time_limit")
-    title = data.get("title", name)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
-    profiles = Profiles(Path(where).parent, dict(_table(data, "profiles", where)))
-    groups = tuple(_resolved(list(_groups(data, where, profiles))))
+    files = Files(Path(where).parent, _table(data, "profiles", where))
+    groups = list(_groups(data, where, files))
+    # force laws are found for the scenes of all groups at once
+    under_laws = resolved([scene for group in groups for scene in group.scenes])
+    groups = [
+        Group(g.name, tuple(itertools.chain(*itertools.islice(under_laws, len(g.scenes)))), g.where)
+        for g in groups
+    ]
     tolerance = data.get("tolerance")
     if tolerance is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
     cluster = _table(data, "cluster", where)
-    return Study(name, title, groups, float(limit), tolerance, cluster, text + profiles.added)
+    return Study(name, title, tuple(groups), float(limit), tolerance, cluster, text + files.added)
 
 
 def check_time(value: Any, where: str) -> None:
-    """A time limit is one that a machine can wait for.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
+    """See that a time limit is a time that a machine can wait for; else an `InputError`."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value <= LONGEST_S:
-        raise InputError(
-            f"{value!r} is not a time in seconds",
-            where=where,
-            remedy=f"above 0, and at most {LONGEST_S:g}",
-        )
+        what, remedy = f"{value!r} is not a time in seconds", f"above 0, and at most {LONGEST_S:g}"
+        raise InputError(what, where=where, remedy=remedy)
 
 
 def check_tolerance(value: Any, where: str) -> None:
-    """A tolerance is a relative error below 1.
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
+    """See that a tolerance is a relative error below 1; else an `InputError`."""
     if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value < 1:
-        raise InputError(
-            f"{value!r} is not a relative error from 0 to below 1",
-            where=where,
-            remedy="0.05 allows tau_c to be 5 % off, 0 takes every scene as it is asked",
-        )
+        what = f"{value!r} is not a relative error from 0 to below 1"
+        remedy = "0.05 allows tau_c to be 5 % off, 0 takes every scene as it is asked"
+        raise InputError(what, where=where, remedy=remedy)
 
 
-def _groups(data: Mapping[str, Any], where: str, profiles: Profiles) -> Iterator[Group]:
-    listed = data.get("group", [{}])
+def _groups(data: Mapping[str, Any], where: str, files: Files) -> Iterator[Group]:
+    """The groups of a file, with their scenes as they are asked for."""
+    listed, count = data.get("group", [{}]), 0
     is_list = isinstance(listed, list) and listed
     if not is_list or not all(isinstance(item, dict) for item in listed):
-        raise InputError(
-            "not a list of tables", where=f"{where}: group", remedy="write [[group]] for each"
-        )
-    count = 0
+        what, remedy = "not a list of tables", "write [[group]] for each"
+        raise InputError(what, where=f"{where}: group", remedy=remedy)
     for number, item in enumerate(listed, 1):
         place = f"{where}: group {number}" if "group" in data else where
-        check_keys(item, GROUP_KEYS, place)
-        merged = {part: _merged(data, item, part, place) for part in (*PARTS, "axes")}
-        if seeds := _seeds(item.get("seeds", data.get("seeds", 0)), f"{place}: seeds"):
-            merged["axes"] = {**merged["axes"], "bed.seed": seeds}
-        _check_axes(merged["axes"], place)
-        count += math.prod(map(len, merged["axes"].values()))
+        _check_keys(item, GROUP_KEYS, place)
+        tables = {
+            part: {**_table(data, part, place), **_table(item, part, place)}
+            for part in (*PARTS, "axes")
+        }
+        for key, values in tables["axes"].items():
+            part, dot, field = key.partition(".")
+            what, remedy = "", 'for instance "grain.diameter" = [1e-4, 1e-3]'
+            if part not in PARTS or not dot or not field:
+                what = "an axis is named by its table and field"
+            elif not isinstance(values, list) or not values:
+                what = f"{values!r} is not a list of values"
+            if what:
+                raise InputError(what, where=f"{place}: axes.{key}", remedy=remedy)
+        seeds = item.get("seeds", data.get("seeds", 0))
+        if type(seeds) is not int or not 0 <= seeds <= MOST_SEEDS:
+            what, remedy = "it is no number of beds", f"at most {MOST_SEEDS}: 5 takes seeds 0 to 4"
+            raise InputError(what, where=f"{place}: seeds", remedy=remedy)
+        if seeds:
+            tables["axes"]["bed.seed"] = list(range(seeds))
+        count += math.prod(map(len, tables["axes"].values()))
         if count > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
             raise InputError(what, where=f"{place}: axes", remedy="shorten the lists")
-        scenes = tuple(_scenes(merged, place, profiles))
+        scenes = tuple(_scenes(tables, place, files))
         yield Group(str(item.get("name", f"group {number}")), scenes, place)
 
 
-def _seeds(count: Any, where: str) -> list[int]:
-    """The seeds of beds that differ in nothing else; none where a file asks for none."""
-    if type(count) is not int or not 0 <= count <= MOST_SEEDS:
-        what = "it is no number of beds"
-        raise InputError(what, where=where, remedy=f"at most {MOST_SEEDS}: seeds = 5 takes 0 to 4")
-    return list(range(count))
-
-
-def _resolved(groups: Sequence[Group]) -> Iterator[Group]:
-    """The groups with a force law for each of their scenes; for all of them at once."""
-    each = resolved([scene for group in groups for scene in group.scenes])
-    for group in groups:
-        decided = itertools.islice(each, len(group.scenes))
-        yield replace(group, scenes=tuple(itertools.chain.from_iterable(decided)))
-
-
-def _merged(
-    data: Mapping[str, Any], item: Mapping[str, Any], part: str, where: str
-) -> dict[str, Any]:
-    return {**_table(data, part, where), **_table(item, part, where)}
+def _scenes(tables: Mapping[str, dict[str, Any]], where: str, files: Files) -> Iterator[Scene]:
+    """A scene for each combination of the axes' values; each must be a scene of its own."""
+    points: dict[str, tuple[Any, ...]] = {}
+    for point in itertools.product(*tables["axes"].values()):
+        parts = {part: dict(tables[part]) for part in PARTS}
+        for key, value in zip(tables["axes"], point, strict=True):
+            part, _, field = key.partition(".")
+            parts[part][field] = value
+        scene = make_scene(parts, where, files)
+        same = points.setdefault(scene.id, point)
+        if same is not point:
+            texts = (", ".join(map(str, values)) for values in (same, point))
+            what = f"{' and '.join(texts)} are one scene"
+            raise InputError(what, where=f"{where}: axes", remedy="list each value once")
+        yield scene
 
 
 def _table(data: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
     table = data.get(name, {})
     if not isinstance(table, dict):
-        raise InputError(
-            f"{table!r} is not a table", where=f"{where}: {name}", remedy=f"write [{name}]"
-        )
-    return table
-
-
-def _check_axes(axes: Mapping[str, Any], where: str) -> None:
-    """See that each axis is a list of values of a field."""
-    for key, values in axes.items():
-        part, dot, field = key.partition(".")
-        if part not in PARTS or not dot or not field:
-            raise InputError(
-                "an axis is named by its table and field",
-                where=f"{where}: axes.{key}",
-                remedy='for instance "grain.diameter" = [1e-4, 1e-3]',
-            )
-        if not isinstance(values, list) or not values:
-            raise InputError(
-                f"{values!r} is not a list of values",
-                where=f"{where}: axes.{key}",
-                remedy="write [first, second, ...]",
-            )
-
-
-def _scenes(tables: Mapping[str, dict[str, Any]], where: str, profiles: Profiles) -> list[Scene]:
-    grid = list(itertools.product(*tables["axes"].values()))
-    scenes = [make_scene(parts, where, profiles) for parts in _points(tables, grid)]
-    if len(grid) > 1:
-        _check_distinct(scenes, grid, where)
-    return scenes
-
-
-def _check_distinct(scenes: list[Scene], grid: list[tuple[Any, ...]], where: str) -> None:
-    """See that each combination of values is a scene of its own."""
-    points: dict[str, tuple[Any, ...]] = {}
-    for scene, point in zip(scenes, grid, strict=True):
-        same = points.setdefault(scene.id, point)
-        if same is not point:
-            said, again = (", ".join(map(str, values)) for values in (same, point))
-            raise InputError(
-                f"{said} and {again} are one scene",
-                where=f"{where}: axes",
-                remedy="list each value once",
-            )
-
-
-def _points(
-    tables: Mapping[str, dict[str, Any]], grid: list[tuple[Any, ...]]
-) -> Iterator[dict[str, dict[str, Any]]]:
-    places = [key.partition(".")[::2] for key in tables["axes"]]
-    for point in grid:
-        parts = {part: dict(tables[part]) for part in PARTS}
-        for (part, field), value in zip(places, point, strict=True):
-            parts[part][field] = value
-        yield parts
+        what = f"{table!r} is not a table"
+        raise InputError(what, where=f"{where}: {name}", remedy=f"write [{name}]")
+    return dict(table)
 
 
 def make_scene(
-    parts: Mapping[str, dict[str, Any]], where: str, profiles: Profiles | None = None
+    parts: Mapping[str, dict[str, Any]], where: str, files: Files | None = None
 ) -> Scene:
-    """Validate the tables of one scene; `where` names the file in messages.
+    """Validate the tables of one scene.
+
+    Parameters
+    ----------
+    parts : mapping
+        The tables by their names; d/30 of a diameter is filled in, and the d50 of a sieve table.
+    where : str
+        Names the file in messages.
+    files : Files, optional
+        The files that the tables may name.
 
     Raises
     ------
     InputError
         For the first thing wrong: the file, the field and the remedy.
     """
-    bed = {**BED, **parts["bed"]}
-    if profiles and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
-        bed |= profiles.bed(bed, where)
-    grain = parts["grain"]
-    if profiles and isinstance(grain.get("sizes"), str):
-        grain = {**grain, "sizes": profiles.sieve(grain["sizes"], where)}
+    bed, grain = {**BED, **parts["bed"]}, dict(parts["grain"])
+    if files and bed["kind"] == "pile" and "profile" in bed:
+        bed |= files.bed(bed, where)
+    if files and isinstance(grain.get("sizes"), str):
+        grain["sizes"] = files.sieve(grain["sizes"])
     try:
-        mixture, grain = _mixture(grain)
-        if diameter := _of_the_bed(grain.get("diameter"), bed.get("relative_size", 1.0)):
+        mixture = sizes.read(grain.get("sizes"))
+        if isinstance(mixture, tuple):
+            grain.setdefault("diameter", sizes.percentile(mixture, 1.0, 0.5))
+        diameter, relative = grain.get("diameter"), bed.get("relative_size", 1.0)
+        # other values are refused where the fields are declared
+        if isinstance(diameter, int | float) and abs(diameter) < 1e300:
+            if isinstance(relative, int | float) and 1e-3 < relative < 1e3:
+                diameter = diameter / relative
             bed["roughness"] = roughness_length(bed["roughness"], diameter, mixture)
         return Scene.model_validate({**parts, "grain": grain, "bed": bed})
     except UnfitError as error:
         raise InputError(error.what, where=f"{where}: {error.field}", remedy=error.remedy) from None
     except ValidationError as error:
-        raise explained(error, where) from None
+        raise _explained(error, where) from None
 
 
-def _mixture(grain: dict[str, Any]) -> tuple[Sizes | None, dict[str, Any]]:
-    """The sizes of a bed's grains, None where they are equal; the grain, a sieve's with its d50."""
-    try:
-        found = sizes.read(grain.get("sizes"))
-    except ValueError:
-        return None, {"diameter": 1e-3, **grain}  # the model will refuse the sizes
-    if not isinstance(found, tuple):
-        return found, grain
-    return found, {"diameter": sizes.percentile(found, 1.0, 0.5), **grain}
+def _check_keys(table: Mapping[str, Any], keys: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in keys:
+            raise unknown_key(key, keys, f"{where}: {key}", _elsewhere(""))
 
 
-def _of_the_bed(diameter: Any, relative_size: Any) -> float:
-    """Diameter of the grains that make the bed rough, m; 0 where the model will refuse it."""
-    if not isinstance(diameter, int | float) or abs(diameter) >= sys.float_info.max:
-        return 0.0
-    # the model will refuse a size that is none
-    is_size = isinstance(relative_size, int | float) and 1e-3 < relative_size < 1e3
-    return float(diameter / relative_size) if is_size else float(diameter)
+def _explained(error: ValidationError, where: str) -> InputError:
+    """The refusal of a scene's tables, for the first thing that is wrong in them."""
+    # a misspelt key says more than the field that is missing because of it
+    first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, UnfitError):
+        return InputError(cause.what, where=f"{where}: {cause.field}", remedy=cause.remedy)
+    path = [str(step) for step in first["loc"]]
+    is_grain = path[:2] == ["bed", "grain"]
+    if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]):
+        del path[1]  # the branch of the union, not a key of the file
+    field = ".".join(path)
+    place = f"{where}: {field}"
+    if first["type"] == "missing":
+        return InputError("is missing", where=place, remedy="add it to the file")
+    if first["type"] != "extra_forbidden":
+        remedy = first["msg"].lower().replace("input should", "it should")
+        return InputError(f"{first.get('input')!r} is not accepted", where=place, remedy=remedy)
+    if field in RENAMED:
+        return InputError("a former name", where=place, remedy=f"write {RENAMED[field]}")
+    if is_grain and path[1] in PileBed.model_fields:
+        what, remedy = "unknown key of a bed of one grain", 'a pile has it: write kind = "pile"'
+        return InputError(what, where=place, remedy=remedy)
+    keys = list(PARTS[path[0]].model_fields if path[1:] else PARTS)
+    return unknown_key(path[-1], keys, place, _elsewhere(path[0]))
+
+
+def _elsewhere(here: str) -> list[tuple[str, str]]:
+    """The keys of all tables but one, with how a message writes them."""
+    tables = ((part, model.model_fields) for part, model in PARTS.items() if part != here)
+    fields = [(name, f"{part}.{name}") for part, names in tables for name in names]
+    top = (key for key in TOP_KEYS if key not in PARTS)
+    return [*fields, *((key, f"{key}, above the first table") for key in top)]

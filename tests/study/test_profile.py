@@ -11,7 +11,7 @@ from orchestrator.errors import InputError
 from orchestrator.study import profile, study
 from orchestrator.study.parts import PileBed
 
-GOOD = "x_m,z_m\n0,0\n0.05,0.01\n0.1,0.02\n0.14,0\n"
+GOOD = "x_m,z_m\n0,0\n0.05,0.01\n\n0.1,0.02\n0.14,0\n\n"
 STUDY = """
 grain = { diameter = 1e-3 }
 bed = { kind = "pile", profile = "scan.csv" }
@@ -37,35 +37,33 @@ def long(*changed: tuple[int, str]) -> str:
 
 
 BAD: dict[str, tuple[str | bytes, str]] = {
-    "empty": ("", r"scan.csv: the profile is empty \(write x_m"),
-    "blank": (" \n\n", r"the profile is empty"),
-    "header alone": ("x_m,z_m\n", r"0 points make no bed \(write 3"),
-    "one point": (points("0,0"), r"1 points make no bed"),
-    "no header": ("0,0\n1,0.1\n2,0\n", r"line 1: no column x_m in '0,0'"),
-    "another language": ("Ort;Höhe\n0;0\n1;0,1\n", r"line 1: no column x_m in 'Ort;Höhe'"),
-    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", r"line 1: no column z_m"),
-    "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", r"line 1: two columns x_m"),
-    "millimetres": ("x_mm,z_mm\n0,0\n", r"line 1: no column x_m .*divide x_mm by 1000"),
-    "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), r"line 4: x goes back to 1 m: unsorted"),
-    "overhang": (long((30, "0.14,0.02")), r"line 32: x goes back to 0.14 m: unsorted, or an over"),
-    "upstream": (points("3,0", "2,0.1", "1,0"), r"line 3: x falls: the profile runs upstream"),
-    "duplicate": (points("0,0", "1,0.1", "1,0.2", "2,0"), r"line 4: x = 1 m again"),
-    "NaN": (points("0,0", "1,nan", "2,0"), r"line 3: nan is not a place"),
-    "infinite": (points("0,0", "inf,1", "2,0"), r"line 3: inf is not a place"),
-    "vast": (points("0,0", "1,1e300", "2,0"), r"line 3: 1e\+300 m is no place on a bed"),
-    "a word": (points("0,0", "1,high", "2,0"), r"line 3: 'high' is not a number"),
-    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), r"line 3: 4 values, more than the header"),
-    "semicolons": ("x_m;z_m\n0;0\n1;1\n", r"line 1: no column x_m in 'x_m;z_m'"),
-    "too few values": (points("0,0", "1", "2,0"), r"line 3: 1 values, less than the header"),
-    "an empty value": (points("0,0", "1,", "2,0"), r"line 3: an empty value \(close the gap"),
-    "a blank line": (points("0,0", "", "1,0.1", "2,0"), r"line 3: a blank line"),
-    "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), r"a gap"),
-    "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), r"line 4: 89 deg at x = 1 m, above"),
-    "level": (points("0,0.3", "1,0.3", "2,0.3"), r"level: it has no height"),
-    "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), r"4000 points, more than"),
-    "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), r"not a readable text file"),
-    "binary": (b"\x7fELF\0\0\x01\0", r"binary, not text"),
-    "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, r"larger than 20 MB"),
+    "empty": ("", "an empty file"),
+    "blank": (" \n\n", "line 1: no column x_m"),
+    "header alone": ("x_m,z_m\n", "0 points make no bed"),
+    "one point": (points("0,0"), "1 points make no bed"),
+    "no header": ("0,0\n1,0.1\n2,0\n", "line 1: no column x_m"),
+    "another language": ("Ort;Höhe\n0;0\n1;0,1\n", "line 1: no column x_m"),
+    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", "line 1: no column z_m"),
+    "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: no column x_m, or two"),
+    "millimetres": ("x_mm,z_mm\n0,0\n", "line 1: .*divide x_mm by 1000"),
+    "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), "line 4: x goes back to 1 m: unsorted"),
+    "overhang": (long((30, "0.14,0.02")), "line 32: x goes back to 0.14 m: unsorted, or an over"),
+    "upstream": (points("3,0", "2,0.1", "1,0"), "line 3: x falls: the profile runs upstream"),
+    "duplicate": (points("0,0", "1,0.1", "1,0.2", "2,0"), "line 4: x = 1 m again"),
+    "too few values": (points("0,0", "1", "2,0"), "line 3: 1 values"),
+    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: 4 values"),
+    "semicolons": ("x_m;z_m\n0;0\n1;1\n", "line 1: no column x_m"),
+    **{
+        f"not a number: {cell}": (points("0,0", f"1,{cell}", "2,0"), f"line 3: '{cell}' is not")
+        for cell in ("nan", "inf", "1e300", "1e6", "high", "", "1_0e-2", "٠.١", "0x1", "1e-2\u2028")
+    },
+    "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), "a gap"),
+    "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), "line 4: 89 deg at x = 1 m, above"),
+    "level": (points("0,0.3", "1,0.3", "2,0.3"), "level: it has no height"),
+    "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), "4000 points, more than"),
+    "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), "not a readable text file"),
+    "binary": (b"\x7fELF\0\0\x01\0", "binary, not text"),
+    "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, "larger than 20 MB"),
 }
 
 
@@ -73,7 +71,7 @@ BAD: dict[str, tuple[str | bytes, str]] = {
 def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
     text, says = BAD[name]
     (tmp_path / "scan.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(InputError, match=says) as caught:
+    with pytest.raises(InputError, match=says.replace("\u2028", ".*")) as caught:
         bed_of(tmp_path)
     said = str(caught.value)
     assert str(tmp_path / "scan.csv") in said
@@ -82,17 +80,15 @@ def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"there is no such profile \(a path is relative to the"):
-        bed_of(tmp_path)
-    (tmp_path / "scan.csv").mkdir()
-    with pytest.raises(InputError, match="a directory, not a profile"):
-        bed_of(tmp_path)
-    (tmp_path / "scan.csv").rmdir()
-    os.mkfifo(tmp_path / "scan.csv")
-    with pytest.raises(InputError, match="not a regular file"):
-        bed_of(tmp_path)
-    with pytest.raises(InputError, match="no such profile"):
+    path = tmp_path / "scan.csv"
+    for make in (lambda: None, path.mkdir, lambda: (path.rmdir(), os.mkfifo(path))):
+        make()
+        with pytest.raises(InputError, match=rf"{path}: not a readable text file"):
+            bed_of(tmp_path)
+    with pytest.raises(InputError, match="not a readable text file"):
         bed_of(tmp_path, STUDY.replace("scan.csv", "x" * 5000))
+    with pytest.raises(InputError, match=r"bed.profile: 3 is not accepted"):
+        bed_of(tmp_path, STUDY.replace('"scan.csv"', "3"))
 
 
 @pytest.mark.parametrize(
@@ -161,13 +157,13 @@ def test_noise_is_smoothed_and_the_ends_stay(tmp_path: Path) -> None:
     hill = 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))
     noisy = hill + 1e-4 * np.random.default_rng(1).standard_normal(len(x))
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True))
-    found = profile.read(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.02)
+    found = profile.read_profile(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.02)
     assert len(found.x) < 300
     there = np.interp(np.array(found.x), x, hill)
     assert np.abs(np.array(found.z) - there + noisy[0]).max() < 4e-4
     assert found.x[-1] == pytest.approx(1.0)
     with pytest.raises(InputError, match=r"10000 points, more than .* \(give bed.smoothing"):
-        profile.read(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.0)
+        profile.read_profile(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.0)
 
 
 @pytest.mark.parametrize(
@@ -200,10 +196,3 @@ def test_a_smoothing_that_smooths_nothing_is_refused(smoothing: str, tmp_path: P
     (tmp_path / "scan.csv").write_text(GOOD)
     with pytest.raises(InputError, match=r"leaves over 3000 points.*raise bed.smoothing"):
         bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", smoothing = {smoothing}'))
-
-
-@pytest.mark.parametrize("number", ["1_0e-2", "٠.١", "0x1", "1e-2\u2028"])
-def test_a_number_of_a_profile_is_written_in_ascii_digits(number: str, tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD.replace("0.05", number), encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 3: .* is not a number"):
-        bed_of(tmp_path)

@@ -13,9 +13,8 @@ from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.fields import FIELDS
 from orchestrator.study.parts import Grain, GrainBed, PileBed
-from orchestrator.study.refusals import RENAMED
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import make_scene
+from orchestrator.study.study import RENAMED, make_scene
 
 PILE = """
 [grain]

@@ -132,13 +132,13 @@ def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "line 1 is not"),
-        ("size,fraction\n1e-3,1\n", "line 1 is not"),
-        ("diameter_m,fraction\n1e-3;1\n", "line 2 is no row"),
-        ("diameter_m,fraction\n1e-3,0.5\nsand,0.5\n", "line 3 is no row"),
-        ("diameter_m,fraction\n", "neither rows"),
-        ("diameter_m,fraction\n1,0.5\n2,0.4\n", "add up to 0.9"),
-        ("diameter_m,fraction\n1e-3,1,1\n", "a row is not"),
+        ("", "sieve.csv: an empty file"),
+        ("size,fraction\n1e-3,1\n", "sieve.csv: line 1"),
+        ("diameter_m,fraction\n1e-3;1\n", "sieve.csv: line 2"),
+        ("diameter_m,fraction\n1e-3,0.5\nsand,0.5\n", "sieve.csv: line 3"),
+        ("diameter_m,fraction\n", "grain.sizes: neither rows"),
+        ("diameter_m,fraction\n1,0.5\n2,0.4\n", "grain.sizes: the mass fractions add up to 0.9"),
+        ("diameter_m,fraction\n1e-3,1,1\n", "sieve.csv: line 2"),
     ],
 )
 def test_a_bad_file_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:

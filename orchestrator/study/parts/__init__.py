@@ -5,14 +5,10 @@ text under it are what tables, figures and the reference of study files say of i
 degrees and say so in their names; all else is in SI units or in the unit that is declared.
 """
 
-from orchestrator.study.parts.bed import Bed, GrainBed, Packing, PileBed, Range
+from orchestrator.study.part import Part, UnfitError
+from orchestrator.study.parts.bed import Bed, GrainBed, Obstacle, Packing, PileBed, Range
 from orchestrator.study.parts.flow import Convection, Flow, Turbulence
-from orchestrator.study.parts.fluid import Fluid
-from orchestrator.study.parts.forces import Forces
-from orchestrator.study.parts.grain import Grain
-from orchestrator.study.parts.obstacle import Obstacle
-from orchestrator.study.parts.part import Part, UnfitError
-from orchestrator.study.parts.protocol import Protocol
+from orchestrator.study.parts.grain import Fluid, Forces, Grain, Protocol
 
 __all__ = [
     "Bed",

@@ -3,30 +3,17 @@
 from math import radians, tan
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainSerializer, PlainValidator, field_validator
+from pydantic import Field, InstanceOf, PlainSerializer, field_validator
 
-from orchestrator.study.info import Info
-from orchestrator.study.parts.obstacle import Obstacle
-from orchestrator.study.parts.part import Part, unless
-from orchestrator.study.profile import Profile, a_profile
-from orchestrator.study.ranges import (
-    EntrainmentAngle,
-    Height,
-    LeeSlope,
-    Length,
-    RelativeSize,
-    Roughness,
-    Slope,
-)
+from orchestrator.study.part import Height, Info, Length, Part, Roughness, unless
+from orchestrator.study.profile import Profile
 
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 Shape = Literal[
     "triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "step up", "step down", "flat"
 ]
 Range = tuple[float, float]
-File = Annotated[
-    Profile, PlainValidator(a_profile), PlainSerializer(lambda profile: profile and profile.digest)
-]
+File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
 BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
     "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
@@ -37,20 +24,49 @@ LEVEL = 4.0
 """Length of level bed with grains, over the height."""
 
 
+class Obstacle(Part):
+    """An obstacle across the flow, which carries no grains."""
+
+    kind: Literal["fence", "block", "half-cylinder"]
+    """what it is; all have steep sides, none is upright"""
+    x: float
+    """place of its middle, downstream of the foot of the first form"""
+    height: Height
+    """height over the bed"""
+    length: Length | None = None
+    """length of a block; by default its height"""
+
+    @property
+    def reach(self) -> float:
+        """From its middle to the foot of its sides on level bed, at most, m."""
+        return {"fence": 0.4, "block": 0.3, "half-cylinder": 1.1}[self.kind] * self.height + (
+            (self.length or self.height) / 2 if self.kind == "block" else 0.0
+        )
+
+    def __str__(self) -> str:
+        length = f", {self.length:g} m long" if self.length else ""
+        return f"{self.kind} of {self.height:g} m at {self.x:g} m{length}"
+
+
 class Bed(Part):
     """Common fields of all beds. Subclasses add the grains."""
 
-    slope_deg: Annotated[Slope, Info("slope", "α", "°", "alpha_deg")] = 0.0
+    slope_deg: Annotated[float, Field(ge=0, lt=90), Info("slope", "α", "°", "alpha_deg")] = 0.0
     """slope of the bed; the flow goes up it"""
+    # at 60 the two grains below touch, at 0 the grain falls between them
     entrainment_angle_deg: Annotated[
-        EntrainmentAngle, Info("entrainment angle", "β", "°", "beta_deg")
+        float, Field(ge=1, le=60), Info("entrainment angle", "β", "°", "beta_deg")
     ] = 60.0
     """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
     roughness: Annotated[Roughness, Info("roughness length", "z_0", "m", "z0_m")]
     """roughness length of the bed; a study file may write a part of the diameter of the bed's
     grains: "d/30" """
+    # a smaller grain falls through the pores of a bed, a larger one lies on many grains
     relative_size: Annotated[
-        RelativeSize, unless(1.0), Info("relative size", "D/d", scope="single grains")
+        float,
+        Field(ge=0.1, le=10),
+        unless(1.0),
+        Info("relative size", "D/d", scope="single grains"),
     ] = 1.0
     """diameter of a single grain over that of its two neighbours, which lie as far apart as equal
     grains do: 2 d cos β"""
@@ -103,7 +119,9 @@ class PileBed(Bed):
     ] = "straight"
     """windward side of a dune"""
     lee_slope_deg: Annotated[
-        LeeSlope | None, unless(None), Info("lee slope", unit="°", scope="piles")
+        Annotated[float, Field(gt=0, le=60)] | None,
+        unless(None),
+        Info("lee slope", unit="°", scope="piles"),
     ] = None
     """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
     dune and a step down"""

@@ -4,14 +4,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from orchestrator.study.info import Info
-from orchestrator.study.parts.part import Part, unless
-from orchestrator.study.ranges import FormHeights, Length, Roughness, Speed, Viscosity
+from orchestrator.study.part import Info, Length, Part, Roughness, Viscosity, unless
 
 Model = Literal["solve", "waves", "hill", "flat"]
 Top = Literal["open water", "closed channel", "boundary layer"]
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
+FormHeights = Annotated[float, Field(ge=3, le=1000)]
+"""A length of the flow's domain over the height of the forms."""
 
 
 class Flow(Part):
@@ -34,7 +34,7 @@ class Flow(Part):
     ] = "solve"
     """where the stress on a pile comes from"""
     speed: Annotated[
-        Speed,
+        Annotated[float, Field(ge=1e-6, le=1e3)],
         Info("speed of the solve", "U_e", "m/s", "solve_u_e_m_s", "solved flows", "answer"),
     ] = 10.0
     """speed 10 h above the flat bed at which the flow over a pile is solved; the stress is scaled
