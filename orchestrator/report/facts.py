@@ -26,7 +26,6 @@ PACKAGES = (
     "meshio",
     "numpy",
     "pandas",
-    "pyarrow",
     "pydantic",
     "pyvista",
     "vtk",

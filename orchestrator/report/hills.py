@@ -10,7 +10,7 @@ from orchestrator.report import captions, labels, style
 from orchestrator.report.figure import Figure
 from orchestrator.report.results import Results
 from orchestrator.study.parts import Flow
-from orchestrator.tables.flows import measured_hill
+from orchestrator.tables.scenes import measured_hill
 
 COLOURS = {
     "kEpsilon": "#0072b2",

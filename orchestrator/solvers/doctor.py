@@ -15,7 +15,7 @@ from orchestrator.runs import process
 from orchestrator.solvers import liggghts, openfoam
 
 LIBRARIES = (
-    *("numpy", "scipy", "pandas", "pyarrow", "pydantic"),
+    *("numpy", "scipy", "pandas", "pydantic"),
     *("gmsh", "meshio", "pyvista", "matplotlib"),
 )
 TOOLS = ("stdbuf", "sha256sum", "setpriv")

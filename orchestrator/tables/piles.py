@@ -1,17 +1,16 @@
 """The tables of piles: the stress on them, their grains, their answer to the flow."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 
-from orchestrator.fidelity import calibration, decision
+from orchestrator.fidelity import calibration, decision, limits
 from orchestrator.fidelity.decision import Decision
-from orchestrator.fidelity.levels import Pair
+from orchestrator.fidelity.levels import Pair, changed
 from orchestrator.flow.channel import mean_speed
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
@@ -20,11 +19,14 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
+from orchestrator.plan import Plan
 from orchestrator.study.scene import Scene
-from orchestrator.tables.scenes import Row, point
+from orchestrator.study.study import Study
+from orchestrator.tables.scenes import point
+from orchestrator.types import Row
 
-Columns = Mapping[str, NDArray[Any]]
-"""Columns of one length, by name."""
+Columns = dict[str, Any]
+"""Columns of a table by name: arrays of one length, and values that all its rows have."""
 
 
 @dataclass(frozen=True)
@@ -48,32 +50,11 @@ class Answer:
         return self.decision.asked.id
 
 
-def wall_stress(piles: Iterable[Pile], cases: Path) -> Iterator[pd.DataFrame]:
-    """The friction velocity along the bed, for the solved flow of each pile."""
-    for pile in piles:
-        stress = pile.stress(cases)
-        yield pd.DataFrame(
-            {
-                "flow_case": pile.flow.name,
-                "alpha_deg": pile.bed.slope_deg,
-                "h_m": pile.bed.height,
-                "z0_m": pile.flow.roughness_m,
-                "s_m": stress.s_m,
-                "s_over_h": stress.s_m / pile.bed.height,
-                "x_m": stress.x_m,
-                "z_m": stress.z_m,
-                "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
-                "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
-                "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
-            }
-        )
-
-
 def grains(answer: Answer) -> Columns:
-    """The windward grains of a pile: the stress on each, when and how it moved."""
-    motion, face = answer.motion, answer.face
-    return {
-        "scene_id": np.full(len(face.ids), answer.scene_id),
+    """The counted grains of a pile: the stress on each, when and how it moved."""
+    motion, face, pile = answer.motion, answer.face, answer.pile
+    columns = {
+        "scene_id": answer.scene_id,
         "grain_id": face.ids,
         "s_m": face.arc_length,
         "x_m": face.x,
@@ -83,17 +64,14 @@ def grains(answer: Answer) -> Columns:
         "carried_off": motion.carried.astype(int),
         "mode": np.array(MODES)[motion.mode],
         "ustar0_m_s": threshold.of_grains(motion).value,
-        **(_of_its_own(answer.pile) if answer.pile.pouring else {}),
     }
-
-
-def _of_its_own(pile: Pile) -> Columns:
-    """Columns that differ from grain to grain of a poured bed."""
-    packed, chosen = pile.packing, pile.packing.windward
-    found = {"size_over_d": packed.sizes[chosen], "pivot_deg": pile.pivot_angles_deg}
-    if packed.width:
-        found["y_m"] = packed.places.xyz[chosen, 1] * pile.scene.grain.diameter
-    return found
+    if pile.pouring:
+        packing, counted = pile.packing, pile.packing.windward
+        columns["size_over_d"] = packing.sizes[counted]
+        columns["pivot_deg"] = pile.pivot_angles_deg
+        if packing.width:
+            columns["y_m"] = packing.places.xyz[counted, 1] * pile.scene.grain.diameter
+    return columns
 
 
 def size_class_rows(answer: Answer) -> Iterator[Row]:
@@ -137,13 +115,13 @@ def _of_class(answer: Answer, one: classes.SizeClass, fraction: float) -> Row:
 def curve(answer: Answer) -> Columns:
     """The fraction of a pile that had moved, and the stress on it, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
-    curve, steps = threshold.curve(motion, answer.face.speed, scene.fluid.density), len(motion.flow)
+    curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
     return {
-        "scene_id": np.full(steps, answer.scene_id),
-        "load_step": np.arange(steps),
-        "u_e_m_s": curve.ustar0 * _lid_speed_ratio(answer.pile),
+        "scene_id": answer.scene_id,
+        "load_step": np.arange(len(motion.flow)),
+        "u_e_m_s": curve.ustar0 * answer.pile.model.lid_speed_ratio,
         "ustar0_m_s": curve.ustar0,
-        "count": np.full(steps, motion.count),
+        "count": motion.count,
         "moved": motion.moved,
         "not_moved": motion.count - motion.moved,
         "carried_off": motion.carried_off,
@@ -174,7 +152,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "frozen_bed": calibration.frozen_bed(answer.decision.asked, fraction),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
-            "u_e_m_s": found.ustar0 * _lid_speed_ratio(pile),
+            "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
             **_speeds(scene, found.ustar0),
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
@@ -216,23 +194,20 @@ def _model_interval(scene: Scene, fraction: float, shields: float) -> Row:
     }
 
 
-def check_rows(
-    decisions: Mapping[str, Decision],
-    cheap: Mapping[str, Pile],
-    check: Mapping[str, Pile],
-    tolerance: float,
-    cases: Path,
-) -> Iterator[Row]:
-    """The piles that DEM checked: both answers at each fraction."""
-    for asked, pile in check.items():
-        scene = cheap[asked].scene
-        for one in decision.compare(cheap[asked], pile, tolerance, cases):
+def check_rows(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
+    """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
+    if not study.tolerance:
+        return
+    for asked, pile in decision.ready(plan.piles, plan.checks, done).items():
+        cheap = plan.piles[asked]
+        scene = cheap.scene
+        for one in decision.compare(cheap, pile, study.tolerance, cases):
             yield {
                 "scene_id": asked,
                 **point(scene),
                 "packing": pile.bed.packing,
                 "fraction": one.cheap.fraction,
-                **_levels(decisions[asked].levels),
+                **_levels(plan.decisions[asked].levels),
                 "shields": shields(scene, one.cheap.tau),
                 "shields_dem": shields(scene, one.dem.tau),
                 "shields_dem_low": shields(scene, one.dem.tau_low),
@@ -252,10 +227,6 @@ def _speeds(scene: Scene, ustar0: float) -> Row:
     return {"mean_speed_m_s": mean, "discharge_m2_s": mean * flow.depth}
 
 
-def _lid_speed_ratio(pile: Pile) -> float:
-    return pile.model.lid_speed_ratio
-
-
 def shields(scene: Scene, tau: Any) -> Any:
     """The Shields number of a stress, Pa."""
     return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
@@ -264,3 +235,71 @@ def shields(scene: Scene, tau: Any) -> Any:
 def _reynolds(scene: Scene, tau: Any) -> Any:
     ustar = np.sqrt(tau / scene.fluid.density)
     return ustar * scene.grain.diameter / scene.fluid.viscosity
+
+
+def forms(answer: Answer) -> Iterator[Row]:
+    """Of a train, a row for each form and each fraction of the counted grains of that form."""
+    pile, face = answer.pile, answer.face
+    bed, line = pile.bed, pile.model.line
+    if bed.forms == 1 or bed.profile:
+        return
+    period = bed.spacing or (line.x[-2] - line.x[1]) / bed.forms
+    form = np.clip(np.floor(face.x / period).astype(int), 0, bed.forms - 1)
+    ustar0 = np.nan_to_num(threshold.of_grains(answer.motion).value, nan=np.inf)
+    for fraction in pile.scene.protocol.fractions:
+        first = np.nan
+        for number in range(bed.forms):
+            grains = np.sort(ustar0[form == number])
+            needed = max(int(np.ceil(fraction * len(grains) - 1e-9)), 1)
+            reached = float(grains[needed - 1]) if len(grains) else np.nan
+            first = reached if number == 0 else first
+            # loose grains of the first form move in still fluid: nothing is a multiple of that
+            ratio = reached / first if first > 0 else np.nan
+            speed = face.speed[form == number]
+            yield {
+                "scene_id": answer.scene_id,
+                "form": number + 1,
+                "count": len(grains),
+                "fraction": fraction,
+                "mean_ustar_over_ustar0": float(speed.mean()) if len(speed) else np.nan,
+                "ustar0_m_s": reached if np.isfinite(reached) else np.nan,
+                "over_first_form": ratio if np.isfinite(ratio) else np.nan,
+            }
+
+
+def bed_changes(answers: Sequence[Answer]) -> Iterator[Columns]:
+    """Thresholds on beds that change beside those on the frozen beds, grain by grain.
+
+    For each pile that the study asks for on both, up to its last fraction.
+    """
+    frozen = {one.scene_id: one for one in answers if not one.pile.scene.protocol.update}
+    for answer in answers:
+        scene, count = answer.pile.scene, answer.motion.count
+        twin = frozen.get(changed(answer.decision.asked, {"protocol.update": 0.0}).id)
+        if not scene.protocol.update or twin is None:
+            continue
+        moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
+        on_both = [
+            [
+                threshold.of_pile(one.motion, one.face.speed, n / count, scene.fluid.density)
+                for n in moved.tolist()
+            ]
+            for one in (answer, twin)
+        ]
+        tau, tau_frozen = ([one.tau for one in found] for found in on_both)
+        ustar0, ustar0_frozen = ([one.ustar0 for one in found] for found in on_both)
+        change = np.divide(tau, tau_frozen) - 1
+        beyond = moved[np.abs(change) > limits.FROZEN_BED] / count
+        yield {
+            "scene_id": answer.scene_id,
+            **point(scene),
+            "packing": answer.pile.bed.packing,
+            "count": count,
+            "moved": moved,
+            "fraction_moved": moved / count,
+            "shields": shields(scene, np.array(tau)),
+            "shields_frozen": shields(scene, np.array(tau_frozen)),
+            "change": change,
+            "change_ustar0": np.divide(ustar0, ustar0_frozen) - 1,
+            "holds_until": beyond[0] if len(beyond) else np.nan,
+        }

@@ -1,28 +1,50 @@
-"""The table of scenes: what was asked, and how it was answered."""
+"""The tables of scenes, of single grains and of flows."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from orchestrator.bed.shapes import rushil_aspect
+from orchestrator.flow import diagnostics
+from orchestrator.grains import threshold
+from orchestrator.grains.cells import SingleGrainCase
+from orchestrator.grains.motion import Motion
+from orchestrator.grains.pile import Pile
+from orchestrator.physics.hills import MeasuredHill, measured
 from orchestrator.plan import Plan
 from orchestrator.study import fields
-from orchestrator.study.closed_form import law_holds
+from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
-
-Row = dict[str, Any]
+from orchestrator.types import Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
+WAY_UP = {
+    "ustar_foot": 0.0,
+    "ustar_quarter": 0.25,
+    "ustar_half": 0.5,
+    "ustar_three_quarters": 0.75,
+    "ustar_top": 1.0,
+}
+"""Columns of u*/u*_0 at parts of the way along the bed from the foot to the top."""
+
+
+def point(scene: Scene) -> Row:
+    """The columns by which a scene is found in a figure."""
+    return {column: fields.COLUMNS[column].asked(scene) for column in POINT}
 
 
 def rows(study: Study, plan: Plan) -> Iterator[Row]:
-    """A row for each scene of each group, in the study's order."""
-    cell_of = {scene.id: one.name for one in plan.cells for scene in one.scenes}
+    """A row for each scene of each group, in the study's order: as asked, and as answered."""
+    cell_of = {scene.id: cell.name for cell in plan.cells for scene in cell.scenes}
     for group in study.groups:
         for asked in group.scenes:
             decision, pile = plan.decisions[asked.id], plan.piles.get(asked.id)
             scene = decision.scene
-            runs = [one.name for one in pile.runs] if pile else [cell_of.get(scene.id)]
+            runs = [case.name for case in pile.runs] if pile else [cell_of.get(scene.id)]
             yield {
                 "scene_id": asked.id,
                 "group": group.name,
@@ -35,6 +57,101 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
             }
 
 
-def point(scene: Scene) -> Row:
-    """The columns by which a scene is found in a figure."""
-    return {column: fields.COLUMNS[column].asked(scene) for column in POINT}
+def single_grains(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> Iterator[Row]:
+    """A row for each single grain that a finished case or the closed form answers."""
+    measured: dict[str, Row] = {}
+    for cell in cells:
+        motion = Motion.from_csv(cases / cell.name)
+        steps = threshold.of_grains(motion)
+        brackets = zip(steps.value, steps.low, steps.high, motion.fallen > 0, strict=True)
+        for scene, (value, low, high, fell) in zip(cell.scenes, brackets, strict=True):
+            row = {**_single_grain(scene, value, low, high), "fell_upstream": bool(fell)}
+            measured[scene.id] = {**row, "case": cell.name}
+    for asked, decision in plan.decisions.items():
+        scene = decision.scene
+        if scene.id in measured:
+            yield {"scene_id": asked, **measured[scene.id]}
+        elif asked not in plan.piles and scene.protocol.method != "dem":
+            row = _single_grain(scene, np.nan, np.nan, np.nan)
+            yield {"scene_id": asked, **row, "fell_upstream": False}
+
+
+def _single_grain(scene: Scene, value: float, low: float, high: float) -> Row:
+    """A threshold by DEM, u* over that of the closed form, with its interval; and that."""
+    exact = closed_form(scene)
+    ustar, shields = float(exact.friction_velocity), float(exact.shields)
+    return {
+        **point(scene),
+        "answered_method": scene.protocol.method,
+        "reynolds": float(exact.reynolds) * value,
+        "reynolds_closed_form": float(exact.reynolds),
+        "shields_closed_form": shields,
+        "shields_dem": shields * value**2,
+        "shields_dem_low": shields * low**2,
+        "shields_dem_high": shields * high**2,
+        "ustar_closed_form_m_s": ustar,
+        "ustar_m_s": ustar * value,
+        "ustar_low_m_s": ustar * low,
+        "ustar_high_m_s": ustar * high,
+        "drag_over_weight": float(exact.drag) / scene.weight,
+    }
+
+
+def wall_stress(pile: Pile, cases: Path) -> Mapping[str, Any]:
+    """The friction velocity along the bed, for the solved flow of a pile."""
+    stress = pile.stress(cases)
+    return {
+        "flow_case": pile.flow.name,
+        "alpha_deg": pile.bed.slope_deg,
+        "h_m": pile.bed.height,
+        "z0_m": pile.flow.roughness_m,
+        "s_m": stress.s_m,
+        "s_over_h": stress.s_m / pile.bed.height,
+        "x_m": stress.x_m,
+        "z_m": stress.z_m,
+        "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
+        "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
+        "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
+    }
+
+
+def flow(pile: Pile, cases: Path) -> Row:
+    """The solved flow of a pile: its settings, its separation and its speed-up."""
+    case, stress, line = pile.flow, pile.stress(cases), pile.model.line
+    separation, reattachment = diagnostics.bubble(stress, line.h) or (np.nan, np.nan)
+    ustar = stress.ustar_over_ustar0_wall
+    windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
+    length, hill = stress.length_m[windward], measured_hill(pile)
+    row = {
+        "flow_case": case.name,
+        "bed_shape": pile.bed.shape if not pile.bed.profile else "profile",
+        "alpha_deg": pile.bed.slope_deg,
+        "h_m": case.height_m,
+        "z0_m": case.roughness_m,
+        "turbulence_model": case.turbulence_model,
+        "first_cell_m": case.first_cell_m,
+        "lid_over_h": case.lid,
+        "upstream_over_h": case.upstream,
+        "downstream_over_h": case.downstream,
+        "separation_over_h": separation,
+        "reattachment_over_h": reattachment,
+        **{
+            name: float(np.interp(part * line.crest_s, stress.s_m, ustar))
+            for name, part in WAY_UP.items()
+        },
+        "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
+        "ustar_largest": float(ustar.max()),
+    }
+    if hill is not None:
+        row["measured_reattachment_over_h"] = hill.reattachment
+        row["measured_verified"] = hill.verified
+        row["measured_source"] = hill.source
+    return row
+
+
+def measured_hill(pile: Pile) -> MeasuredHill | None:
+    """The hill of a wind tunnel that a pile is, if any."""
+    bed, case = pile.bed, pile.flow
+    if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
+        return None
+    return measured(rushil_aspect(bed.slope_deg), case.height_m / case.roughness_m)

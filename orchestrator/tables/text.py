@@ -1,13 +1,24 @@
-"""A table as the text of a file."""
+"""Tables as CSV files."""
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from io import BytesIO
+from pathlib import PurePath
 
 import pandas as pd
 
+from orchestrator.errors import OrchestratorError
+from orchestrator.runs.folder import Folder
+from orchestrator.tables.columns import COLUMNS
+
 BEGINS = ("=", "+", "-", "@", "\t", "\n")
 """Spreadsheets run a cell that begins with one of these as a formula."""
+NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
+"""Columns of texts that may look like numbers, or be empty."""
 
 
 def csv(table: pd.DataFrame, digits: str | None = None) -> str:
-    """A table as CSV. No name that someone gave begins a formula: it gets an apostrophe.
+    """A table as CSV; a text that would begin a formula gets an apostrophe before it.
 
     Parameters
     ----------
@@ -17,20 +28,16 @@ def csv(table: pd.DataFrame, digits: str | None = None) -> str:
         Format of its numbers, such as ``%.9g``.
     """
     texts = table.select_dtypes(exclude=["number", "bool"])
-    harmless = {str(name): _column(texts[name]) for name in texts}
-    return table.assign(**harmless).to_csv(index=False, float_format=digits)
+    return table.assign(**{str(name): texts[name].map(_harmless) for name in texts}).to_csv(
+        index=False, float_format=digits
+    )
 
 
-def _column(texts: pd.Series) -> pd.Series:
-    """Thousands of rows share few texts."""
-    named = (value for value in texts.unique() if isinstance(value, str))
-    changed = {text: safe for text in named if (safe := _harmless(text)) != text}
-    return texts.map(lambda value: changed.get(value, value)) if changed else texts
-
-
-def _harmless(text: str) -> str:
+def _harmless(value: object) -> object:
+    if not isinstance(value, str):
+        return value
     # pandas writes \r without quotes, and a reader takes it for the end of the row
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = value.replace("\r\n", "\n").replace("\r", "\n")
     if not text.startswith(BEGINS):
         return text
     try:
@@ -38,3 +45,41 @@ def _harmless(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
+
+
+def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
+    """Put each table into a sub-directory of a folder, and the meanings of the columns."""
+    for name, table in tables.items():
+        folder.put(f"{place}/{name}.csv", csv(table))
+    used = sorted({str(column) for table in tables.values() for column in table})
+    rows = [{"column": column, "meaning": COLUMNS[column]} for column in used]
+    folder.put(f"{place}/columns.csv", csv(pd.DataFrame(rows)))
+
+
+def read(folder: Folder, place: str) -> dict[str, pd.DataFrame]:
+    """Read the tables that `write` wrote, and no others.
+
+    Raises
+    ------
+    OrchestratorError
+        If there are none, or one has changed since.
+    """
+    files = [name for name in folder.written() if fnmatchcase(name, f"{place}/*.csv")]
+    names = {PurePath(file).stem: file for file in files}
+    names.pop("columns", None)
+    if not names:
+        raise OrchestratorError(
+            "there are no tables", where=str(folder.root / place), remedy="run the study first"
+        )
+    return {name: _read(folder.read(file)) for name, file in names.items()}
+
+
+def _read(data: bytes) -> pd.DataFrame:
+    table = pd.read_csv(
+        BytesIO(data),
+        dtype=dict.fromkeys(NAMES, "str"),
+        keep_default_na=False,
+        na_values=[""],
+        float_precision="round_trip",
+    )
+    return table.assign(why_not=table["why_not"].fillna("")) if "why_not" in table else table

@@ -21,7 +21,7 @@ from tests.faults.bench import Bench, case_of, ended, none_left_in, same_tables,
 from tests.faults.ledger import Ledger
 
 pytestmark = pytest.mark.filterwarnings("always:.*is not what this program wrote")
-ODD = ("two\nlines", os.fsdecode(b"\xff\xfe"), "-rf", "*", "x" * 255, ".x.1.tmp", "a.parquet")
+ODD = ("two\nlines", os.fsdecode(b"\xff\xfe"), "-rf", "*", "x" * 255, ".x.1.tmp", "a.csv")
 """Names of files that are none of ours, whatever they look like."""
 
 

@@ -52,7 +52,7 @@ OF_A_STUDY = (
     "figures/shields.svg",
     "timings/timings.csv",
     "tables/scenes.csv",
-    "tables/single_grain.parquet",
+    "tables/single_grain.csv",
     "tables/columns.csv",
 )
 OF_CELLS = (

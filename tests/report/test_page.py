@@ -120,9 +120,9 @@ def test_links_lead_to_what_is_there(page: Path, parsed: Page, results: Results)
         targets.add(Path(unquote(address.path)))
     folders = {results.cases / name for name in results.plan.cases}
     assert folders <= targets
-    assert all(path.is_dir() for path in targets if path.suffix not in {".csv", ".parquet"})
-    tables = {path.stem for path in targets if path.suffix == ".parquet"}
-    assert tables == set(results.tables)
+    assert all(path.is_dir() for path in targets if path.suffix != ".csv")
+    tables = {path.stem for path in targets if path.suffix == ".csv"}
+    assert tables == {"columns", *results.tables}
 
 
 def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
