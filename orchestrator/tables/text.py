@@ -80,6 +80,5 @@ def _read(data: bytes) -> pd.DataFrame:
         dtype=dict.fromkeys(NAMES, "str"),
         keep_default_na=False,
         na_values=[""],
-        float_precision="round_trip",
     )
     return table.assign(why_not=table["why_not"].fillna("")) if "why_not" in table else table

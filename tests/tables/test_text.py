@@ -1,20 +1,25 @@
-"""Tables as files: what a spreadsheet would run as a formula."""
+"""Tables as files: they come back as they were, and hold no formula for a spreadsheet."""
 
 import csv
 import io
 import math
+from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.tables import text
+from orchestrator import tables
+from orchestrator.errors import OrchestratorError
+from orchestrator.runs.folder import Folder
+from orchestrator.tables.columns import COLUMNS
 
 FORMULAS = ["=1+1", "+A1", "-A1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0", "-rf"]
 
 
 @pytest.mark.parametrize("name", FORMULAS)
 def test_no_name_is_a_formula(name: str) -> None:
-    written = text.csv(pd.DataFrame({"group": [name], "d_m": [-1.5]}))
+    written = tables.csv(pd.DataFrame({"group": [name], "d_m": [-1.5]}))
     ((_, _), (group, number)) = csv.reader(io.StringIO(written, newline=""))
     assert (group, float(number)) == ("'" + name.replace("\r", "\n"), -1.5)
 
@@ -28,5 +33,39 @@ def test_all_else_is_as_it_is() -> None:
             "truth": [True, False, True, False, True],
         }
     )
-    assert text.csv(table) == table.to_csv(index=False)
-    assert "-1.0000," in text.csv(table, "%.4f")
+    assert tables.csv(table) == table.to_csv(index=False)
+    assert "-1.0000," in tables.csv(table, "%.4f")
+
+
+def test_tables_come_back(tmp_path: Path) -> None:
+    table = pd.DataFrame(
+        {
+            # ids and names that look like numbers or like none
+            "scene_id": ["0195b034e2ac", "123456789012", "12345e678901"],
+            "group": ["NA", "007", "nan"],
+            "reynolds": np.random.default_rng(0).normal(size=3),
+            "shields": [0.0, np.nan, np.inf],
+            "count": [1, 2, 3],
+            "usable": [True, False, True],
+            "why_not": ["", "lift, and more", ""],
+        }
+    )
+    folder = Folder(tmp_path)
+    with folder.renewed():
+        tables.write({"single_grain": table}, folder, "tables")
+    assert list(tables.read(folder, "tables")) == ["single_grain"]
+    pd.testing.assert_frame_equal(tables.read(folder, "tables")["single_grain"], table)
+    meanings = pd.read_csv(tmp_path / "tables" / "columns.csv").set_index("column")["meaning"]
+    assert meanings.to_dict() == {column: COLUMNS[column] for column in sorted(table)}
+    with pytest.raises(OrchestratorError, match="no tables"):
+        tables.read(folder, "elsewhere")
+
+
+def test_columns_are_described_in_the_words_of_the_glossary() -> None:
+    for column, meaning in COLUMNS.items():
+        assert meaning.strip() == meaning != ""
+        words = set(meaning.lower().replace(",", " ").split())
+        assert not words & {"hold", "holds", "marker", "look", "looks", "told"} - {
+            # "whether a law holds" and "rows that hold one another" are no load steps
+            *(("hold", "holds") if column in ("law_holds", "row_hold", "force_law") else ()),
+        }, column
