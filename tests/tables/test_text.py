@@ -56,7 +56,7 @@ def test_tables_come_back(tmp_path: Path) -> None:
     assert list(tables.read(folder, "tables")) == ["single_grain"]
     pd.testing.assert_frame_equal(tables.read(folder, "tables")["single_grain"], table)
     meanings = pd.read_csv(tmp_path / "tables" / "columns.csv").set_index("column")["meaning"]
-    assert meanings.to_dict() == {column: COLUMNS[column] for column in sorted(table)}
+    assert meanings.to_dict() == {column: COLUMNS[column] for column in sorted(map(str, table))}
     with pytest.raises(OrchestratorError, match="no tables"):
         tables.read(folder, "elsewhere")
 
