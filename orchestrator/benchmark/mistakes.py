@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark import exact
-from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import threshold
 

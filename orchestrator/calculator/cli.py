@@ -237,7 +237,7 @@ def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
 
 def as_json(table: "pd.DataFrame") -> str:
     """A record for one point, or a list of records: parameters, rules, an object for each law."""
-    from orchestrator.physics.regime import LAWS_OF
+    from orchestrator.physics.threshold import LAWS_OF
 
     def plain(value: Any) -> Any:  # JSON has no NaN
         return None if isinstance(value, float) and not math.isfinite(value) else value

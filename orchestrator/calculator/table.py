@@ -1,7 +1,6 @@
 """Thresholds of many single grains under every force law, as one table."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +9,10 @@ import pandas as pd
 from orchestrator.calculator.parameters import PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
-from orchestrator.physics.exposure import Exposure
-from orchestrator.physics.force_law import ForceLaw
+from orchestrator.physics.force_law import Exposure, ForceLaw
 from orchestrator.physics.laws import LAWS, law
-from orchestrator.physics.log_law import depth_mean_speed, log_law_speed, smooth_wall_roughness
-from orchestrator.physics.regime import LAWS_OF, regime
-from orchestrator.physics.threshold import Threshold, lift_bound, threshold
+from orchestrator.physics.threshold import LAWS_OF, Threshold, regime, threshold, why_not
+from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, smooth_wall_roughness
 from orchestrator.study.closed_form import PAPER, SingleGrain, single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
@@ -143,11 +140,7 @@ def _columns(here: ForceLaw, found: Threshold, grains: pd.DataFrame) -> dict[str
     mean = depth_mean_speed(ustar, depth, z0)
     turbulent = mean * depth / viscosity >= LAMINAR_BELOW
     rest = {name: grains[name].to_numpy() for name in ("density", "slope_deg", "gravity")}
-    why = np.full(len(grains), "", object)
-    for bound in (*here.bounds(ustar, exposure), lift_bound(found.lift, exposure, **rest)):
-        for i in np.flatnonzero(~bound.holds):
-            said = str(replace(bound, value=bound.value[i]))
-            why[i] = "; ".join(filter(None, (why[i], said)))
+    why = np.array(why_not(here, ustar, exposure, **rest), object)
     return {
         "ustar_m_s": ustar,
         "wind_1m_m_s": np.where(gas, log_law_speed(ustar, 1.0, z0), np.nan),

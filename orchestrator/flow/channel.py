@@ -7,7 +7,7 @@ from typing import ClassVar
 from orchestrator.flow.case import FlowCase, set_values
 from orchestrator.flow.diagnostics import Diagnostic
 from orchestrator.flow.solved import SolvedFlow
-from orchestrator.physics.log_law import depth_mean_speed
+from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study.scene import LEAST_DEPTH
 
 MEAN_SPEED_ERROR = 0.1

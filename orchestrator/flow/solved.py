@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
 from orchestrator.flow.stress import Array, WallStress, undisturbed_ustar
-from orchestrator.physics.log_law import log_law_ustar
+from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.solvers.openfoam import read_last_time, read_numbers
 
 if TYPE_CHECKING:

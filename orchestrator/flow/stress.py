@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.physics.log_law import log_law_ustar
+from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import write_durably
 
 _DERIVED = "ustar_over_ustar0_wall"

@@ -1,26 +1,153 @@
-"""The seam of the force laws: what the flow does to an exposed grain at a friction velocity."""
+"""Force laws: the forces of the flow on an exposed grain at a friction velocity, and their range.
+
+`Exposure` holds the surroundings of a grain, `SphereDrag` the drag of a sphere, `ForceLaw` is the
+interface of all laws, and `DragAndSaffman` the base of those that follow Eqs. 2 and 4.
+"""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from orchestrator.physics.exposure import Exposure, FloatArray
-from orchestrator.physics.near_bed import saffman_lift
-from orchestrator.physics.sphere_drag import SphereDrag
+from orchestrator.physics.constants import LIFT_COEFFICIENT
+from orchestrator.physics.velocity import smooth_wall_roughness
+from orchestrator.types import BoolArray, FloatArray
 
 SUBLAYER = 5.0
 """Thickness of the viscous sublayer, wall units."""
 SMOOTH_END = 1.25
-"""Speed over that above a smooth wall from which a law's logarithm is of no wall: it is at most
-1.2 for z0 = d/1000."""
+"""Largest speed over that above a smooth wall; for z0 = d/1000 it is at most 1.2."""
+
+
+@dataclass(frozen=True, init=False, eq=False)
+class Exposure:
+    """An exposed grain and the fluid around it; the fields broadcast together.
+
+    Parameters
+    ----------
+    diameter : array_like
+        d, m.
+    roughness : array_like
+        Roughness length z0 of the bed, m.
+    fluid_density : array_like
+        rho_f, kg/m3.
+    viscosity : array_like
+        Kinematic viscosity nu, m2/s.
+    lift_coefficient : array_like
+        alpha_s of Eqs. 2 and 4; laws with a lift of their own ignore it.
+    gap : array_like, optional
+        Height of the grain's lowest point over the level at which the flow begins, m; by default
+        z0. Laws that do not `protrude` ignore it.
+    """
+
+    diameter: FloatArray
+    roughness: FloatArray
+    fluid_density: FloatArray
+    viscosity: FloatArray
+    lift_coefficient: FloatArray
+    gap: FloatArray
+
+    def __init__(
+        self,
+        diameter: ArrayLike,
+        roughness: ArrayLike,
+        fluid_density: ArrayLike,
+        viscosity: ArrayLike,
+        lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
+        gap: ArrayLike | None = None,
+    ) -> None:
+        height = roughness if gap is None else gap
+        given = (diameter, roughness, fluid_density, viscosity, lift_coefficient, height)
+        for name, value in zip(self.__dataclass_fields__, given, strict=True):
+            object.__setattr__(self, name, np.asarray(value, float))
+
+    @property
+    def fields(self) -> tuple[FloatArray, ...]:
+        """The six fields in their order, for calls that pass them on as arguments."""
+        return tuple(getattr(self, name) for name in self.__dataclass_fields__)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape that the fields broadcast to."""
+        return np.broadcast_shapes(*(field.shape for field in self.fields))
+
+    @property
+    def ratio(self) -> FloatArray:
+        """Roughness length over diameter, z0/d."""
+        return np.asarray(self.roughness / self.diameter)
+
+    def reynolds(self, ustar: ArrayLike) -> FloatArray:
+        """Friction Reynolds number Re* = ustar d/nu of a friction velocity (m/s)."""
+        return np.asarray(np.asarray(ustar, float) * self.diameter / self.viscosity)
+
+    def ustar(self, reynolds: ArrayLike) -> FloatArray:
+        """Friction velocity (m/s) of a friction Reynolds number."""
+        return np.asarray(np.asarray(reynolds, float) * self.viscosity / self.diameter)
 
 
 @dataclass(frozen=True)
-class Bound:
-    """A range of one quantity in which a law holds: low <= value < high."""
+class SphereDrag:
+    """Drag of a sphere in a uniform stream, C_D = (24/Re) factor(Re), Re = V d/nu.
+
+    Attributes
+    ----------
+    name : str
+        Authors.
+    factor : callable
+        Factor on Stokes' drag, of the particle Reynolds number; 1 at zero.
+    highest : float
+        Particle Reynolds number at which the law ends.
+    reference : str
+        Where it was published.
+    """
+
+    name: str
+    factor: Callable[[FloatArray], FloatArray]
+    highest: float
+    reference: str
+
+    def force(self, speed: FloatArray, exposure: Exposure) -> FloatArray:
+        """Drag (N) of a stream at a speed (m/s): 3 pi rho nu d V factor."""
+        e = exposure
+        stokes = 3 * np.pi * e.fluid_density * e.viscosity * e.diameter * speed
+        return np.asarray(stokes * self.factor(speed * e.diameter / e.viscosity))
+
+
+def _schiller_naumann(reynolds: FloatArray) -> FloatArray:
+    return np.asarray(1 + 0.15 * reynolds**0.687)
+
+
+def _clift_gauvin(reynolds: FloatArray) -> FloatArray:
+    # 0.42/(1 + 42500 Re^-1.16) over 24/Re, multiplied out so that Re = 0 needs no division by it
+    newton = 0.42 / 24 * reynolds**2.16 / (reynolds**1.16 + 42500)
+    return np.asarray(_schiller_naumann(reynolds) + newton)
+
+
+STOKES = SphereDrag("Stokes", np.ones_like, np.inf, "G. G. Stokes, 1851")
+"""The drag of Eq. 2, which ends with the range of Re* of that equation."""
+SCHILLER_NAUMANN = SphereDrag(
+    "Schiller and Naumann",
+    _schiller_naumann,
+    1000.0,
+    "L. Schiller and A. Naumann, Z. VDI 77, 1933",
+)
+"""The drag of Eq. 4; the paper's expression, which is in common use up to Re = 1000."""
+CLIFT_GAUVIN = SphereDrag(
+    "Clift and Gauvin",
+    _clift_gauvin,
+    3e5,
+    "R. Clift and W. H. Gauvin, Can. J. Chem. Eng. 49, 1971, doi:10.1002/cjce.5450490403",
+)
+"""Schiller and Naumann's drag and a term of inertia, up to the drag crisis at 3e5. Coefficients and
+limit agree in several public codes."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """The range of one quantity in which a law holds: low <= value < high."""
 
     quantity: str
     value: FloatArray
@@ -28,16 +155,28 @@ class Bound:
     high: float
 
     @property
-    def holds(self) -> NDArray[np.bool_]:
-        """Whether the quantity is in its range; not a number is not."""
+    def holds(self) -> BoolArray:
+        """Whether the quantity is in its range; NaN is not."""
         return np.asarray((self.value >= self.low) & (self.value < self.high))
 
-    def __str__(self) -> str:
-        value = float(self.value)
+    @property
+    def texts(self) -> list[str]:
+        """Which limit each value is beyond, in words; empty for those in the range."""
+        return [self._text(float(value)) for value in np.ravel(self.value)]
+
+    def _text(self, value: float) -> str:
+        if self.low <= value < self.high:
+            return ""
         if np.isnan(value):
             return f"{self.quantity} is not a number"
         side = f"below {self.low:g}" if value < self.low else f"not below {self.high:g}"
         return f"{self.quantity} {float(f'{value:.3g}'):g} is {side}"
+
+
+def reasons(ranges: Iterable[Validity], count: int) -> list[str]:
+    """The limits that each of some grains is beyond, in words; empty where all ranges hold."""
+    texts = [one.texts if np.ndim(one.value) else one.texts * count for one in ranges]
+    return ["; ".join(filter(None, row)) for row in zip(*texts, strict=True)]
 
 
 class ForceLaw(ABC):
@@ -47,12 +186,13 @@ class ForceLaw(ABC):
 
     Attributes
     ----------
-    name : str
-        Key of the registry and of study files.
-    label : str
-        For legends.
+    name, label : str
+        Key of the registry and of study files; name in legends.
     reference : str
         Source, with a DOI where one could be verified.
+    unverified : str
+        What of the law was not confirmed by its source; empty if all was. An unverified law takes
+        part in no score, and its answers are not usable.
     reynolds : tuple of float
         Range of Re* in which the law holds: low <= Re* < high.
     drag_law, drag_end : str, float
@@ -61,20 +201,17 @@ class ForceLaw(ABC):
         Whether the flow also turns the grain about its centre.
     protrudes : bool
         Whether a grain's own height over the bed matters to its forces.
-    unverified : str
-        What of the law was not confirmed by its source; empty if all was. An unverified law takes
-        part in no score, and its answers are not usable.
     """
 
     name: ClassVar[str]
     label: ClassVar[str]
     reference: ClassVar[str]
+    unverified: ClassVar[str] = ""
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
     turns: ClassVar[bool] = False
     protrudes: ClassVar[bool] = False
-    unverified: ClassVar[str] = ""
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
@@ -97,44 +234,35 @@ class ForceLaw(ABC):
         speed = self.speed(ustar, exposure)
         return np.asarray(speed * exposure.diameter / exposure.viscosity)
 
-    def covers(self, reynolds: ArrayLike) -> NDArray[np.bool_]:
-        """Whether friction Reynolds numbers lie in the range of the law."""
-        return Bound("Re*", np.asarray(reynolds, float), *self.reynolds).holds
-
-    def bounds(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Bound, ...]:
-        """The ranges that the law holds in; a law with more of them adds its own."""
-        particle = self.particle_reynolds(ustar, exposure)
-        over = self.speed_over_smooth(ustar, exposure)
-        return (
-            Bound("Re*", exposure.reynolds(ustar), *self.reynolds),
-            Bound(f"particle Reynolds number ({self.drag_law})", particle, 0.0, self.drag_end),
-            Bound("speed over that above a smooth wall (z0 = 0.11 nu/u*)", over, 0.0, SMOOTH_END),
-        )
-
     def speed_over_smooth(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Speed of the flow over that with the roughness length of a smooth wall added to z0.
 
-        z0 = 0.11 nu/u* is that of a smooth wall (Nikuradse, VDI Forschungsheft 356, 1932); it
-        bounds the speed over a bed that is far smoother than its grains are large. 1 where the
-        grain lies within the viscous sublayer, Re* < 5.
+        A smooth wall bounds the speed over a bed that is far smoother than its grains are large.
+        1 where the grain lies within the viscous sublayer, Re* < 5.
         """
-        e, reynolds = exposure, np.asarray(exposure.reynolds(ustar))
+        e, reynolds = exposure, exposure.reynolds(ustar)
         with np.errstate(all="ignore"):
-            z0 = e.roughness + 0.11 * e.diameter / np.maximum(reynolds, SUBLAYER)
-            smooth = Exposure(
-                e.diameter, z0, e.fluid_density, e.viscosity, e.lift_coefficient, e.gap
-            )
+            wall = smooth_wall_roughness(np.maximum(ustar, e.ustar(SUBLAYER)), e.viscosity)
+            rest = (e.fluid_density, e.viscosity, e.lift_coefficient, e.gap)
+            smooth = Exposure(e.diameter, e.roughness + wall, *rest)
             over = self.speed(ustar, e) / self.speed(ustar, smooth)
         return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))
 
-    def valid(self, ustar: ArrayLike, exposure: Exposure) -> NDArray[np.bool_]:
-        """Whether the law holds: in its range of Re* and in all others of its bounds."""
-        every = np.broadcast_arrays(*(b.holds for b in self.bounds(ustar, exposure)))
-        return np.asarray(np.logical_and.reduce(every))
+    def ranges(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Validity, ...]:
+        """The ranges that the law holds in; a law with more of them adds its own."""
+        reynolds = exposure.reynolds(ustar)
+        particle = self.particle_reynolds(ustar, exposure)
+        over = self.speed_over_smooth(ustar, exposure)
+        return (
+            Validity("Re*", reynolds, *self.reynolds),
+            Validity(f"particle Reynolds number ({self.drag_law})", particle, 0.0, self.drag_end),
+            Validity("speed over that above a smooth wall", over, 0.0, SMOOTH_END),
+        )
 
-    def why_not(self, ustar: float, exposure: Exposure) -> str:
-        """The bounds that one grain is beyond, in words; empty if the law holds."""
-        return "; ".join(str(b) for b in self.bounds(ustar, exposure) if not b.holds)
+    def valid(self, ustar: ArrayLike, exposure: Exposure) -> BoolArray:
+        """Whether the law holds: in its range of Re* and in all its other ranges."""
+        every = np.broadcast_arrays(*(one.holds for one in self.ranges(ustar, exposure)))
+        return np.asarray(np.logical_and.reduce(every))
 
 
 class DragAndSaffman(ForceLaw):
@@ -160,5 +288,10 @@ class DragAndSaffman(ForceLaw):
         return self.sphere.force(self.speed(ustar, exposure), exposure)
 
     def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Saffman's lift at that speed and shear, N."""
-        return saffman_lift(self.speed(ustar, exposure), self.gradient(ustar, exposure), exposure)
+        """Saffman's lift, N: alpha_s rho sqrt(nu) d^2 V sqrt(du/dz).
+
+        Eq. 4 prints the root of ``(du/dz)/ustar``; its dimension needs ``d (du/dz)/ustar``.
+        """
+        e = exposure
+        scale = e.lift_coefficient * e.fluid_density * np.sqrt(e.viscosity) * e.diameter**2
+        return np.asarray(scale * self.speed(ustar, e) * np.sqrt(self.gradient(ustar, e)))

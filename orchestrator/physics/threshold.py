@@ -1,18 +1,33 @@
 """The threshold of motion of one exposed grain that rolls over its downstream neighbour."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize.elementwise import find_root
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
-from orchestrator.physics.exposure import Exposure, FloatArray
-from orchestrator.physics.force_law import Bound, ForceLaw
-from orchestrator.physics.root import friction_velocity_at
+from orchestrator.physics.force_law import Exposure, ForceLaw, Validity, reasons
+from orchestrator.physics.laws import LAWS
+from orchestrator.types import BoolArray, FloatArray
 
+Regime = Literal["low", "high", "transition"]
+LAWS_OF: dict[Regime, tuple[str, ...]] = {
+    "low": ("low",),
+    "high": ("high",),
+    "transition": ("low", "high"),
+}
+"""Names of the laws that the paper's rule picks in each regime."""
+RUNGS = np.geomspace(1e-9, 1e9, 37)
+"""Friction Reynolds numbers between which the first root is looked for.
+
+A sum that is above its target for less than half a decade is missed; the sum of a pivot rises
+throughout.
+"""
 LIFT_OFF = 1 + 1e-9
 """Lift over the weight normal to the bed from which a grain leaves without rolling: on level bed
-with no drag the pivot itself is at 1."""
+without drag the pivot itself is at 1."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +53,7 @@ class Threshold:
     shields: FloatArray
     drag: FloatArray
     lift: FloatArray
-    valid: NDArray[np.bool_]
+    valid: BoolArray
 
 
 def weight(
@@ -76,25 +91,75 @@ def standing_out(relative_size: ArrayLike, entrainment_angle_deg: ArrayLike) -> 
     return np.asarray((centre + size / 2 - 0.5) / size)
 
 
-def lift_bound(
-    lift: ArrayLike,
+def friction_velocity_at(
+    law: ForceLaw,
     exposure: Exposure,
+    target: ArrayLike,
     *,
-    density: ArrayLike,
-    slope_deg: ArrayLike,
-    gravity: ArrayLike = GRAVITY,
-) -> Bound:
-    """The bound of the pivot: a lift (N) below the part of the weight that is normal to the bed.
+    along: ArrayLike = 1.0,
+    outward: ArrayLike = 0.0,
+    turning: ArrayLike = 0.0,
+    speed_up: ArrayLike = 1.0,
+) -> FloatArray:
+    """The least undisturbed friction velocity at which a sum of the forces reaches a target.
 
-    A greater lift carries the grain off before it can roll.
+    The sum is ``along drag + outward lift + turning torque`` at the local friction velocity, which
+    is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` < 0) drag
+    and torque change their sign. About a contact, `along` and `outward` are the arms of drag and
+    lift over a length, `turning` is one over it, and the target is the moment of the weight alike.
+
+    Parameters
+    ----------
+    law : ForceLaw
+        The forces.
+    exposure : Exposure
+        The grains.
+    target : array_like
+        Value of the sum that is to be reached, N.
+    along, outward : array_like
+        Weights of drag and lift.
+    turning : array_like
+        Weight of the torque, 1/m.
+    speed_up : array_like
+        Local over undisturbed friction velocity, signed.
+
+    Returns
+    -------
+    ndarray
+        Friction velocity, m/s, in the broadcast shape; NaN where the target is not positive, since
+        such a grain needs no flow, and infinite where no flow reaches it.
     """
-    e = exposure
-    submerged = weight(
-        diameter=e.diameter, density=density, fluid_density=e.fluid_density, gravity=gravity
-    )
-    normal = submerged * np.cos(np.radians(np.asarray(slope_deg, float)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return Bound("lift over the weight normal to the bed", lift / normal, -np.inf, LIFT_OFF)
+    local = np.asarray(speed_up, float)
+    weights = (np.sign(local) * along, np.asarray(outward), np.sign(local) * turning)
+    given = (*exposure.fields, *weights, np.asarray(target, float), np.abs(local))
+    arrays = np.broadcast_arrays(*given)
+    shape = arrays[0].shape
+    *args, ratio = (np.ravel(array).astype(float) for array in arrays)
+
+    def excess(ustar: FloatArray, *grain: FloatArray) -> FloatArray:
+        here, (a, b, c, goal) = Exposure(*grain[:6]), grain[6:]
+        sum_ = law.drag(ustar, here) * a + law.lift(ustar, here) * b + law.torque(ustar, here) * c
+        return np.asarray(sum_ - goal)
+
+    found = np.where(args[-1] > 0, np.inf, np.nan)
+    low, high = np.zeros_like(ratio), np.full_like(ratio, np.nan)
+    left = np.flatnonzero(args[-1] > 0)
+    unit = args[3] / args[0]
+    # rungs from below, since the sum need not rise everywhere if a weight is negative
+    for rung in RUNGS:
+        at = rung * unit[left]
+        reached = excess(at, *(arg[left] for arg in args)) >= 0
+        high[left[reached]] = at[reached]
+        left, at = left[~reached], at[~reached]
+        low[left] = at
+        if not len(left):
+            break
+    solved = np.flatnonzero(np.isfinite(high))
+    if len(solved):
+        bracket, grains = (low[solved], high[solved]), tuple(arg[solved] for arg in args)
+        found[solved] = find_root(excess, bracket, args=grains).x
+    with np.errstate(divide="ignore"):
+        return np.asarray((found / ratio).reshape(shape))
 
 
 def threshold(
@@ -133,8 +198,8 @@ def threshold(
         that no flow moves an infinite friction velocity.
     """
     e, beta = exposure, np.radians(np.asarray(entrainment_angle_deg, float))
-    of_grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
-    submerged = weight(diameter=e.diameter, **of_grain)
+    grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
+    submerged = weight(diameter=e.diameter, **grain)
     ustar = friction_velocity_at(
         law,
         e,
@@ -146,7 +211,7 @@ def threshold(
     # where no flow moves the grain the forces are those of an infinite one: not a number
     with np.errstate(invalid="ignore"):
         lift = law.lift(ustar, e)
-        rolls = lift_bound(lift, e, density=density, slope_deg=slope_deg, gravity=gravity).holds
+        rolls = _lift_range(lift, submerged, slope_deg).holds
         return Threshold(
             friction_velocity=ustar,
             reynolds=e.reynolds(ustar),
@@ -155,6 +220,37 @@ def threshold(
             lift=lift,
             valid=law.valid(ustar, e) & rolls,
         )
+
+
+def why_not(
+    law: ForceLaw,
+    ustar: FloatArray,
+    exposure: Exposure,
+    *,
+    density: ArrayLike | None = None,
+    slope_deg: ArrayLike = 0.0,
+    gravity: ArrayLike = GRAVITY,
+) -> list[str]:
+    """Reasons against the thresholds u* (m/s) of some grains under a law, in words; empty if none.
+
+    Parameters are those of `threshold`; without a density the weight, and with it a lift-off, is
+    left out.
+    """
+    ranges = [*law.ranges(ustar, exposure)]
+    if density is not None:
+        e = exposure
+        grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
+        submerged = weight(diameter=e.diameter, **grain)
+        ranges.append(_lift_range(law.lift(ustar, e), submerged, slope_deg))
+    return reasons(ranges, np.size(ustar))
+
+
+def _lift_range(lift: FloatArray, submerged: FloatArray, slope_deg: ArrayLike) -> Validity:
+    """Range of the pivot: a greater lift carries the grain off before it can roll."""
+    normal = submerged * np.cos(np.radians(np.asarray(slope_deg, float)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        over = np.asarray(lift / normal)
+    return Validity("lift over the weight normal to the bed", over, -np.inf, LIFT_OFF)
 
 
 def shields_at(
@@ -178,3 +274,20 @@ def shields_at(
     moment = moment + 2 * law.torque(ustar, unit)
     resistance = np.pi / 6 * pivot_resistance(slope_deg, entrainment_angle_deg)
     return np.asarray(resistance * ustar**2 / moment)
+
+
+def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
+    """Which of Eqs. 2 and 4 holds at its own threshold: ``low``, ``high`` or ``transition``.
+
+    The ranges of Re* decide, Re* < 3 and Re* >= 30, and not the end of the drag of Eq. 4: gravel is
+    in the high regime, if beyond its drag law.
+
+    Raises
+    ------
+    ArithmeticError
+        If both hold somewhere; no such grain is known.
+    """
+    slow, fast = low.reynolds < LAWS["low"].reynolds[1], high.reynolds >= LAWS["high"].reynolds[0]
+    if np.any(slow & fast):
+        raise ArithmeticError("both force laws hold for one grain")
+    return np.where(slow, "low", np.where(fast, "high", "transition"))

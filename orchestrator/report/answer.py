@@ -7,7 +7,7 @@ import pandas as pd
 
 from orchestrator.fidelity.calibration import lowest_floor
 from orchestrator.fidelity.limits import FROZEN_BED
-from orchestrator.physics.log_law import log_law_speed
+from orchestrator.physics.velocity import log_law_speed
 from orchestrator.report import hills, labels
 from orchestrator.report.apart import varying
 from orchestrator.report.facts import Sheet

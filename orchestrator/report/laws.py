@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.regime import LAWS_OF
+from orchestrator.physics.threshold import LAWS_OF
 
 PAIR = LAWS_OF["transition"]
 """The paper's two, which hold at no common Re*: their lines need not be told apart."""

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import Threshold, shields_at
 from orchestrator.report import laws

@@ -10,10 +10,9 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.regime import LAWS_OF, Regime, regime
-from orchestrator.physics.threshold import Threshold, threshold
+from orchestrator.physics.threshold import LAWS_OF, Regime, Threshold, regime, threshold
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray
 

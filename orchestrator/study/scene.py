@@ -12,8 +12,8 @@ from pydantic import Field, model_validator
 
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.log_law import log_law_ustar
 from orchestrator.physics.threshold import weight
+from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.part import Part, UnfitError
 from orchestrator.study.parts import (

@@ -12,7 +12,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.physics.hills import MeasuredHill, measured
+from orchestrator.physics.measured import MeasuredHill, rushil_hill
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
@@ -154,4 +154,4 @@ def measured_hill(pile: Pile) -> MeasuredHill | None:
     bed, case = pile.bed, pile.flow
     if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
         return None
-    return measured(rushil_aspect(bed.slope_deg), case.height_m / case.roughness_m)
+    return rushil_hill(rushil_aspect(bed.slope_deg), case.height_m / case.roughness_m)

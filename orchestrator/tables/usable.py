@@ -7,10 +7,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from orchestrator.flow.case import SPEED_HEIGHT
-from orchestrator.physics.exposure import Exposure
-from orchestrator.physics.force_law import Bound
+from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import lift_bound, standing_out
+from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.study.study import Study
 
 SMOOTH_BELOW = 5 / 30
@@ -84,30 +83,20 @@ def _unreached(row: Mapping[object, object]) -> str:
 
 
 def _law(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Iterator[Reason]:
-    """The bounds of each row's force law, with the rows beyond them."""
+    """The ranges of each row's force law, with the rows beyond them."""
     for name in sorted(set(rows["force_law"])):
         own = (rows["force_law"] == name).to_numpy()
         d = rows["d_m"].to_numpy(float)
         z0 = rows["z0_over_d"].to_numpy(float) * d
         law = LAWS[name]
         exposure = Exposure(d, z0, *(rows[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s")))
-        bounds = list(law.bounds(ustar, exposure))
-        if "share_carried_off" not in rows:
-            bounds.append(
-                lift_bound(
-                    law.lift(ustar, exposure),
-                    exposure,
-                    density=rows["rho_sol_kg_m3"],
-                    slope_deg=rows["alpha_deg"],
-                    gravity=rows["g_m_s2"],
-                )
-            )
+        of_grain = (("density", "rho_sol_kg_m3"), ("slope_deg", "alpha_deg"), ("gravity", "g_m_s2"))
+        single = "share_carried_off" not in rows
+        weights = {key: rows[column].to_numpy(float) for key, column in of_grain if single}
         if law.unverified:
             yield own, [f"unverified force law: {law.unverified}"] * len(rows)
-        for bound in bounds:
-            values = np.broadcast_to(bound.value, ustar.shape)
-            texts = [str(Bound(bound.quantity, value, bound.low, bound.high)) for value in values]
-            yield own & ~bound.holds, texts
+        texts = why_not(law, ustar, exposure, **weights)
+        yield own & (np.array(texts) != ""), texts
 
 
 def _smooth(rows: pd.DataFrame, ustar: NDArray[np.float64]) -> Reason:

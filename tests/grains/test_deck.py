@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,24 +15,24 @@ from hypothesis import strategies as st
 
 from orchestrator.grains import deck
 from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.physics.force_law import Exposure
+from orchestrator.physics.laws import LAWS
 from orchestrator.runs import assets
-from tests.physics import closures
-from tests.physics.closures import Closure
 
-WHERE = {"diameter": 1e-3, "roughness": 1e-4, "fluid_density": 1.0, "viscosity": 1e-5}
+WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
 OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))
 
 
 @given(
-    law_name=st.sampled_from(closures.CLOSURES),
+    law_name=st.sampled_from(sorted(LAWS)),
     ratio=st.floats(-2, 2).filter(lambda r: abs(r) > 1e-3),
     ustar0=st.floats(0.05, 2),
 )
 def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
-    law_name: Closure, ratio: float, ustar0: float
+    law_name: str, ratio: float, ustar0: float
 ) -> None:
-    drag, lift = closures.drag(law_name, **WHERE), closures.lift(law_name, **WHERE)
+    drag, lift = (partial(f, exposure=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
     loading = Loading(drag, lift, np.array([ratio, 0.0]), ALONG, OUTWARD)
     local = abs(ratio) * ustar0
     exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
@@ -39,14 +40,14 @@ def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
 
 
 @given(
-    law_name=st.sampled_from(closures.CLOSURES),
+    law_name=st.sampled_from(sorted(LAWS)),
     goal=st.floats(0.01, 10),
     arms=st.tuples(st.floats(0.1, 1), st.floats(0, 1)),
 )
 def test_the_table_of_forces_finds_the_flow_of_the_force_law(
-    law_name: Closure, goal: float, arms: tuple[float, float]
+    law_name: str, goal: float, arms: tuple[float, float]
 ) -> None:
-    drag, lift = closures.drag(law_name, **WHERE), closures.lift(law_name, **WHERE)
+    drag, lift = (partial(f, exposure=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
     weight = 1e-5
     ustar = ForceTable(drag, lift, weight, 0.5).reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))

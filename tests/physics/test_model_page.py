@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.physics.exposure import Exposure
+from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import shields_at
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.physics.hills import measured
+from orchestrator.physics.measured import rushil_hill
 from orchestrator.report import answer, hills
 from orchestrator.report.results import Results
 from tests import small_study
@@ -83,6 +83,6 @@ def test_a_panel_without_reversed_flow_says_so(results: Results) -> None:
 
 
 def test_another_hill_is_not_the_experiments() -> None:
-    assert measured(3.0, 745.0)
-    assert measured(4.0, 745.0) is None
-    assert measured(3.0, 100.0) is None
+    assert rushil_hill(3.0, 745.0)
+    assert rushil_hill(4.0, 745.0) is None
+    assert rushil_hill(3.0, 100.0) is None

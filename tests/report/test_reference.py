@@ -8,7 +8,6 @@ from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import reference, theory
 from orchestrator.report.results import Results
-from tests.physics import closures
 
 
 def test_band_holds_every_curve_within_its_range() -> None:
@@ -68,9 +67,9 @@ def bed(results: Results) -> pd.DataFrame:
 def test_closed_form_lines_are_solid_where_their_equation_holds(bed: pd.DataFrame) -> None:
     low, high = theory.branches(bed)
     assert (low.law, high.law) == ("low", "high")
-    assert (low.valid == (low.reynolds < closures.LOW_BELOW)).all()
+    assert (low.valid == (low.reynolds < LAWS["low"].reynolds[1])).all()
     inside = high.reynolds < theory.drag_law_limit(0.1)
-    assert (high.valid == ((high.reynolds >= closures.HIGH_FROM) & inside)).all()
+    assert (high.valid == ((high.reynolds >= LAWS["high"].reynolds[0]) & inside)).all()
     assert not (low.valid & low.continued).any()
     assert low.valid.any()
     assert low.continued.any()

@@ -1,0 +1,256 @@
+"""Thresholds of single grains under any force law: known values, and their invariants."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator.physics import curves
+from orchestrator.physics.force_law import Exposure
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.threshold import (
+    LAWS_OF,
+    Threshold,
+    friction_velocity_at,
+    pivot_resistance,
+    regime,
+    shields_at,
+    standing_out,
+    threshold,
+    weight,
+    why_not,
+)
+
+few = settings(max_examples=30, deadline=None)
+every_law = pytest.mark.parametrize("name", LAWS)
+ratios = st.floats(1 / 60, 1 / 5)
+betas = st.floats(5, 60)
+diameters = st.floats(3.5e-5, 2e-3)
+
+# Root of the moment balance (third of Eqs. 1) with the forces as first printed (Eq. 2; Eq. 4 with
+# V_f by quadrature of the profile), by an arbitrary-precision root finder at 50 digits.
+INDEPENDENT = [
+    ("low", 5e-5, 0, 60, 30, 1e-5, 0.25580768642034),
+    ("low", 1e-3, 0, 45, 10, 1e-3, 1.35707693484772),
+    ("low", 1e-4, 30, 50, 30, 1e-3, 0.557460808643586),
+    ("high", 1e-3, 0, 60, 30, 1e-5, 0.833007199705443),
+    ("high", 7e-4, 15, 60, 10, 1e-5, 1.17223668827337),
+    ("high", 1e-3, 20, 50, 30, 1e-5, 1.20632632568727),
+]
+
+
+def of_air(name: str, d: float, ratio: float, alpha: float, beta: float, nu: float) -> Threshold:
+    where = Exposure(d, ratio * d, 1.0, nu)
+    angles = {"slope_deg": alpha, "entrainment_angle_deg": beta}
+    return threshold(LAWS[name], where, density=2500.0, **angles)
+
+
+def water(d: float, beta: float = 50, law: str = "bridged") -> Threshold:
+    where = Exposure(d, d / 30, 1000.0, 1e-6)
+    return threshold(LAWS[law], where, density=2650.0, slope_deg=0, entrainment_angle_deg=beta)
+
+
+@pytest.mark.parametrize(("name", "d", "alpha", "beta", "part", "nu", "ustar"), INDEPENDENT)
+def test_threshold_is_the_root_of_the_printed_equations(
+    name: str, d: float, alpha: float, beta: float, part: float, nu: float, ustar: float
+) -> None:
+    found = of_air(name, d, 1 / part, alpha, beta, nu)
+    assert float(found.friction_velocity) == pytest.approx(ustar, rel=1e-12)
+
+
+def test_eq_3_in_its_printed_form() -> None:
+    alpha, beta, ratio = np.radians(20), np.radians(50), 0.1
+    found = of_air("low", 1e-4, ratio, 20, 50, 1e-3)
+    geometry = 1 + 2 * ratio
+    lift = 1.615 / 2 * found.reynolds * geometry
+    printed = (np.pi / 6 * (np.sin(alpha) * np.tan(beta) + np.cos(alpha))) / (
+        1.5 * np.pi * geometry * np.tan(beta) + lift
+    )
+    assert float(found.shields) == pytest.approx(float(printed), rel=1e-12)
+
+
+# computed for the specification, by another program
+@pytest.mark.parametrize(
+    ("d", "theta", "curve"),
+    [(1e-4, 0.0701, 0.0771), (5e-4, 0.0348, 0.0308), (2e-3, 0.0410, 0.0399)],
+)
+def test_bridged_thresholds_in_water(d: float, theta: float, curve: float) -> None:
+    assert float(water(d).shields) == pytest.approx(theta, abs=5e-5)
+    dstar = np.array(d * (1.65 * 9.81 / 1e-12) ** (1 / 3))
+    assert float(curves.soulsby_whitehouse(dstar)) == pytest.approx(curve, abs=5e-5)
+
+
+@pytest.mark.parametrize(("d", "theta", "reynolds"), [(1e-4, 0.0499, 3.5), (5e-4, 0.0362, 33.3)])
+def test_bridged_thresholds_in_air(d: float, theta: float, reynolds: float) -> None:
+    found = of_air("bridged", d, 1 / 30, 15, 60, 1e-5)
+    assert float(found.shields) == pytest.approx(theta, abs=5e-5)
+    assert float(found.reynolds) == pytest.approx(reynolds, abs=0.05)
+    assert bool(found.valid)
+
+
+def test_the_bridged_curve_dips_between_the_regimes_and_leaves_soulsby_below_one() -> None:
+    reynolds, theta = next(c for c in curves.WATER if "Soulsby" in c.name).points(2000)
+    own = shields_at(LAWS["bridged"], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=50)
+    assert 10 < reynolds[np.argmin(own)] < 30
+    assert own.min() == pytest.approx(0.0319, abs=2e-4)
+    ratio = own / theta
+    sand = (reynolds > 1) & (reynolds < 150)
+    assert 0.85 < ratio[sand].min() < ratio[sand].max() < 1.2
+    assert np.interp([0.5, 0.1], reynolds, ratio) == pytest.approx([0.66, 0.41], abs=0.01)
+
+
+@every_law
+@few
+@given(d=diameters, ratio=ratios, beta=betas, slope=st.floats(0, 30), nu=st.floats(1e-6, 1e-3))
+def test_moments_balance_at_the_threshold(
+    name: str, d: float, ratio: float, beta: float, slope: float, nu: float
+) -> None:
+    law, where = LAWS[name], Exposure(d, ratio * d, 1.0, nu)
+    found = of_air(name, d, ratio, slope, beta, nu)
+    b, u = np.radians(beta), found.friction_velocity
+    moment = found.drag * np.sin(b) + found.lift * np.cos(b) + 2 * law.torque(u, where) / d
+    submerged = weight(diameter=d, density=2500.0, fluid_density=1.0)
+    resistance = submerged * pivot_resistance(slope, beta)
+    assert float(moment) == pytest.approx(float(resistance), rel=1e-12)
+    angles = {"entrainment_angle_deg": beta, "slope_deg": slope}
+    curve = shields_at(law, found.reynolds, roughness_ratio=ratio, **angles)
+    assert float(curve) == pytest.approx(float(found.shields), rel=1e-12)
+
+
+@every_law
+def test_an_array_of_grains_is_its_grains_in_turn(name: str) -> None:
+    d, slope = np.array([[5e-5], [3e-4], [2e-3]]), np.array([0.0, 10.0, 25.0])
+    where, grain = Exposure(d, d / 10, 1.0, 1e-5), {"density": 2500.0, "entrainment_angle_deg": 60}
+    many = threshold(LAWS[name], where, slope_deg=slope, **grain)
+    assert many.friction_velocity.shape == many.valid.shape == many.drag.shape == (3, 3)
+    for i, j in np.ndindex(3, 3):
+        single = of_air(name, float(d[i, 0]), 0.1, float(slope[j]), 60, 1e-5).friction_velocity
+        assert float(many.friction_velocity[i, j]) == pytest.approx(float(single), rel=1e-14)
+
+
+@every_law
+@few
+@given(d=diameters, ratio=ratios, beta=betas, factor=st.floats(1.05, 3))
+def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
+    name: str, d: float, ratio: float, beta: float, factor: float
+) -> None:
+    where, grain = Exposure(d, ratio * d, 1.0, 1e-5), {"density": 2500.0}
+    slopes = np.linspace(0, beta, 9)
+    angle = {"entrainment_angle_deg": beta}
+    up = threshold(LAWS[name], where, slope_deg=slopes, **grain, **angle).friction_velocity
+    assert np.all(np.diff(up) > 0)
+    heavy = threshold(LAWS[name], where, density=2500.0 * factor, slope_deg=0, **angle)
+    assert float(heavy.friction_velocity) > up[0]
+    assert float(of_air(name, d, ratio, 0, beta - 4, 1e-5).friction_velocity) > up[0]
+
+
+@every_law
+@few
+@given(d=diameters, factor=st.floats(0.1, 10), ratio=ratios, beta=betas)
+def test_the_shields_number_depends_on_the_scale_through_the_reynolds_number(
+    name: str, d: float, factor: float, ratio: float, beta: float
+) -> None:
+    small = of_air(name, d, ratio, 10, beta, 1e-5)
+    # the same d^3 g/nu^2 with another diameter
+    large = of_air(name, factor * d, ratio, 10, beta, 1e-5 * factor**1.5)
+    assert float(large.shields) == pytest.approx(float(small.shields), rel=1e-11)
+    assert float(large.reynolds) == pytest.approx(float(small.reynolds), rel=1e-11)
+
+
+def test_a_torque_and_a_lift_both_lower_the_threshold() -> None:
+    bare = water(3e-4, law="zeng").friction_velocity
+    assert float(water(3e-4, law="zeng-torque").friction_velocity) < float(bare)
+    without = Exposure(3e-4, 1e-5, 1000.0, 1e-6, 0.0)
+    grain = {"density": 2650.0, "slope_deg": 0, "entrainment_angle_deg": 50}
+    level = threshold(LAWS["bridged"], without, **grain).friction_velocity
+    assert float(water(3e-4).friction_velocity) < float(level)
+
+
+def test_without_resistance_there_is_no_threshold() -> None:
+    found = threshold(
+        LAWS["bridged"],
+        Exposure(1e-3, 1e-4, 1000.0, 1e-6),
+        density=np.array([2650.0, 900.0, 2650.0, np.nan]),
+        slope_deg=np.array([-50.0, 0.0, 0.0, 0.0]),
+        entrainment_angle_deg=45.0,
+    )
+    np.testing.assert_array_equal(np.isnan(found.shields), [True, True, False, True])
+    np.testing.assert_array_equal(found.valid, [False, False, True, False])
+
+
+def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
+    # a law without lift, in a pocket that is bottomless for a drag
+    found = water(1e-3, beta=0, law="claudin-andreotti")
+    assert float(found.friction_velocity) == float(found.shields) == np.inf
+    assert not bool(found.valid)
+
+
+def test_gravel_is_beyond_one_drag_and_within_another() -> None:
+    assert not bool(water(0.02).valid)
+    assert bool(water(0.02, law="bridged-gravel").valid)
+
+
+@pytest.mark.parametrize(("lift", "reason"), [(10.0, "lift over the weight"), (1.615, "")])
+def test_a_lift_beyond_the_weight_ends_the_pivot(lift: float, reason: str) -> None:
+    """Up a slope the lift can pass the weight before the drag turns the grain."""
+    where = Exposure(5e-4, 5e-4 / 30, 1.2, 1.5e-5, lift)
+    grain = {"density": 2650.0, "slope_deg": 20}
+    found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
+    assert bool(found.valid) == (not reason)
+    (text,) = why_not(LAWS["bridged"], found.friction_velocity, where, **grain)
+    assert reason in text
+    assert bool(text) == bool(reason)
+
+
+def test_a_small_grain_hides_between_its_neighbours() -> None:
+    # between neighbours that touch the top of a grain of d/4 is level with theirs
+    assert float(standing_out(0.25, 60.0)) == pytest.approx(0, abs=1e-12)
+    assert float(standing_out(1.0, 60.0)) == pytest.approx(np.sqrt(0.75))
+    sizes = np.array([0.1, 0.2, 0.5, 1.0, 3.0, 10.0])
+    assert np.all(np.diff(standing_out(sizes, 60.0)) > 0)
+
+
+class TestFrictionVelocityAt:
+    where = Exposure(1e-3, 1e-4, 1000.0, 1e-6)
+
+    def test_the_local_flow_is_the_undisturbed_one_sped_up(self) -> None:
+        ratio = np.array([0.5, 1.0, 1.6])
+        found = friction_velocity_at(LAWS["bridged"], self.where, 1e-6, speed_up=ratio)
+        np.testing.assert_allclose(found * ratio, np.full(3, found[1]), rtol=1e-14)
+
+    def test_a_flow_that_runs_backwards_turns_drag_and_torque_but_not_lift(self) -> None:
+        law, sums = LAWS["zeng-torque"], {"along": 0.8, "outward": 0.5, "turning": 100.0}
+        forth = friction_velocity_at(law, self.where, 1e-6, speed_up=0.7, **sums)
+        mirrored = {**sums, "along": -0.8, "turning": -100.0}
+        back = friction_velocity_at(law, self.where, 1e-6, speed_up=-0.7, **mirrored)
+        assert float(back) == pytest.approx(float(forth), rel=1e-14)
+
+    def test_unreached_is_infinite_and_no_need_of_flow_is_not_a_number(self) -> None:
+        given = {"along": np.array([-1.0, 1.0, 1.0, 1.0]), "speed_up": np.array([1, 0, 1, 1.0])}
+        target = np.array([1e-6, 1e-6, 0.0, -1e-6])
+        found = friction_velocity_at(LAWS["bridged"], self.where, target, **given)
+        np.testing.assert_array_equal(found, [np.inf, np.inf, np.nan, np.nan])
+
+    def test_of_several_roots_it_is_the_least(self) -> None:
+        # lift against drag: the lift is above a quarter of the drag for Re* of about 2 to 1000
+        law, weights = LAWS["bridged"], {"along": -0.25, "outward": 1.0}
+        flows = self.where.ustar(np.geomspace(1e-3, 1e4, 4001))
+        total = law.lift(flows, self.where) - 0.25 * law.drag(flows, self.where)
+        target = 0.5 * total.max()
+        above = np.flatnonzero(total >= target)
+        assert above[-1] < len(flows) - 1
+        found = float(friction_velocity_at(law, self.where, target, **weights))
+        assert flows[above[0] - 1] <= found <= flows[above[0]]
+
+
+def test_the_regime_is_that_of_the_ranges_of_eqs_2_and_4_and_gravel_is_high() -> None:
+    d, nu = np.geomspace(3e-5, 2e-2, 60), np.array([[1e-6], [1e-5], [1e-3]])
+    grain = {"density": 2500.0, "slope_deg": 5.0, "entrainment_angle_deg": 60.0}
+    where = Exposure(d, d / 30, 1.0, nu)
+    low, high = (threshold(LAWS[name], where, **grain) for name in ("low", "high"))
+    found = regime(low, high)
+    np.testing.assert_array_equal(found == "low", low.reynolds < 3)
+    np.testing.assert_array_equal(found == "high", high.reynolds >= 30)
+    assert set(np.unique(found)) == set(LAWS_OF)
+    assert found[1, -1] == "high"
+    assert not high.valid[1, -1]

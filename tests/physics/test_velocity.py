@@ -1,0 +1,110 @@
+"""Mean velocities against quadrature of their profiles."""
+
+from decimal import Decimal, localcontext
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from orchestrator.physics.constants import KARMAN
+from orchestrator.physics.velocity import (
+    bridge,
+    depth_mean_speed,
+    layer,
+    log_law_speed,
+    log_law_ustar,
+    rough_gradient,
+    rough_speed,
+    shear,
+    shift,
+    viscous_length,
+)
+
+D, Z0 = 1e-3, 1e-3 / 30
+DIAMETER, ROUGHNESS = np.array(D), np.array(Z0)
+
+
+@given(speed=st.floats(1e-3, 50), height=st.floats(0.02, 20), z0=st.floats(1e-6, 1e-2))
+def test_speed_and_friction_velocity_are_inverse(speed: float, height: float, z0: float) -> None:
+    ustar = log_law_ustar(speed, height, z0)
+    assert float(ustar) == pytest.approx(0.41 * speed / np.log((height + z0) / z0), rel=1e-10)
+    assert float(log_law_speed(ustar, height, z0)) == pytest.approx(speed, rel=1e-13)
+
+
+def test_eq_10_as_printed_changes_its_sign_below_z0() -> None:
+    assert float(log_law_ustar(1.0, 1e-3, 1e-4, printed=True)) == pytest.approx(0.41 / np.log(10))
+    assert float(log_law_ustar(1.0, 5e-5, 1e-4, printed=True)) < 0 < log_law_ustar(1.0, 5e-5, 1e-4)
+
+
+@pytest.mark.parametrize("depth", [0.05, 1.0, 5.0])
+def test_the_depth_mean_is_the_mean_of_the_profile(depth: float) -> None:
+    total = quad(lambda z: float(log_law_speed(0.05, z, 1e-4)), 0, depth, epsrel=1e-12)[0]
+    assert float(depth_mean_speed(0.05, depth, 1e-4)) == pytest.approx(total / depth, rel=1e-9)
+
+
+@pytest.mark.parametrize("gap", [-0.6 * D, -0.1 * D, 0.0, Z0, 0.2 * D, 1.5 * D])
+def test_speeds_and_shears_are_means_over_the_height_of_the_grain(gap: float) -> None:
+    height = np.array(gap)
+    mean, _ = quad(lambda z: 2.5 * np.log(max(z, Z0) / Z0), gap, gap + D, points=[Z0], limit=200)
+    assert rough_speed(DIAMETER, ROUGHNESS, height) == pytest.approx(mean / D, rel=1e-6)
+    linear, _ = quad(lambda z: max(z, 0.0), gap, gap + D, points=[0.0])
+    assert viscous_length(DIAMETER, height) == pytest.approx(linear / D, rel=1e-6)
+    rise = 2.5 * (np.log((gap + D) / Z0) - np.log(max(gap, Z0) / Z0))
+    assert rough_gradient(DIAMETER, ROUGHNESS, height) == pytest.approx(rise / D, rel=1e-9)
+
+
+def test_a_grain_at_z0_meets_the_speeds_of_eqs_2_and_4() -> None:
+    r = Z0 / D
+    assert viscous_length(DIAMETER, ROUGHNESS) == pytest.approx(D / 2 + Z0, rel=1e-14)
+    assert rough_speed(DIAMETER, ROUGHNESS, ROUGHNESS) == pytest.approx(
+        2.5 * ((1 + r) * np.log1p(1 / r) - 1), rel=1e-14
+    )
+    assert rough_gradient(DIAMETER, ROUGHNESS, ROUGHNESS) == pytest.approx(
+        2.5 * np.log1p(1 / r) / D, rel=1e-14
+    )
+
+
+@given(reynolds=st.floats(1e-6, 1e6), viscous=st.floats(1e-3, 1e3), rough=st.floats(1, 50))
+def test_the_root_of_the_bridge_is_right_to_the_last_digits(
+    reynolds: float, viscous: float, rough: float
+) -> None:
+    with localcontext() as context:
+        context.prec = 60
+        u, a, c = Decimal(reynolds), Decimal(viscous), Decimal(rough)
+        exact = (-a + (a * a + 4 * u * u / (c * c)).sqrt()) * c * c / 2
+    found = bridge(np.array(reynolds), np.array(viscous), np.array(rough))
+    assert float(found) == pytest.approx(float(exact), rel=1e-15)
+
+
+def _by_quadrature(base: float, top: float, moved: float) -> tuple[float, float]:
+    """Mean speed and shear of van Driest's profile, independently of the tables."""
+
+    def slope(z: float) -> float:
+        length = KARMAN * (z + moved) * (1 - np.exp(-(z + moved) / 26))
+        return float(2 / (1 + np.sqrt(1 + 4 * length**2)))
+
+    below = quad(slope, 0, base, epsrel=1e-12, epsabs=0)[0]
+    rise = first = 0.0
+    for a, b in pairwise(np.geomspace(base, top, 12)):
+        rise += quad(slope, a, b, epsrel=1e-12, epsabs=0)[0]
+        first += quad(lambda z: (top - z) * slope(z), a, b, epsrel=1e-12, epsabs=0)[0]
+    return below + first / (top - base), rise / (top - base)
+
+
+@pytest.mark.parametrize("reynolds", [1e-3, 0.3, 5.0, 40.0, 500.0, 2000.0, 1e9, 1e20])
+@pytest.mark.parametrize("ratio", [1 / 60, 1 / 10])
+def test_the_profile_is_the_integral_of_its_shear(reynolds: float, ratio: float) -> None:
+    base = np.array(ratio * reynolds)
+    moved = shift(30 * base)
+    exact = _by_quadrature(float(base), float(base + reynolds), float(moved))
+    np.testing.assert_allclose(layer(base, base + reynolds, moved), exact, rtol=1e-9)
+
+
+def test_the_limits_of_the_profile() -> None:
+    assert float(shear(np.array(1e4))) == pytest.approx(1 / (KARMAN * 1e4), rel=2e-4)
+    assert not np.any(shift(np.linspace(0, 4.5, 50)))
+    assert 0 < float(shift(np.array(4.54))) < 0.01
+    assert float(shift(np.array(70.0))) == pytest.approx(0.9 * np.sqrt(70), rel=1e-3)
