@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.bed.line import BedLine
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import Array, Measure, WallStress

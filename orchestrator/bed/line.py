@@ -1,22 +1,31 @@
-"""The bed line: the bottom of the flow as a polyline, which mesh, packing and stress ask.
+"""The bed line: the bottom of the flow as a polyline, and how one is made of forms and obstacles.
 
-Lengths are in any one unit: metres for the flow, diameters for a packing. Makers put the foot of
-the first form at x = 0, where the arc length s is zero.
+Lengths are in any one unit: metres for the flow, diameters for a packing. The foot of the first
+form is at x = 0, where the arc length s is zero.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from math import pi, radians, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from orchestrator.study.parts import Obstacle, PileBed, Range, UnfitError
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
-
-SOME = 50
-"""Points whose nearest places are looked for at a time."""
+UPSTREAM, DOWNSTREAM = 10.0, 20.0
+"""Flat bed before and behind the forms, in heights of them."""
+SIDE_DEG = 75.0
+"""Slope of an obstacle's sides: the grid lines of the mesh are vertical, and so no side is."""
+FENCE = 0.1
+"""Thickness of a fence at its top, of its height."""
+CHORDS = 16
+"""Chords of a half-cylinder."""
+LEVEL_DEG = 1e-6
+"""Slope from which on a segment rises."""
+PLACES = 10**6
+"""Most pairs of a point and a segment that are compared at a time."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,12 @@ class BedLine:
     z: tuple[float, ...]
     h: float
     bare: tuple[tuple[float, float], ...] = ()
+
+    @classmethod
+    def through(cls, corners: FloatArray, h: float) -> "BedLine":
+        """The line through some corners, shape (n, 2)."""
+        x, z = np.transpose(corners).tolist()
+        return cls(tuple(x), tuple(z), h)
 
     def scaled(self, factor: float) -> "BedLine":
         """The same line in another unit of length."""
@@ -87,7 +102,7 @@ class BedLine:
 
     @property
     def top(self) -> int:
-        """Number of the highest corner, the crest."""
+        """Number of the highest corner, the crest, and of the segment behind it."""
         return int(np.argmax(self.z))
 
     @property
@@ -106,26 +121,36 @@ class BedLine:
         falls = np.flatnonzero(np.diff(self.z) < 0)
         return np.asarray(self.corners[falls[-1] + 1 if len(falls) else -1])
 
-    @property
-    def windward(self) -> int:
-        """Number of the segment that rises to the crest."""
-        return self.top - 1
-
-    @property
-    def lee(self) -> int:
-        """Number of the segment that falls behind the crest."""
-        return self.top
-
     def height(self, x: FloatArray) -> FloatArray:
         """Height of the line at some places along x."""
         return np.asarray(np.interp(x, self.x, self.z))
 
+    def counted(self, counts: str | Range) -> BoolArray:
+        """Which segments carry counted grains, shape (n - 1,); none of the two at the ends.
+
+        Those that rise for "windward", every one for "all", or those within a range of x.
+        """
+        inner = np.zeros(len(self.lengths), bool)
+        inner[1:-1] = True
+        if counts == "windward":
+            return np.asarray(inner & (self.slopes_deg > LEVEL_DEG))
+        if isinstance(counts, str):
+            return inner
+        x = np.array(self.x)
+        return np.asarray(inner & (x[1:] > counts[0]) & (x[:-1] < counts[1]))
+
     def under(self, points: FloatArray) -> IntArray:
         """The segment under each of some points over the bed; at a top that on their own side."""
         segment, s = self.nearest(points)
-        last = s >= self.arc_lengths[segment + 1] - 1e-9 * self.lengths.max()
-        behind = last & (points[:, 0] > self.corners[segment + 1, 0] + 1e-9 * self.lengths.max())
+        near = 1e-9 * self.lengths.max()
+        last = s >= self.arc_lengths[segment + 1] - near
+        behind = last & (points[:, 0] > self.corners[segment + 1, 0] + near)
         return np.asarray(np.minimum(segment + behind, len(self.lengths) - 1))
+
+    def over(self, points: FloatArray, segment: IntArray | int) -> FloatArray:
+        """Distance of points (m, 2) over the straight lines of segments, shape (m,)."""
+        away = points - self.corners[segment]
+        return np.asarray((away * self.normals[segment]).sum(axis=1))
 
     def roof(self, clearance: float) -> tuple[float, FloatArray]:
         """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""
@@ -135,35 +160,106 @@ class BedLine:
         steep = np.abs(np.arctan2(-apart[:, 1], np.abs(apart[:, 0]))).min()
         return float(np.degrees(steep)), ridge + np.array([0, clearance / np.cos(steep)])
 
-    def depth(self, points: FloatArray, segment: int) -> FloatArray:
-        """Signed distance of points (m, 2) below the straight line of a segment, shape (m,)."""
-        return np.asarray(-(points - self.corners[segment]) @ self.normals[segment])
-
     def nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """The segment nearest to each of m points, and the arc length of the nearest place on it.
 
-        If two are as near, the one further up counts: the face, where it meets the flat bed.
+        If two are as near, the higher place counts.
         """
-        order = np.argsort(points[:, 0], kind="stable")
-        chosen, arc_length = np.empty(len(points), np.int64), np.empty(len(points))
-        for some in np.array_split(order, max(len(points) // SOME, 1)):
-            chosen[some], arc_length[some] = self._nearest(points[some])
-        return chosen, arc_length
+        segment, s = np.empty(len(points), np.int64), np.empty(len(points))
+        blocks = len(points) * len(self.lengths) // PLACES + 1
+        for block in np.array_split(np.arange(len(points)), blocks):
+            away = points[block, None] - self.corners[:-1]
+            along = np.clip(np.einsum("mnk,nk->mn", away, self.tangents), 0.0, self.lengths)
+            places = self.corners[:-1] + along[..., None] * self.tangents
+            distance = np.linalg.norm(points[block, None] - places, axis=2)
+            tied = distance <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
+            chosen = np.argmax(np.where(tied, places[..., 1], -np.inf), axis=1)
+            segment[block] = chosen
+            s[block] = self.arc_lengths[chosen] + along[np.arange(len(block)), chosen]
+        return segment, s
 
-    def _nearest(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The same for a few neighbours, among the segments that can be near to them."""
-        x, away = points[:, 0], np.abs(points[:, 1] - self.height(points[:, 0])).max()
-        low = max(int(np.searchsorted(self.x, x.min() - away)) - 1, 0)
-        high = int(np.searchsorted(self.x, x.max() + away, side="right")) + 1
-        # points beyond an end are nearest to the segment there
-        low, high = min(low, len(self.lengths) - 1), max(high, 2)
-        corners, tangents = self.corners[low : high - 1][: len(self.lengths) - low], self.tangents
-        tangents, lengths = tangents[low : high - 1], self.lengths[low : high - 1]
-        along = np.einsum("mnk,nk->mn", points[:, None] - corners, tangents)
-        along = np.clip(along, 0.0, lengths)
-        places = corners + along[..., None] * tangents
-        distance = np.linalg.norm(points[:, None] - places, axis=2)
-        tied = distance <= distance.min(axis=1, keepdims=True) + 1e-9 * self.lengths.max()
-        chosen = np.argmax(np.where(tied, places[..., 1], -np.inf), axis=1)
-        rows = np.arange(len(points))
-        return chosen + low, np.asarray(self.arc_lengths[chosen + low] + along[rows, chosen])
+
+@cache
+def of_bed(bed: PileBed) -> BedLine:
+    """The bed line that a pile's bed asks for, m.
+
+    Raises
+    ------
+    UnfitError
+        If the forms of a train overlap.
+    """
+    if bed.profile:
+        corners = np.column_stack([bed.profile.x, bed.profile.z])
+    else:
+        corners = _train(bed.form.corners(bed), bed.forms, bed.spacing)
+    for obstacle in bed.obstacles:
+        start, end = obstacle.x - obstacle.reach, obstacle.x + obstacle.reach
+        if start < corners[0, 0]:
+            corners = np.vstack([[start, corners[0, 1]], corners])
+        if end > corners[-1, 0]:
+            corners = np.vstack([corners, [end, corners[-1, 1]]])
+    line = between_flats(corners, bed.relief)
+    for obstacle in sorted(bed.obstacles, key=lambda obstacle: obstacle.x):
+        line = _with_obstacle(line, obstacle)
+    return line
+
+
+@cache
+def triangle(slope_deg: float, height: float) -> BedLine:
+    """A pile with two faces of one slope (degrees), the paper's bed; of slope 0 the flat bed."""
+    face = height / tan(radians(slope_deg)) if slope_deg else 4 * height
+    top = height if slope_deg else 0.0
+    return between_flats(np.array([[0, 0], [face, top], [2 * face, 0]]), height)
+
+
+def between_flats(corners: FloatArray, height: float) -> BedLine:
+    """A line with flat bed before and behind some corners."""
+    (x_first, z_first), (x_last, z_last) = corners[[0, -1]]
+    before, behind = (x_first - UPSTREAM * height, z_first), (x_last + DOWNSTREAM * height, z_last)
+    return BedLine.through(np.vstack([before, corners, behind]), height)
+
+
+def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
+    """Several forms in a row, the foot of each a spacing behind that of the one before."""
+    length = float(form[-1, 0])
+    spacing = spacing or length
+    if count > 1 and spacing < length * (1 - 1e-9):
+        what = f"forms {length:g} m long overlap at {spacing:g} m"
+        raise UnfitError("bed.spacing", what, "raise it, or leave it out: they touch then")
+    corners = np.vstack([form + np.array([place * spacing, 0]) for place in range(count)])
+    # forms that touch share a corner
+    new = np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)
+    return np.asarray(corners[new])
+
+
+def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:
+    """The line over an obstacle, whose sides go down to where they meet the bed."""
+    middle = np.array([obstacle.x, float(line.height(np.array(obstacle.x)))])
+    outline = _outline(obstacle) + middle
+    start, end = _foot(line, outline[0], -1), _foot(line, outline[-1], 1)
+    before, behind = (
+        line.corners[line.corners[:, 0] < start[0]],
+        line.corners[line.corners[:, 0] > end[0]],
+    )
+    whole = BedLine.through(np.vstack([before, start, outline, end, behind]), line.h)
+    return replace(whole, bare=(*line.bare, (float(start[0]), float(end[0]))))
+
+
+def _foot(line: BedLine, top: FloatArray, way: int) -> FloatArray:
+    """Where a side that goes down from a point, upstream (-1) or downstream (1), meets the bed."""
+    x = float(top[0])
+    for _ in range(50):  # the side is steeper than any bed: this converges
+        x = float(top[0] + way * (top[1] - line.height(np.array(x))) / tan(radians(SIDE_DEG)))
+    return np.array([x, float(line.height(np.array(x)))])
+
+
+def _outline(obstacle: Obstacle) -> FloatArray:
+    """The corners of an obstacle above its sides, around the middle of its foot, shape (n, 2)."""
+    if obstacle.kind == "half-cylinder":
+        # where the circle is steeper than the sides they go straight down
+        first = radians(90 - SIDE_DEG)
+        angles = np.linspace(pi - first, first, CHORDS + 1)
+        return obstacle.height * np.column_stack([np.cos(angles), np.sin(angles)])
+    height = obstacle.height
+    length = FENCE * height if obstacle.kind == "fence" else obstacle.length or height
+    return np.array([[-length / 2, height], [length / 2, height]])

@@ -2,25 +2,26 @@
 
 A lattice of equal spheres has rows in which the centres are ``2 d cos(beta)`` apart, each row
 resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are in diameters d of
-the scene, with the foot of the form at the origin; each grain has a size of its own.
+the scene, with the foot of the first form at the origin; each grain has a size of its own.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
-from orchestrator.bed.disorder import rows as disorder_rows
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.places import Places
 from orchestrator.study.parts import Packing as Pattern
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from orchestrator.study.parts import Range, UnfitError
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TIE = 1e-6
 """Part of a diameter: neighbours of a lattice lie exactly on the limits below, and round-off must
 not decide a tie."""
+TOUCH = 1e-3
+"""Two grains closer than this touch, of the mean of their diameters."""
 APRON = 10.0
 """Length of the fixed flat bed beyond each toe, diameters."""
 STRAY = 0.1
@@ -34,6 +35,75 @@ PERTURBATION = 1e-9
 which grain of a chain goes first."""
 LEE_DEPTH = 1.5
 """Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
+SHARP_DEG = 8.0
+"""Bend from which on rows do not follow the bed round a corner."""
+SLIT = 0.15
+"""Between neighbours of a row that goes round a bend a gap is at most this wide, diameters."""
+BARE = 1.0
+"""Grains this near to an obstacle are fixed under its foot, diameters."""
+LOWER = 0.1
+"""A neighbour bears a grain that stands so much over it, diameters."""
+UNDER = 2
+"""Rows of fixed grains where none is counted: none falls through them."""
+OFFSET = 0.125
+"""Largest offset of a grain normal to its row, over the size of the disorder."""
+FINE = 0.1
+"""Between two places of a curve at which a row may be opened, diameters."""
+TURNS = 100
+"""How often a row is opened further; grains that overlap then are left out by `cover`."""
+ROOM = 1 + 1e-9
+"""Neighbours of a disordered row are at least this far apart, diameters."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """The centres of n grains, in one unit of length.
+
+    Attributes
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Along the flow, across it, up.
+    width : float
+        From one side of a strip to the other, beyond which it begins again; 0 in one plane.
+    """
+
+    xyz: FloatArray
+    width: float = 0.0
+
+    @classmethod
+    def of(cls, centres: FloatArray, across: ArrayLike = 0.0, width: float = 0.0) -> "Places":
+        """Places from x and z, shape (n, 2), and y."""
+        x, z = centres.T
+        y = np.broadcast_to(np.asarray(across, float), x.shape)
+        return cls(np.column_stack([x, np.mod(y, width) if width else y, z]), width)
+
+    def pairs(self, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
+        """Grains within a reach of one another, each pair in both orders, k pairs in all.
+
+        Returns
+        -------
+        first, second : ndarray of int, shape (k,)
+        apart : ndarray, shape (k, 3)
+            Vector from the first to the second, the shorter way across the sides.
+        """
+        tree = cKDTree(self.xyz, boxsize=np.array([0.0, self.width, 0.0]))
+        pairs = tree.query_pairs(reach, output_type="ndarray")
+        first, second = np.vstack([pairs, pairs[:, ::-1]]).T
+        apart = self.xyz[second] - self.xyz[first]
+        apart[:, 1] = across(apart[:, 1], self.width)
+        return first, second, apart
+
+    def contacts(self, sizes: FloatArray, touch: float = TOUCH) -> tuple[IntArray, ...]:
+        """Pairs as `pairs` gives them whose surfaces are nearer than a part of their mean size."""
+        first, second, apart = self.pairs((1 + touch) * float(sizes.max()))
+        reach = (1 + touch) * (sizes[first] + sizes[second]) / 2
+        close = np.linalg.norm(apart, axis=1) < reach
+        return first[close], second[close], apart[close]
+
+
+def across(distance: FloatArray, width: float) -> FloatArray:
+    """Distances across the flow, the shorter way in a strip of some width."""
+    return distance - width * np.round(distance / width) if width else distance
 
 
 @dataclass(frozen=True)
@@ -74,182 +144,161 @@ class Packing:
 
     @property
     def count(self) -> int:
-        """N(d): how many grains the windward face exposes."""
+        """N(d): how many grains are counted."""
         return int(self.windward.sum())
 
+    @property
+    def pushed(self) -> BoolArray:
+        """Which grains feel the flow: exposed ones that may move, shape (n,)."""
+        return np.asarray(self.mobile & (self.windward | self.lee))
 
-def pile(
-    line: BedLine,
-    *,
-    entrainment_angle_deg: float,
-    gap: float,
-    pattern: Pattern,
-    mobile_layers: int,
-    disorder: float = 0.0,
-    seed: int = 0,
-) -> Packing:
-    """Pack a pile with straight faces.
 
-    Parameters
+@dataclass(frozen=True)
+class Lattice:
+    """How the grains of a bed that is not poured are laid.
+
+    Attributes
     ----------
-    line : BedLine
-        Bed line of the flow, diameters.
     entrainment_angle_deg : float
         beta of the lattice.
     gap : float
         Height of the exposed grains' lowest points over the bed line, z0/d.
     pattern : {"aligned", "horizontal", "disordered"}
-        Rows along the windward face, or level; or along it with random gaps.
+        Rows along the bed, or level; or along it with random gaps.
     mobile_layers : int
-        Layers of the windward face that may move.
+        Layers that may move.
     disorder : float
         Largest gap in the row below the mobile ones of a disordered packing, diameters.
     seed : int
         Chooses one disordered packing of many; on a lattice 0 is itself, others are its replicas.
     """
-    beta = np.radians(entrainment_angle_deg)
-    surface = 0.5 + gap
-    row_height = float(np.sin(beta))
-    most = int(np.ceil(line.crest[1] / line.tangents[line.windward, 0] / row_height)) + 1
-    mobile_layers = min(mobile_layers, most)
-    uneven = max(mobile_layers, DISORDERED)
-    points = _points(line, pattern, beta, surface, uneven, disorder, seed)
-    stray = STRAY if pattern == "disordered" else TIE
+
+    entrainment_angle_deg: float
+    gap: float
+    pattern: Pattern
+    mobile_layers: int
+    disorder: float = 0.0
+    seed: int = 0
+
+    @property
+    def beta(self) -> float:
+        """Entrainment angle, rad."""
+        return float(np.radians(self.entrainment_angle_deg))
+
+    @property
+    def uneven(self) -> bool:
+        """Whether its rows have random gaps."""
+        return self.pattern == "disordered"
+
+    def packed(
+        self,
+        line: BedLine,
+        centres: FloatArray,
+        mobile: BoolArray,
+        windward: BoolArray,
+        lee: BoolArray,
+    ) -> Packing:
+        """The packing of some grains on a line; those of a replica a little aside."""
+        aside = PERTURBATION if self.seed and not self.uneven else 0.0
+        shift = np.random.default_rng(self.seed).uniform(-aside, aside, centres.shape)
+        arc_length = line.nearest(centres)[1]
+        sizes = np.ones(len(centres))
+        return Packing(centres + shift, sizes, mobile, windward, lee, arc_length)
+
+
+def pile(line: BedLine, lattice: Lattice) -> Packing:
+    """Pack a pile of two straight faces: rows of its windward face fill it to the lee one."""
+    beta, surface = lattice.beta, 0.5 + lattice.gap
+    row_height, faces = np.sin(beta), (line.top - 1, line.top)
+    most = int(np.ceil(line.crest[1] / line.tangents[faces[0], 0] / row_height)) + 1
+    mobile_layers = min(lattice.mobile_layers, most)
+    points = _filling(line, replace(lattice, mobile_layers=mobile_layers), surface)
     # under a slope's level rows a grain rests on one that lies deeper below the face
-    layers = mobile_layers + (pattern == "horizontal")
-    body = _shell(points, line, beta, surface, layers, stray)
-    buried = body[:, 1] < surface - TIE
-    in_layers = line.depth(body, line.windward) + surface < (mobile_layers - 0.5) * row_height
-    windward, lee = (face & ~buried for face in exposed(body, line, disorder))
-    mobile = (in_layers & ~buried) | windward
-    idle = buried & ~_touching(body, mobile)
-    body = body[~idle]
-    mobile, windward, lee = (chosen[~idle] for chosen in (mobile, windward, lee))
-    centres = np.vstack([body, _apron(body, surface)])
-    rest = np.zeros(len(centres) - len(body), bool)
-    return Packing(
-        centres=centres + replica(len(centres), 0 if pattern == "disordered" else seed),
-        sizes=np.ones(len(centres)),
-        mobile=np.append(mobile, rest),
-        windward=np.append(windward, rest),
-        lee=np.append(lee, rest),
-        arc_length=line.nearest(centres)[1],
+    layers = mobile_layers + (lattice.pattern == "horizontal")
+    deep = np.array([surface - line.over(points, face) for face in faces])
+    depth, level = deep.min(axis=0), points[:, 1] - surface
+    # below the layers that hold mobile grains one is enough: a grain touches no deeper one
+    shell = (deep[0] < (layers + 0.5) * row_height) | (deep[1] < LEE_DEPTH * row_height)
+    inside = (depth >= -(STRAY if lattice.uneven else TIE)) & shell
+    below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
+    kept = inside & ((level >= -TIE) | below)
+    body, depth = points[kept], deep[0, kept]
+    buried = level[kept] < -TIE
+    ahead = body[:, 0] <= line.crest[0] + TIE
+    free = exposed(body, line.tangents[np.where(ahead, *faces)], slack=lattice.disorder) & ~buried
+    windward, lee = free & ahead, free & ~ahead
+    mobile = ((depth < (mobile_layers - 0.5) * row_height) & ~buried) | windward
+    needed = ~buried | _touching(body, mobile)
+    apron = _apron(body[needed], surface)
+    fixed = np.zeros(len(apron), bool)
+    return lattice.packed(
+        line,
+        np.vstack([body[needed], apron]),
+        *(np.append(chosen[needed], fixed) for chosen in (mobile, windward, lee)),
     )
 
 
-def replica(count: int, seed: int) -> FloatArray:
-    """How far the grains of a replica lie aside; 0 is the lattice itself."""
-    aside = PERTURBATION if seed else 0.0
-    return np.random.default_rng(seed).uniform(-aside, aside, (count, 2))
-
-
-def _points(
-    line: BedLine,
-    pattern: Pattern,
-    beta: float,
-    surface: float,
-    uneven: int,
-    disorder: float,
-    seed: int,
-) -> FloatArray:
-    """Where grains of the pattern may lie, one of them on the crest."""
-    face = line.tangents[line.windward]
-    direction = np.array([1.0, 0.0]) if pattern == "horizontal" else face
-    apex = line.crest + np.array([0, surface / face[0]])
-    lattice = _lattice(line, apex, direction, beta)
-    if pattern != "disordered":
-        return lattice
-    columns = int(np.ceil(line.crest_s / np.cos(beta) / 2)) + uneven + 4
-    rows = disorder_rows(columns, uneven, beta=beta, size=disorder, seed=seed)
-    normal = line.normals[line.windward]
-    upper = apex + np.vstack(rows) @ np.vstack([direction, normal])
-    below = (apex - lattice) @ normal > (uneven + 0.5) * np.sin(beta)
-    return np.vstack([upper, lattice[below]])
-
-
-def _shell(
-    points: FloatArray,
-    line: BedLine,
-    beta: float,
-    surface: float,
-    layers: int,
-    stray: float,
-) -> FloatArray:
-    """Grains near both faces, and some below the ground.
-
-    Below the layers that hold mobile grains one is enough: a grain touches no deeper one.
-    """
-    depths = [line.depth(points, face) + surface for face in (line.windward, line.lee)]
-    depth, level = np.minimum(*depths), points[:, 1] - surface
-    windward_shell = depths[0] < (layers + 0.5) * np.sin(beta)
-    lee_shell = depths[1] < LEE_DEPTH * np.sin(beta)
-    inside = (depth >= -stray) & (windward_shell | lee_shell)
-    covered = (level < -TIE) & (depth > 0.5 * np.sin(beta))
-    return np.asarray(points[inside & ((level >= -TIE) | (covered & (level > -1.3)))])
-
-
-def _touching(points: FloatArray, chosen: BoolArray) -> BoolArray:
-    """Which points touch one of the chosen ones."""
-    wanted = points[chosen]
-    order = np.argsort(wanted[:, 0])
-    wanted = wanted[order]
-    reach = 1 + 1e-3
-    start = np.searchsorted(wanted[:, 0], points[:, 0] - reach)
-    stop = np.searchsorted(wanted[:, 0], points[:, 0] + reach)
-    return np.array(
-        [
-            bool(np.any(np.hypot(*(wanted[low:high] - point).T) < reach))
-            for point, low, high in zip(points, start, stop, strict=True)
-        ]
-    )
-
-
-def exposed(centres: FloatArray, line: BedLine, slack: float = 0.0) -> tuple[BoolArray, BoolArray]:
-    """Which grains are exposed on the windward and on the lee face.
-
-    A grain is exposed when no other centre lies higher along the normal of its face within d/2 of
-    the line along that normal through its own centre. A slit narrower than `slack` (diameters)
-    between two grains does not expose the one under it.
-    """
-    side = centres[:, 0] <= line.crest[0] + TIE
-    found = []
-    for face, own in ((line.windward, side), (line.lee, ~side)):
-        normal = line.normals[face]
-        along = centres @ np.array([normal[1], -normal[0]])
-        height = centres @ normal
-        free = _unshadowed(along, height, 0.5 + slack + TIE, STRAY if slack else TIE)
-        found.append(free & own)
-    return found[0], found[1]
-
-
-def _unshadowed(along: FloatArray, height: FloatArray, reach: float, stray: float) -> BoolArray:
-    """Which points have none that is higher within a reach along the face."""
-    order = np.argsort(along, kind="stable")
-    x, z = along[order], height[order]
-    free = np.ones(len(x), bool)
-    # neighbours by place: first each point with the next one, then with the one after that
-    for apart in range(1, len(x)):
-        near = np.flatnonzero(x[apart:] - x[:-apart] <= reach)
-        if not len(near):
-            break
-        first, second = near, near + apart
-        free[first] &= z[second] <= z[first] + stray
-        free[second] &= z[first] <= z[second] + stray
-    found = np.empty_like(free)
-    found[order] = free
-    return found
-
-
-def _lattice(line: BedLine, anchor: FloatArray, direction: FloatArray, beta: float) -> FloatArray:
-    """Every lattice point within the form's corners, with a margin."""
+def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
+    """Where grains of the pattern may lie in a pile of two faces, one of them on the crest."""
+    beta, face = lattice.beta, line.tangents[line.top - 1]
+    direction = np.array([1.0, 0.0]) if lattice.pattern == "horizontal" else face
     normal = np.array([-direction[1], direction[0]])
-    corners = np.array([np.zeros(2), line.toe, line.crest]) - anchor
+    apex = line.crest + np.array([0, surface / face[0]])
+    corners = np.array([np.zeros(2), line.toe, line.crest]) - apex
     along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
     rows = np.arange(0, np.ceil(down.max()) + 3)
     columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)
     row, column = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
     offset = (2 * column + row % 2) * np.cos(beta)
-    return anchor + np.outer(offset, direction) - np.outer(row * np.sin(beta), normal)
+    points = apex + np.outer(offset, direction) - np.outer(row * np.sin(beta), normal)
+    if not lattice.uneven:
+        return np.asarray(points)
+    uneven = max(lattice.mobile_layers, DISORDERED)
+    count = int(np.ceil(line.crest_s / np.cos(beta) / 2)) + uneven + 4
+    upper = apex + _disordered(count, uneven, lattice) @ np.vstack([direction, normal])
+    return np.vstack([upper, points[(apex - points) @ normal > (uneven + 0.5) * np.sin(beta)]])
+
+
+def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
+    """Rows whose lowest has random gaps and offsets; the others rest in the pockets below them.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Along the rows and normal to them; the middle grain of the uppermost is at the origin.
+    """
+    rng = np.random.default_rng(lattice.seed)
+    size = lattice.disorder
+    spacing = 2 * np.cos(lattice.beta) + rng.uniform(0, size, 2 * columns)
+    offset = rng.uniform(-OFFSET * size, OFFSET * size, 2 * columns + 1)
+    while True:
+        lowest = np.column_stack([np.concatenate([[0], np.cumsum(spacing)]), offset])
+        rows = _stacked(lowest, layers)
+        if not any(np.any(_overlap(row) > 0) for row in rows):
+            break
+        # where two grains of a row would overlap, the row below them is opened a little
+        for above, row in enumerate(rows):
+            wide = np.zeros_like(spacing)
+            for place in np.flatnonzero(_overlap(row) > 0):
+                wide[place : place + layers - above + 1] += _overlap(row)[place]
+            spacing = spacing + wide
+    return np.asarray(np.vstack(rows) - rows[0][len(rows[0]) // 2])
+
+
+def _stacked(lowest: FloatArray, layers: int) -> list[FloatArray]:
+    """Rows above a lowest one, the uppermost first: each grain rests on two of the row below."""
+    rows = [lowest]
+    for _ in range(layers):
+        apart = np.diff(rows[0], axis=0)
+        half = np.hypot(*apart.T)[:, None] / 2
+        outward = np.column_stack([-apart[:, 1], apart[:, 0]]) / (2 * half)
+        rows.insert(0, rows[0][:-1] + apart / 2 + outward * np.sqrt(1 - half**2))
+    return rows
+
+
+def _overlap(row: FloatArray) -> FloatArray:
+    """How much nearer than `ROOM` each two neighbours of a row are."""
+    return np.asarray(ROOM - np.hypot(*np.diff(row, axis=0).T))
 
 
 def _apron(body: FloatArray, surface: float) -> FloatArray:
@@ -257,7 +306,255 @@ def _apron(body: FloatArray, surface: float) -> FloatArray:
     drop = np.abs(body[:, 1] - surface)
     near = body[drop < 1]
     clearance = np.sqrt(1 - drop[drop < 1] ** 2)
-    first = (near[:, 0] - clearance).min(), (near[:, 0] + clearance).max()
     steps = np.arange(0, APRON)
-    x = np.concatenate([first[0] - steps, first[1] + steps])
+    first, last = (near[:, 0] - clearance).min(), (near[:, 0] + clearance).max()
+    x = np.concatenate([first - steps, last + steps])
     return np.column_stack([x, np.full(len(x), surface)])
+
+
+def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice) -> Packing:
+    """Pack the grains of a bed of any shape.
+
+    The line is divided at its sharp corners. Each part has rows of its own, those that are counted
+    first; where rows of two parts meet, grains of the later one that would overlap are left out,
+    and grains that do not rest on two are fixed.
+
+    Parameters
+    ----------
+    line : BedLine
+        Bed line of the flow, diameters.
+    ground : BedLine
+        The same without obstacles.
+    counts : {"windward", "all"} or (float, float)
+        Which exposed grains are counted, as `BedLine.counted` takes it.
+    lattice : Lattice
+        How the grains are laid.
+
+    Raises
+    ------
+    UnfitError
+        If the bed bends more sharply than grains can follow, or none is counted.
+    """
+    x = np.array(ground.x)
+    x[0], x[-1] = x[1] - APRON, x[-2] + APRON
+    top = offset(replace(ground, x=tuple(x.tolist())), 0.5 + lattice.gap)
+    segments = top.counted(counts)
+    centres = _without_overlaps(list(_rows(top, segments, lattice)))
+    under, depth = _depth(top, centres)
+    slack = SLIT if lattice.pattern == "aligned" else 0.0
+    slack = max(SLIT, lattice.disorder) if lattice.uneven else slack
+    seen = exposed(centres, top.tangents[under], slack) & (depth < 1)
+    chosen = segments[under] & within(centres[:, 0], counts)
+    for start, end in line.bare:
+        chosen &= (centres[:, 0] <= start - BARE) | (centres[:, 0] >= end + BARE)
+    near = depth < (lattice.mobile_layers - 0.5) * np.sin(lattice.beta)
+    mobile = chosen & near & _rests(centres)
+    counted = mobile & seen
+    if not counted.any():
+        raise UnfitError("bed.counted", "no grain is counted", "choose another part of the bed")
+    needed = mobile | seen | _touching(centres, mobile)
+    kinds = (mobile, counted, seen & ~counted)
+    return lattice.packed(line, centres[needed], *(kind[needed] for kind in kinds))
+
+
+def offset(line: BedLine, distance: float) -> BedLine:
+    """The line at a distance above a line, with the corners that it has.
+
+    Raises
+    ------
+    UnfitError
+        If the line bends more sharply than that.
+    """
+    bends = np.radians(line.bends_deg) / 2
+    ends = np.vstack([line.normals[:1], line.normals, line.normals[-1:]])
+    middle = ends[:-1] + ends[1:]
+    middle /= np.linalg.norm(middle, axis=1)[:, None]
+    x, z = (line.corners + middle * (distance / np.cos(bends))[:, None]).T
+    back = np.flatnonzero(np.diff(x) <= 0)
+    if len(back):
+        raise UnfitError(
+            "bed",
+            f"it bends more sharply than a grain at {line.x[back[0]]:.4g} d from the first foot",
+            "smooth it, or choose smaller grains",
+        )
+    return BedLine(tuple(x.tolist()), tuple(z.tolist()), line.h)
+
+
+def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatArray]:
+    """Centres of the rows along each part of a line between sharp corners, the counted first."""
+    bends = np.flatnonzero(np.abs(top.bends_deg[1:-1]) > SHARP_DEG).tolist()
+    ends = [*bends, len(top.lengths) - 1]
+    parts = list(zip([0, *(end + 1 for end in bends)], ends, strict=True))
+    carries = [bool(counted[first : last + 1].any()) for first, last in parts]
+    if lattice.pattern == "horizontal":
+        yield _level_rows(top, lattice)
+    for turn in (True, False) if lattice.pattern != "horizontal" else (False,):
+        for first, last in (part for part, own in zip(parts, carries, strict=True) if own == turn):
+            points = _rows_along(top, first, last, lattice, counted=turn)
+            straight = first == last and lattice.pattern == "aligned"
+            yield points[_depth(top, points)[1] >= -(TIE if straight else STRAY)]
+
+
+def _rows_along(
+    top: BedLine, first: int, last: int, lattice: Lattice, *, counted: bool
+) -> FloatArray:
+    """Rows under some segments of a line, which end a little beyond them."""
+    layers = lattice.mobile_layers + (lattice.pattern == "horizontal")
+    rows = layers + 1 if counted else UNDER
+    uneven = lattice.uneven and counted
+    below = max(rows, DISORDERED + 1 if uneven else rows) - 1
+    corners = top.corners[first : last + 2].copy()
+    corners[0] -= top.tangents[first] * (2 * layers + 2)
+    corners[-1] += top.tangents[last] * (2 * layers + 2)
+    curve = offset(BedLine.through(corners, top.h), -below * np.sin(lattice.beta))
+    disorder = lattice.disorder if uneven else 0.0
+    stacked = _on_a_curve(curve, below, lattice, disorder, lattice.seed + first)
+    return np.vstack(stacked[:rows])
+
+
+def _on_a_curve(
+    curve: BedLine, layers: int, lattice: Lattice, size: float, seed: int
+) -> list[FloatArray]:
+    """Rows over a curve, on which the lowest lies, the uppermost first.
+
+    Its grains have random gaps of at most `size` and random offsets. Where two grains of a row
+    would overlap, on the inside of a bend, the row below them is opened.
+    """
+    spacing = 2 * np.cos(lattice.beta)
+    count = int(np.ceil(curve.lengths.sum() / spacing)) + 1
+    rng = np.random.default_rng(seed)
+    gaps = rng.uniform(0, size, count) if size else np.zeros(count)
+    aside = rng.uniform(-OFFSET * size, OFFSET * size, count + 1)
+    close = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
+    # the opening belongs to places of the curve: grains that it shifts leave it where it is
+    length = 2 * float(close[-1]) + 1
+    places = np.linspace(0, length, int(np.ceil(length / FINE)) + 1)
+    step, opened = places[1] - places[0], np.zeros(len(places))
+    arc = curve.arc_lengths - curve.arc_lengths[0]
+    for _ in range(TURNS):
+        along = np.interp(close, places - np.cumsum(opened), places)
+        segment = np.clip(np.searchsorted(arc, along, side="right") - 1, 0, len(arc) - 2)
+        into = (along - arc[segment])[:, None] * curve.tangents[segment]
+        lowest = curve.corners[segment] + into + aside[:, None] * curve.normals[segment]
+        rows = _stacked(lowest, layers)
+        wide = np.zeros(count)
+        for above, row in enumerate(rows):
+            more = np.maximum(_overlap(row), 0.0)
+            for place in range(layers - above + 1):
+                opening = wide[place : place + len(more)]
+                np.maximum(opening, more, out=opening)
+        if not wide.any():
+            break
+        gap = np.clip(np.searchsorted(along, places) - 1, 0, count - 1)
+        opened += np.minimum(1.1 * wide[gap] / np.diff(along)[gap], 0.5) * step
+        opened = np.minimum(opened, 0.5 * step)
+    return rows
+
+
+def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
+    """Level rows under a whole line, near to it; one grain of the uppermost is on the crest."""
+    row_height, half = np.sin(lattice.beta), np.cos(lattice.beta)
+    layers = lattice.mobile_layers + 1
+    thick = (layers + 1) * row_height / np.cos(np.radians(np.abs(top.slopes_deg).max()))
+    highest = float(np.max(top.z))
+    x = np.arange(top.x[0], top.x[-1], 2 * half)
+    x += (top.crest[0] - x[0]) % (2 * half)
+    parts = []
+    for row in range(int(np.ceil((highest - min(top.z)) / row_height)) + layers + 2):
+        places = np.column_stack(
+            [x + (row % 2) * half, np.full(len(x), highest - row * row_height)]
+        )
+        over = top.height(places[:, 0]) - places[:, 1]
+        parts.append(places[(over > -1) & (over < thick)])
+    points = np.vstack(parts)
+    depth = _depth(top, points)[1]
+    return np.asarray(points[(depth >= -TIE) & (depth < (layers + 0.5) * row_height)])
+
+
+def _depth(top: BedLine, points: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Nearest segment of each point, and how deep it lies under the line."""
+    segment = top.nearest(points)[0]
+    depth = -top.over(points, segment)
+    # over a top the point may be above the line of the other segment
+    for other in (np.maximum(segment - 1, 0), np.minimum(segment + 1, len(top.lengths) - 1)):
+        convex = top.bends_deg[np.maximum(segment, other)] > SHARP_DEG
+        beside = -top.over(points, other)
+        depth = np.where(convex & (other != segment), np.minimum(depth, beside), depth)
+    return segment, depth
+
+
+def _without_overlaps(groups: list[FloatArray]) -> FloatArray:
+    """Points of all groups but those too near to one before them."""
+    points = np.vstack(groups)
+    near = cKDTree(points).query_pairs(1 - 2 * TIE, output_type="ndarray")
+    kept = np.ones(len(points), bool)
+    for first, second in near[np.argsort(near.max(axis=1), kind="stable")].tolist():
+        low, high = min(first, second), max(first, second)
+        kept[high] &= not kept[low]
+    return np.asarray(points[kept])
+
+
+def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> BoolArray:
+    """Which equal grains have no other that is higher along their own normal, within d/2 of it.
+
+    Parameters
+    ----------
+    centres, tangents : ndarray, shape (n, 2)
+        Places of the grains, and the bed's direction under each.
+    slack : float
+        A slit between two grains that is narrower does not expose the one under it; on such a bed
+        a neighbour that stands out by less than `STRAY` hides none.
+    """
+    first, _, apart = Places.of(centres).pairs(1.6)
+    x, z = apart[:, 0], apart[:, 2]
+    tx, tz = tangents[first].T
+    hidden = np.abs(x * tx + z * tz) <= 0.5 + slack + TIE
+    hidden &= z * tx - x * tz > (STRAY if slack else TIE)
+    return _without(len(centres), first[hidden])
+
+
+def unshadowed(along: Places, height: FloatArray, radii: FloatArray) -> BoolArray:
+    """Which grains of any sizes are exposed.
+
+    A grain is exposed when the line through its centre, normal to the bed, meets no other grain
+    whose centre lies higher.
+
+    Parameters
+    ----------
+    along : Places
+        Place of each grain along the bed and across the flow; the third coordinate is 0.
+    height, radii : ndarray, shape (n,)
+        Height over the bed, and radius.
+    """
+    first, second, apart = along.pairs(float(radii.max()) + TIE)
+    hidden = np.linalg.norm(apart, axis=1) <= radii[second] + TIE
+    hidden &= height[second] > height[first] + TIE
+    return _without(len(height), first[hidden])
+
+
+def _without(count: int, hidden: IntArray) -> BoolArray:
+    free = np.ones(count, bool)
+    free[hidden] = False
+    return free
+
+
+def _rests(centres: FloatArray) -> BoolArray:
+    """Which grains touch one upstream and one downstream that lie no higher, one of them lower."""
+    first, _, apart = Places.of(centres).pairs(1 + TOUCH)
+    x, z = apart[:, 0], apart[:, 2]
+    sides = np.zeros((3, len(centres)), bool)
+    for side, beside in zip(sides, (x <= 0, x > 0, z < -LOWER), strict=True):
+        side[first[(z <= TOUCH) & beside]] = True
+    return np.asarray(sides.all(axis=0))
+
+
+def _touching(centres: FloatArray, chosen: BoolArray) -> BoolArray:
+    """Which grains touch one of the chosen ones, or are one."""
+    return np.asarray(cKDTree(centres[chosen]).query(centres)[0] < 1 + TOUCH)
+
+
+def within(x: FloatArray, counts: str | Range) -> BoolArray:
+    """Which places along x a range contains; words contain all."""
+    if isinstance(counts, str):
+        return np.ones(len(x), bool)
+    return np.asarray((x >= counts[0]) & (x <= counts[1]))

@@ -1,29 +1,346 @@
-"""The packing of a bed that LIGGGHTS has poured: which grains are exposed, and which may move."""
+"""Beds that LIGGGHTS pours: a mould of the bed line, the run, and the packing that it leaves.
 
+Lengths are in diameters d of the scene, with the foot of the first form at the origin.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import radians, tan
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from orchestrator.bed.cover import counted_segments, within
+from orchestrator.bed import deck
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.packing import TIE, Packing
-from orchestrator.bed.places import Places, across
-from orchestrator.bed.poured_case import BED
-from orchestrator.errors import InputError
+from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
+from orchestrator.errors import InputError, Noisy, SolverError
+from orchestrator.runs.case import Case
+from orchestrator.solvers import liggghts
 from orchestrator.study.parts import Range
+from orchestrator.study.sizes import Sizes, drawn
+from orchestrator.types import FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
-
+HEAP = 2.0
+"""Height of the grains over the line that are cut away, d."""
+FILLED, FILLED_IN_SPACE = 0.83, 0.6
+"""Part of the area, and of the volume of a strip, that settled grains fill; it only decides how
+many are poured."""
+LOOSE = 0.3
+"""Room of a grain in the air, beside it and over it, in its own diameters: as little as leaves no
+order among equal grains, so that they fall no further than need be."""
+COLUMNS = 20
+"""Columns in a diameter by which free room is looked for."""
+DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
+"""The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+CONTACT = {"damping": 0.1, "time_step": 0.2}
+"""With more damping, or a longer step, equal spheres jitter: they settle into crystals."""
+STIFFNESS, DRAG, CALM = (1e3, 1e4, 1e4), (0.0, 5.0, 1.0), (1e-2, 1e-4, 1e-6)
+"""Stiffness K d/W of each stage, its drag over m sqrt(g/d), and the kinetic energy of a grain, over
+W d, at which it ends. The grains fall on soft springs. Then a drag takes the energy of waves that
+run up and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is
+enough and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to
+other decks too: in a long bed there is always a grain that still rolls somewhere."""
+LONGEST = 400
+"""Time that the grains have in a stage, sqrt(d/g')."""
+SETTLING, DUMP, BED = "settling.csv", "poured.dump", "bed.csv"
+LEAST_LENGTH = 3.0
+"""Least length of the forms of a poured bed, d."""
+MOST_GRAINS = 100_000
+"""Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
 LAYER = np.sin(np.pi / 3)
 """Thickness of a layer, d: as of a lattice."""
 NEAR = 0.5
 """Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
 LOCAL = 5.0
-"""Length of bed before and behind a grain that it is held against, d."""
+"""Length of bed before and behind a grain that its height is compared with, d."""
+
+
+@dataclass(frozen=True)
+class Mould:
+    """A mould that follows a bed line, and the line that the bed in it is cut to.
+
+    Attributes
+    ----------
+    line : BedLine
+        Bed line of the flow.
+    depth : float
+        Depth of the row of fixed grains under the line, along the vertical.
+    surface : float
+        Height over the line, normal to it, above which no centre lies after the cut.
+    width : float
+        Width of a strip with periodic sides; 0 of a bed in one plane.
+    """
+
+    line: BedLine
+    depth: float
+    surface: float
+    width: float = 0.0
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Places along x of the two walls: beyond the forms, within the line."""
+        x = self.line.x
+        return max(x[0], x[1] - APRON), min(x[-1], x[-2] + APRON)
+
+    @property
+    def floor(self) -> FloatArray:
+        """Centres of the fixed grains: along the line one diameter apart, shape (m, 3).
+
+        Those of a strip lie in two layers, each over the gaps of the other: nothing falls through.
+        """
+        x, z = self.line.corners.T
+        along = np.concatenate([[0.0], np.cumsum(self.line.lengths)])
+        first, last = np.interp(self.ends, x, along)
+        places = np.arange(first + 0.5, last, 1.0)
+        x, z = np.interp(places, along, x), np.interp(places, along, z) - self.depth
+        if not self.width:
+            return np.column_stack([x, np.zeros_like(x), z])
+        rows = int(np.ceil(self.width))
+        y = np.tile(np.arange(rows) * self.width / rows, len(x))
+        upper = np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
+        return np.vstack([upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])])
+
+    @property
+    def cut(self) -> dict[str, FloatArray]:
+        """The cut, by the names of its files: x of each segment's ends, height at x0, rise."""
+        (x, z), tangents = self.line.corners.T, self.line.tangents
+        raised = z[:-1] + self.surface / tangents[:, 0]
+        return {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": tangents[:, 1] / tangents[:, 0]}
+
+    def count(self, mean: float) -> int:
+        """Number of grains that fill it, with the heap, by their mean area or volume in d."""
+        start, end = self.ends
+        part = FILLED_IN_SPACE * self.width if self.width else FILLED
+        return int(np.ceil((self.depth + self.surface + HEAP) * (end - start) * part / mean))
+
+    def rain(self, sizes: FloatArray, seed: int) -> FloatArray:
+        """Places in the air of the grains that fill the mould, none touching another.
+
+        They lie row upon row, each over what is already there, at a place of its room that the
+        seed decides; in a strip in lanes along the flow.
+
+        Parameters
+        ----------
+        sizes : ndarray, shape (n,)
+            Diameters of the grains, d.
+        seed : int
+            Seed of the places, and of the offset of each row.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+        """
+        chance = np.random.default_rng(seed).uniform(size=(len(sizes), 3 if self.width else 2))
+        places = np.zeros((len(sizes), 3))
+        # with no room to the sides each lane would stay a bed in a plane
+        lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
+        for lane in range(lanes):
+            own = slice(lane, None, lanes)
+            places[own, 0], places[own, 2] = self._lane(sizes[own], chance[own]).T
+            if self.width:
+                wide = self.width / lanes
+                aside = (chance[own, 2] - 0.5) * (wide - sizes[own])
+                places[own, 1] = (lane + 0.5) * wide + aside
+        return places
+
+    def _lane(self, sizes: FloatArray, chance: FloatArray) -> FloatArray:
+        """X and z of grains that rain in one lane, shape (n, 2)."""
+        (start, end), room, margin = self.ends, (1 + LOOSE) * sizes, float(sizes.max())
+        tops = np.full(int((end - start + 2 * margin) * COLUMNS) + 2, -np.inf)
+
+        def columns(place: float, radius: float) -> slice:
+            low, high = (place + side * radius - (start - margin) for side in (-1, 1))
+            return slice(int(low * COLUMNS), int(high * COLUMNS) + 1)
+
+        for x, _, z in self.floor:
+            under = columns(x, 0.5)
+            tops[under] = np.maximum(tops[under], z + 0.5)
+        places = np.empty((len(sizes), 2))
+        x = start + room[0] * chance[0, 0]
+        for number, (size, wide) in enumerate(zip(sizes.tolist(), room.tolist(), strict=True)):
+            beside, over = LOOSE * size * chance[number, :2]
+            if x + wide > end:
+                x = start + wide * chance[number, 0]
+            place = x + beside + size / 2
+            under = columns(place, size / 2)
+            height = tops[under].max() + over + size / 2
+            places[number] = place, height
+            tops[under] = np.maximum(tops[under], height + size / 2)
+            x += wide
+        return places
+
+
+@dataclass(frozen=True)
+class PouredBed(Case):
+    """The run that pours a bed into a mould of a bed line; all scenes with this bed share it.
+
+    Attributes
+    ----------
+    line : BedLine
+        Bed line of the flow.
+    depth, surface : float
+        As `Mould` takes them.
+    sizes : LogNormal, sequence of classes, or None
+        Sizes of the grains; None for equal ones.
+    diameter : float
+        The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
+    friction_angle_deg : float
+        Friction angle of the grains.
+    seed : int
+        Chooses one bed of many.
+    width : float
+        Width of a strip with periodic sides; 0 of a bed in one plane.
+    """
+
+    line: BedLine
+    depth: float
+    surface: float
+    sizes: Sizes | None
+    diameter: float
+    friction_angle_deg: float
+    seed: int
+    width: float = 0.0
+
+    kind: ClassVar[str] = "poured"
+    template: ClassVar[str] = "liggghts/poured"
+    recipe: ClassVar[int] = 3
+    results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
+    derived: ClassVar[tuple[str, ...]] = (BED,)
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The bed line, what is poured, and the seed."""
+        fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
+        sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
+        own = {name: getattr(self, name) for name in fields}
+        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **own}
+
+    @cached_property
+    def mould(self) -> Mould:
+        """Mould that the grains rain into."""
+        return Mould(self.line, self.depth, self.surface, self.width)
+
+    @property
+    def cost_s(self) -> float:
+        """Expected time of one core, s: 15,000 steps at 6e6 grain-steps a second."""
+        return 1 + self._count * 15_000 / 6e6
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with."""
+        return liggghts.ranks(self._count)
+
+    def check_size(self) -> None:
+        """See that the mould has room for a bed, and takes no more grains than a machine bears.
+
+        Raises
+        ------
+        InputError
+            With the field of a study file.
+        """
+        length = self.line.x[-2] - self.line.x[1]
+        if length < LEAST_LENGTH * (1 - 1e-9):
+            raise InputError(
+                f"a poured bed of {length:.3g} grains: fewer than {LEAST_LENGTH:g} in a row have no"
+                " pockets that are those of a bed",
+                where="bed.length",
+                remedy=f"at least {LEAST_LENGTH:g} diameters",
+            )
+        if self._count > MOST_GRAINS:
+            raise InputError(
+                f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}",
+                where="bed.packing",
+                remedy="a shorter bed, larger grains, or less of bed.poured_depth or bed.width",
+            )
+
+    @cached_property
+    def _count(self) -> int:
+        """Number of grains that rain into the mould."""
+        sizes = drawn(self.sizes, self.diameter, 1000, 0)
+        mean = np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4)
+        return self.mould.count(float(mean))
+
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+        return liggghts.programs(self.ranks)
+
+    @cached_property
+    def grains(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of all grains, the fixed first, and their diameters, d."""
+        floor = self.mould.floor
+        sizes = drawn(self.sizes, self.diameter, self._count, self.seed)
+        places = self.mould.rain(sizes, self.seed)
+        return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), sizes])
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains in the air, the walls and the cut."""
+        start, end = self.mould.ends
+        centres, sizes = self.grains
+        deck.write_parameters(
+            directory,
+            {
+                "diameter": DIAMETER,
+                "smallest": float(sizes.min()),
+                "density": DENSITY,
+                "gravity": GRAVITY,
+                "friction": tan(radians(self.friction_angle_deg)),
+                **CONTACT,
+                "upstream": start * DIAMETER,
+                "downstream": end * DIAMETER,
+                "most_looks": LONGEST,
+                "width": self.width,
+                "ranks": self.ranks,
+                "stiffness": STIFFNESS,
+                "drag": DRAG,
+                "calm": CALM,
+            },
+        )
+        for name, values in self.mould.cut.items():
+            scaled = values if name == "slope" else values * DIAMETER
+            (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in scaled.tolist()))
+        margin = float(sizes.max()) + 1
+        bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
+        if self.width:
+            bounds[:, 1] = 0.0, self.width
+        deck.write_grains(
+            directory,
+            centres * DIAMETER,
+            np.where(np.arange(len(sizes)) < len(self.mould.floor), 1, 2),
+            sizes * DIAMETER,
+            DENSITY,
+            bounds * DIAMETER,
+            # neighbours along the bed are near in memory: a fifth less time for 20,000 grains
+            np.argsort(centres[:, 0], kind="stable"),
+        )
+
+    def collect(self, directory: Path) -> None:
+        """See that the bed came to rest, and write its grains to ``bed.csv``."""
+        liggghts.check_log(directory)
+        self._check_rest(directory)
+        _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
+        number = rows["id"].to_numpy(np.int64) - 1
+        bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
+        fixed = (number < len(self.mould.floor)).astype(int)
+        bed.assign(size=self.grains[1][number], fixed=fixed).to_csv(directory / BED, index=False)
+
+    @staticmethod
+    def _check_rest(directory: Path) -> None:
+        """See that each stage ended as calm as it should, and left grains."""
+        where = str(directory / SETTLING)
+        last = deck.read_table(directory / SETTLING).groupby("stage").last()
+        energy = (last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)).to_numpy()
+        if len(last) < len(CALM) or not (last["grains"] > 0).all():
+            what = "no grain of the poured bed is left"
+            remedy = "a gentler slope, or more of bed.poured_depth"
+            raise SolverError(what, where=where, remedy=remedy)
+        if not np.all(energy < CALM):
+            what = f"the poured bed does not come to rest: {energy[-1]:.2g} W d a grain"
+            remedy = "a gentler slope, or a larger grain.friction_angle_deg"
+            raise Noisy(what, where=where, remedy=remedy)
 
 
 def read(
@@ -44,34 +361,44 @@ def read(
     line : BedLine
         Bed line of the flow, d.
     counts : {"windward", "all"} or (float, float)
-        Which exposed grains are counted: those of segments that rise, all, or a range of x.
+        Which exposed grains are counted, as `BedLine.counted` takes it.
     surface : float
         Height over the line, normal to it, of the highest centres.
     mobile_layers : int
         Layers of the forms that may move.
     width : float
         Width of a strip with periodic sides; 0 in one plane.
+
+    Raises
+    ------
+    InputError
+        If no grain is counted.
     """
     rows = pd.read_csv(directory / BED)
     centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
+    mobile = rows["fixed"].to_numpy() == 0
     segment, along = line.nearest(centres)
-    height = np.einsum("nk,nk->n", centres - line.corners[segment], line.normals[segment])
+    height = line.over(centres, segment)
     places = Places.of(centres, rows["y_over_d"].to_numpy(float), width)
     y = places.xyz[:, 1]
-    free = unshadowed(along, height, sizes / 2, y, width) & (rows["fixed"] == 0).to_numpy()
+    flat = np.column_stack([along, np.zeros_like(along)])
+    free = unshadowed(Places.of(flat, y, width), height, sizes / 2) & mobile
     on_form = (segment > 0) & (segment < len(line.lengths) - 1)
-    in_layers = surface - height < (mobile_layers - 0.5) * LAYER
-    mobile = (in_layers | free) & on_form & (rows["fixed"] == 0).to_numpy()
-    counted = free & counted_segments(line, counts)[segment] & within(centres[:, 0], counts)
+    mobile &= ((surface - height < (mobile_layers - 0.5) * LAYER) | free) & on_form
+    counted = free & line.counted(counts)[segment] & within(centres[:, 0], counts)
     if not counted.any():
         raise InputError(
             "no grain of the poured bed is exposed where grains are counted",
             where="bed.counted",
             remedy="choose another part of the bed, or another bed.seed",
         )
+    first, second, apart = places.pairs(float(sizes.max()) + NEAR)
+    gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
+    near = mobile.copy()
+    near[first[mobile[second] & (gap < NEAR)]] = True
     # along the bed; the fixed ones last, for a deck must not lose the grain of its highest id
-    order = np.lexsort((along, ~mobile))
-    kept = order[(mobile | _near(places, sizes, mobile))[order]]
+    kept = np.lexsort((along, ~mobile))
+    kept = kept[near[kept]]
     return Packing(
         centres=centres[kept],
         sizes=sizes[kept],
@@ -84,44 +411,6 @@ def read(
     )
 
 
-def unshadowed(
-    along: FloatArray,
-    height: FloatArray,
-    radii: FloatArray,
-    sideways: FloatArray | float = 0.0,
-    width: float = 0.0,
-) -> BoolArray:
-    """Which grains are exposed.
-
-    A grain is exposed when the line through its centre, normal to the bed, meets no other grain
-    whose centre lies higher.
-
-    Parameters
-    ----------
-    along, height, radii : ndarray, shape (n,)
-        Place along the bed, height over it, radius, in one unit of length.
-    sideways, width
-        Place across the flow, and the width of a strip; 0 in one plane.
-    """
-    order = np.argsort(along, kind="stable")
-    x, z, r = along[order], height[order], radii[order]
-    y = np.broadcast_to(sideways, along.shape)[order]
-    free = np.ones(len(x), bool)
-    most = float(r.max()) + TIE
-    for apart in range(1, len(x)):
-        gap = x[apart:] - x[:-apart]
-        near = np.flatnonzero(gap <= most)
-        if not len(near):
-            break
-        first, second = near, near + apart
-        away = np.hypot(gap[near], across(y[second] - y[first], width))
-        free[first] &= (away > r[second] + TIE) | (z[second] <= z[first] + TIE)
-        free[second] &= (away > r[first] + TIE) | (z[first] <= z[second] + TIE)
-    found = np.empty_like(free)
-    found[order] = free
-    return found
-
-
 def standing(packing: Packing, line: BedLine) -> FloatArray:
     """How much higher each grain's lowest point lies than that of a mean exposed grain, d, (n,).
 
@@ -129,35 +418,10 @@ def standing(packing: Packing, line: BedLine) -> FloatArray:
     of d: a grain of d at that height stands as all grains of a lattice do.
     """
     segment, along = line.nearest(packing.centres)
-    away = packing.centres - line.corners[segment]
-    height = np.einsum("nk,nk->n", away, line.normals[segment])
+    height = line.over(packing.centres, segment)
     shown = packing.windward | packing.lee
     order = np.argsort(along[shown], kind="stable")
     place, sums = along[shown][order], np.append(0, np.cumsum(height[shown][order]))
     first, last = (np.searchsorted(place, along + side * LOCAL) for side in (-1, 1))
-    near = np.maximum(last - first, 1)
-    level = (sums[last] - sums[first]) / near
+    level = (sums[last] - sums[first]) / np.maximum(last - first, 1)
     return np.asarray(np.where(shown, height - packing.sizes / 2 - (level - 0.5), 0.0))
-
-
-def contacts(places: Places, sizes: FloatArray, touch: float = 1e-3) -> IntArray:
-    """Pairs of grains that touch, by their numbers, shape (k, 2).
-
-    Two grains touch whose surfaces are nearer than a part of the mean of their diameters.
-    """
-    reach = (1 + touch) * float(sizes.max())
-    pairs = places.tree().query_pairs(reach, output_type="ndarray")
-    apart = np.linalg.norm(places.apart(*pairs.T), axis=1)
-    return np.asarray(pairs[apart < (1 + touch) * sizes[pairs].mean(axis=1)])
-
-
-def _near(places: Places, sizes: FloatArray, chosen: BoolArray) -> BoolArray:
-    """Which grains lie near one of the chosen ones."""
-    reach = float(sizes.max()) + NEAR
-    numbers, tree = np.flatnonzero(chosen), places.tree(chosen)
-    found = np.zeros(len(sizes), bool)
-    for number, near in enumerate(tree.query_ball_point(places.xyz, reach)):
-        others = numbers[near]
-        apart = np.linalg.norm(places.apart(np.full_like(others, number), others), axis=1)
-        found[number] = bool(np.any(apart < (sizes[others] + sizes[number]) / 2 + NEAR))
-    return found

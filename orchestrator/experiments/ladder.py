@@ -19,8 +19,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import plan
-from orchestrator.bed.cover import counted_segments
-from orchestrator.bed.shapes import of_bed
+from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.experiments import experiment
 from orchestrator.experiments.experiment import Runs, Tables
@@ -152,7 +151,7 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
 
 def _affordable(levels: Sequence[Level], scene: Scene, bed: PileBed) -> list[Level]:
     line = of_bed(bed)
-    exposed = line.lengths[counted_segments(line, bed.counts)].sum() / scene.grain.diameter
+    exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter
     return [
         one
         for one in levels

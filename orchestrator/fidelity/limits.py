@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.bed.cover import counted_segments
-from orchestrator.bed.shapes import of_bed
+from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import model
@@ -144,7 +143,7 @@ def _bed_line(scene: Scene) -> str | None:
         return None
     slopes = np.abs(line.slopes_deg)
     if not poured:
-        slopes = np.where(counted_segments(line, bed.counts), slopes, 0.0)
+        slopes = np.where(line.counted(bed.counts), slopes, 0.0)
     for start, end in line.bare:
         slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
     steep = int(np.argmax(slopes))

@@ -10,8 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.bed.line import BedLine, FloatArray
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.line import BedLine, triangle
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow import diagnostics
 from orchestrator.flow.diagnostics import Diagnostic
@@ -25,6 +24,7 @@ from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Convection, Turbulence
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import BUILDABLE_DEG
+from orchestrator.types import FloatArray
 
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"

@@ -10,7 +10,8 @@ from math import ceil, expm1, inf, log, radians, tan
 import numpy as np
 from scipy.optimize import brentq
 
-from orchestrator.bed.line import BedLine, FloatArray
+from orchestrator.bed.line import BedLine
+from orchestrator.types import FloatArray
 
 SHARP_DEG = 8.0
 """Bend of the bed from which on a corner is a corner, not a part of a curve."""

@@ -6,8 +6,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.bed.line import BedLine
-from orchestrator.bed.shapes import of_bed
+from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.bed.places import across
+from orchestrator.bed.packing import across
 from orchestrator.errors import Exploded, SolverError
 from orchestrator.grains.deck import GrainTable
 

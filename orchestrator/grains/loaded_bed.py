@@ -3,23 +3,19 @@
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.bed import packing, poured
-from orchestrator.bed.cover import cover
-from orchestrator.bed.line import BedLine
-from orchestrator.bed.packing import Packing
-from orchestrator.bed.poured_case import PouredBed
-from orchestrator.bed.pouring import APRON
-from orchestrator.bed.shapes import of_bed
+from orchestrator.bed.line import BedLine, of_bed
+from orchestrator.bed.packing import APRON, Lattice, Packing, cover
+from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import peeling, pockets
+from orchestrator.grains import peeling
 from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces, on_slopes
 from orchestrator.study.parts import PileBed, Range
@@ -147,20 +143,20 @@ class LoadedBed:
                 mobile_layers=bed.mobile_layers,
                 width=bed.width,
             )
-        how: dict[str, Any] = {
-            "entrainment_angle_deg": bed.entrainment_angle_deg,
-            "gap": bed.roughness / d,
-            "pattern": bed.packing,
-            "mobile_layers": bed.mobile_layers,
-            "disorder": bed.disorder if bed.packing == "disordered" else 0.0,
-            "seed": bed.seed,
-        }
+        lattice = Lattice(
+            bed.entrainment_angle_deg,
+            gap=bed.roughness / d,
+            pattern=bed.packing,
+            mobile_layers=bed.mobile_layers,
+            disorder=bed.disorder if bed.packing == "disordered" else 0.0,
+            seed=bed.seed,
+        )
         ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
         if bed.is_wedge:
-            found = _packed(ground, **how)
+            found = _packed(ground, lattice)
             # an obstacle before it makes the way along the bed longer
             return replace(found, arc_length=self.line.nearest(found.centres)[1])
-        return _covered(self.line, ground, counts, **how)
+        return _covered(self.line, ground, counts, lattice)
 
     @cached_property
     def tangents(self) -> FloatArray:
@@ -281,10 +277,7 @@ class LoadedBed:
             ratio = np.zeros(len(self.packing.sizes))
             ratio[counted] = speed
             packed, pushes = self.packing, (self.loading(ratio), self.force_tables)
-            if packed.width:
-                found = pockets.pivots(packed.places, packed.sizes, *pushes)
-            else:
-                found = peeling.pivots(packed.centres, packed.sizes, *pushes)
+            found = peeling.pivots(packed.places, packed.sizes, *pushes)
             return np.asarray(found[counted])
         slopes = np.degrees(np.arctan2(self.tangents[counted, 1], self.tangents[counted, 0]))
         threshold = on_slopes(self.scene, np.where(speed < 0, -slopes, slopes))
@@ -297,10 +290,7 @@ class LoadedBed:
         In a plane that of its foremost contact, in space that of the saddle between two.
         """
         packed = self.packing
-        if packed.width:
-            found = pockets.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
-        else:
-            found = peeling.pivot_angles_deg(packed.centres, packed.sizes, self.tangents)
+        found = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
         return np.asarray(found[packed.windward])
 
     def leaving(self, ratio: FloatArray, there: NDArray[np.bool_] | None = None) -> FloatArray:
@@ -314,13 +304,12 @@ class LoadedBed:
             The grains that are there; by default all.
         """
         found = peeling.flows(
-            self.packing.centres,
+            self.packing.places,
             self.packing.sizes,
             self.loading(ratio),
             self.force_tables,
-            along=self.downflow(ratio),
-            marker=self.scene.protocol.displacement_criterion,
-            there=there,
+            self.scene.protocol.displacement_criterion,
+            there,
         )
         return np.asarray(found[self.packing.windward])
 

@@ -1,37 +1,40 @@
-"""Peeling: which grain rolls away at which flow, without dynamics, each one freeing the next.
+"""Thresholds by the geometry of a bed, without dynamics: pivots, and peeling.
 
-A grain leaves when the resultant of flow and weight passes beyond its foremost contact: it then
-rolls over that neighbour, and over whatever it meets on its way until it is displaced by the
-marker. A grain whose way is blocked has to wait until the blocking one is gone, or for the flow
-that lifts it over. The flow's forces stay as they were, as in the deck; rolling needs no friction.
-With one grain on two neighbours this is the pivot of Eq. 1.
+By a pivot a grain moves when the resultant of flow and weight passes beyond the contacts that it
+rests on; each grain is taken by itself. In one plane this is the foremost contact (Eq. 1 for a
+grain on two neighbours), in space a side of the pyramid of its contacts: the grain rolls over the
+saddle between two of them.
+
+Peeling goes on from there: a grain rolls over its foremost contact, and over whatever it meets on
+its way until it is displaced by the criterion. A grain whose way is blocked has to wait until the
+blocking one is gone, or for the flow that lifts it over. The flow's forces stay as they were, as in
+the deck; rolling needs no friction.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.bed.packing import TOUCH, Places
 from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-Place = tuple[float, float]
-
-TOUCH = 1e-3
-"""Two grains closer than this touch, of the mean of their diameters."""
 REACH = 1.4
 """Only grains whose surfaces are this near can touch one on its way to the displacement criterion,
 of its own diameter."""
-MOST_STEPS = 8
+STEPS = 8
 """Neighbours that a grain may roll over on its way; more would be a grain that is caught."""
+FLAT = 1e-9
+"""Contacts whose directions are nearer than this to a plane through the centre lie in it."""
+Place = tuple[float, float]
 
 
 class Disc(NamedTuple):
-    """A grain in the plane."""
+    """A grain in the plane of the flow."""
 
     x: float
     z: float
@@ -42,65 +45,130 @@ class Disc(NamedTuple):
         """Its centre."""
         return self.x, self.z
 
-    def seen(self, side: float) -> "Disc":
-        """The grain as it is seen from the front, 1, or from behind, -1."""
-        return Disc(self.x * side, self.z, self.radius)
+
+@dataclass(frozen=True)
+class _Roller:
+    """A grain that the flow pushes, in the plane of the flow.
+
+    The plane is mirrored where the flow pushes the grain upstream, so that it always goes towards
+    +x. Lengths are in d, forces over the grain's weight.
+
+    Attributes
+    ----------
+    start : Disc
+        The grain at its place.
+    others : dict
+        Its neighbours, by their numbers.
+    table : ForceTable
+        Its forces.
+    ratio : float
+        Size of the local friction velocity over the undisturbed one.
+    along, outward : sequence of float
+        Unit vectors along the bed, the way that the flow pushes, and out of it.
+    """
+
+    start: Disc
+    others: dict[int, Disc]
+    table: ForceTable
+    ratio: float
+    along: Sequence[float]
+    outward: Sequence[float]
+
+    def foremost(self, numbers: Sequence[int]) -> int | None:
+        """The contact, of some neighbours, that lies farthest round from below towards +x."""
+        return _foremost(self.start, {k: self.others[k] for k in numbers})
+
+    def flow_over(self, place: Place, pivot: Disc) -> float:
+        """The flow (u*_0) at which the resultant passes through a contact: no moment about it."""
+        lean = _lean(place, pivot.place)
+        x, z = math.cos(lean), math.sin(lean)
+        drag_arm = self.along[0] * x + self.along[1] * z
+        lift_arm = self.outward[0] * x + self.outward[1] * z
+        return self.table.reaching(drag_arm, lift_arm, z) / self.ratio
+
+    def way(self, numbers: Sequence[int], criterion: float) -> tuple[float, list[int]]:
+        """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
+        place, pivot = self.start.place, self.foremost(numbers)
+        flow, rolled = 0.0, []
+        while pivot is not None:
+            rolled.append(pivot)
+            if len(rolled) > STEPS:
+                return math.inf, rolled
+            flow = max(flow, self.flow_over(place, self.others[pivot]))
+            met = self._next(place, self.others[pivot], numbers)
+            if met is None or math.isinf(flow):
+                break
+            place, pivot = met
+            travel = sum(
+                (a - b) * t for a, b, t in zip(place, self.start.place, self.along, strict=True)
+            )
+            if travel >= (criterion - 1e-9) * 2 * self.start.radius:
+                break
+        return flow, rolled
+
+    def _next(self, place: Place, pivot: Disc, numbers: Sequence[int]) -> tuple[Place, int] | None:
+        """Where the grain, rolling over its pivot, touches another neighbour, and which."""
+        arm, turned = (
+            self.start.radius + pivot.radius,
+            math.atan2(place[1] - pivot.z, place[0] - pivot.x),
+        )
+        nearest: tuple[float, int] | None = None
+        for k in numbers:
+            other = self.others[k]
+            apart, touch = math.dist(other.place, pivot.place), self.start.radius + other.radius
+            if not abs(arm - touch) < apart < arm + touch:
+                continue
+            cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
+            angle = math.atan2(other.z - pivot.z, other.x - pivot.x) + math.acos(cosine)
+            angle = angle if angle <= math.pi else angle - 2 * math.pi
+            if -1.0 < angle < turned - 1e-9 and (nearest is None or angle > nearest[0]):
+                nearest = angle, k
+        if nearest is None:
+            return None
+        angle, k = nearest
+        return (pivot.x + arm * math.cos(angle), pivot.z + arm * math.sin(angle)), k
 
 
 def flows(
-    centres: FloatArray,
+    places: Places,
     sizes: FloatArray,
     loading: Loading,
     tables: Sequence[ForceTable],
-    *,
-    along: FloatArray,
-    marker: float,
-    there: BoolArray | None = None,
+    criterion: float,
+    present: BoolArray | None = None,
 ) -> FloatArray:
-    """The flow at which each grain leaves.
+    """The flow at which each grain leaves by peeling.
 
     Parameters
     ----------
-    centres : ndarray, shape (n, 2)
-        x and z of each grain, in one unit of length d.
+    places : Places
+        Places of n grains in one plane, in one unit of length d.
     sizes : ndarray, shape (n,)
         Diameter of each grain, d.
     loading : Loading
         The forces; grains that carry one may leave.
     tables : sequence of ForceTable
         For each grain its force law over its own submerged weight.
-    along : ndarray, shape (n, 2)
-        Unit vectors along the bed, the way that the flow pushes the grain.
-    marker : float
-        Displacement along it that counts as motion, of the grain's own diameter.
-    there : ndarray of bool, shape (n,), optional
-        The grains that are there; by default all.
+    criterion : float
+        Displacement along the bed that counts as motion, of the grain's own diameter.
+    present : ndarray of bool, shape (n,), optional
+        The grains that have not left yet; by default all.
 
     Returns
     -------
     ndarray, shape (n,)
         Undisturbed friction velocity, m/s; infinite for grains that never leave.
     """
-    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
-    present = np.ones(len(centres), bool) if there is None else there.copy()
-    near = dict(_neighbours(centres, sizes, present & (loading.ratio != 0)))
-    ratio, tangents = loading.ratio.tolist(), loading.along.tolist()
-    normals, ups = loading.outward.tolist(), along.tolist()
-    left = np.full(len(centres), np.inf)
-
-    next_flow = np.full(len(centres), np.inf)
-    ways: dict[int, list[Disc]] = {}
+    present = np.ones(len(sizes), bool) if present is None else present.copy()
+    rollers = dict(_rollers(places, sizes, loading, tables, present))
+    left, next_flow = np.full(len(sizes), np.inf), np.full(len(sizes), np.inf)
+    ways: dict[int, list[int]] = {}
 
     def sample(i: int) -> None:
-        # a grain that is pushed upstream is seen from behind, where that is downstream
-        side = math.copysign(1.0, ratio[i])
-        others = {grains[k].seen(side): grains[k] for k in near[i] if present[k]}
-        push = _Push(tables[i], ratio[i], tangents[i], normals[i]).seen(side)
-        climb = _Climb(grains[i].seen(side), list(others), push, _seen(ups[i], side), marker)
-        next_flow[i], way = climb.needed()
-        ways[i] = [others[one] for one in way]
+        numbers = [k for k in rollers[i].others if present[k]]
+        next_flow[i], ways[i] = rollers[i].way(numbers, criterion)
 
-    for i in near:
+    for i in rollers:
         sample(i)
     reached = 0.0
     while np.isfinite(lowest := float(next_flow.min())):
@@ -108,168 +176,142 @@ def flows(
         # a grain that is freed late leaves at once
         reached = max(reached, lowest)
         left[i], next_flow[i], present[i] = reached, np.inf, False
-        for k in near[i]:
-            # whom it would not have rolled over was not on its way
-            if k in near and present[k] and grains[i] in ways[k]:
+        for k in rollers[i].others:
+            # only neighbours whose rolling path crossed grain i are affected by its departure
+            if k in rollers and present[k] and i in ways[k]:
                 sample(k)
     return left
 
 
 def pivots(
-    centres: FloatArray,
+    places: Places, sizes: FloatArray, loading: Loading, tables: Sequence[ForceTable]
+) -> FloatArray:
+    """The flow at which each grain by itself begins to roll; arguments and result as in `flows`.
+
+    It is 0 for a grain that its contacts do not hold. The grains may lie in space.
+    """
+    found = np.full(len(sizes), np.inf)
+    pushed = loading.ratio != 0
+    if not places.width:
+        for i, roller in _rollers(places, sizes, loading, tables, pushed):
+            pivot = roller.foremost(list(roller.others))
+            start = roller.start.place
+            found[i] = 0.0 if pivot is None else roller.flow_over(start, roller.others[pivot])
+        return found
+    for i, sides in _pyramids(places, sizes, pushed):
+        ratio = float(loading.ratio[i])
+        drag = -np.sign(ratio) * _in_plane(sides, loading.along[i])
+        lift = -_in_plane(sides, loading.outward[i])
+        arms = zip(drag.tolist(), lift.tolist(), (-sides[:, 2]).tolist(), strict=True)
+        found[i] = min((tables[i].reaching(*arm) for arm in arms), default=np.inf) / abs(ratio)
+    return found
+
+
+def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> FloatArray:
+    """Angle from the bed's normal over which each grain has to roll downstream, shape (n,).
+
+    In a plane that of its foremost contact, in space that to which the grain bears a force, as a
+    board is tilted until it rolls; `along` has the unit vector downstream along the bed at each
+    grain, shape (n, 2). NaN for a grain without contacts, or that no force along the bed moves.
+    """
+    found, every = np.full(len(sizes), np.nan), np.ones(len(sizes), bool)
+    if not places.width:
+        discs = _discs(places, sizes, 1.0)
+        for i, near in _neighbours(places, sizes, every):
+            pivot = _foremost(discs[i], {k: discs[k] for k in near})
+            if pivot is not None:
+                slope = math.atan2(along[i, 1], along[i, 0])
+                found[i] = math.degrees(_lean(discs[i].place, discs[pivot].place) - slope)
+        return found
+    outward = np.column_stack([-along[:, 1], along[:, 0]])
+    for i, sides in _pyramids(places, sizes, every):
+        forward, deep = _in_plane(sides, along[i]), -_in_plane(sides, outward[i])
+        ahead = forward < 0
+        if ahead.any():
+            found[i] = np.degrees(np.arctan2(deep[ahead], -forward[ahead]).min())
+    return found
+
+
+def _rollers(
+    places: Places,
     sizes: FloatArray,
     loading: Loading,
     tables: Sequence[ForceTable],
-) -> FloatArray:
-    """The flow at which each grain by itself begins to roll over its foremost contact.
-
-    Arguments and result as in `flows`: nobody leaves before, nobody stands in the way.
-    """
-    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
-    found = np.full(len(centres), np.inf)
-    for i, near in _neighbours(centres, sizes, loading.ratio != 0):
-        side = math.copysign(1.0, loading.ratio[i])
-        push = _Push(tables[i], *(float(loading.ratio[i]), loading.along[i], loading.outward[i]))
-        others = [grains[k].seen(side) for k in near]
-        climb = _Climb(grains[i].seen(side), others, push.seen(side), loading.along[i], 0.0)
-        found[i] = climb.first()
-    return found
+    chosen: BoolArray,
+) -> Iterator[tuple[int, _Roller]]:
+    """The chosen grains that carry a force, by their numbers."""
+    ahead, behind = (_discs(places, sizes, side) for side in (1.0, -1.0))
+    for i, near in _neighbours(places, sizes, chosen & (loading.ratio != 0)):
+        ratio = float(loading.ratio[i])
+        side, discs = math.copysign(1.0, ratio), ahead if ratio > 0 else behind
+        # mirrored, upstream along the bed leads towards +x
+        along = [float(loading.along[i, 0]), side * float(loading.along[i, 1])]
+        outward = [side * float(loading.outward[i, 0]), float(loading.outward[i, 1])]
+        others = {k: discs[k] for k in near}
+        yield i, _Roller(discs[i], others, tables[i], abs(ratio), along, outward)
 
 
-def pivot_angles_deg(centres: FloatArray, sizes: FloatArray, along: FloatArray) -> FloatArray:
-    """Angle of each grain's foremost contact from the normal of the bed, shape (n,).
-
-    NaN for a grain that touches none. Arguments as in `flows`.
-    """
-    grains = [Disc(*row) for row in np.column_stack([centres, sizes / 2]).tolist()]
-    found = np.full(len(centres), np.nan)
-    for i, near in _neighbours(centres, sizes, np.ones(len(centres), bool)):
-        pivot = foremost(grains[i], [grains[k] for k in near])
-        if pivot:
-            slope = math.atan2(along[i, 1], along[i, 0])
-            found[i] = math.degrees(_lean(grains[i].place, pivot.place) - slope)
-    return found
-
-
-def foremost(grain: Disc, others: Sequence[Disc]) -> Disc | None:
-    """The contact of a grain that lies farthest round towards downstream, from below."""
-    here = grain.place
-    touching = (
-        k for k in others if math.dist(k.place, here) < (1 + TOUCH) * (grain.radius + k.radius)
-    )
-    return max(touching, key=lambda k: _lean(here, k.place), default=None)
+def _discs(places: Places, sizes: FloatArray, side: float) -> list[Disc]:
+    """The grains in the plane, seen from the front, 1, or mirrored, -1."""
+    rows = np.column_stack([side * places.xyz[:, 0], places.xyz[:, 2], sizes / 2])
+    return [Disc(*row) for row in rows.tolist()]
 
 
 def _neighbours(
-    centres: FloatArray, sizes: FloatArray, chosen: BoolArray
+    places: Places, sizes: FloatArray, chosen: BoolArray
 ) -> Iterator[tuple[int, list[int]]]:
-    """Some grains, each with those within its reach, in order of their numbers."""
-    order = np.argsort(centres[:, 0], kind="stable")
-    (x, z), own = centres[order].T, sizes[order]
-    ranks = np.flatnonzero(chosen[order])
-    far = REACH * own + (own + own.max()) / 2
-    first, last = (np.searchsorted(x, x[ranks] + side * far[ranks]) for side in (-1, 1))
-    for rank, a, b in zip(ranks.tolist(), first.tolist(), last.tolist(), strict=True):
-        apart = np.hypot(x[a:b] - x[rank], z[a:b] - z[rank])
-        near = apart < REACH * own[rank] + (own[a:b] + own[rank]) / 2
-        near[rank - a] = False
-        yield int(order[rank]), np.sort(order[a:b][near]).tolist()
+    """The chosen grains, each with those within its reach, in order of their numbers."""
+    first, second, apart = places.pairs((REACH + 1) * float(sizes.max()))
+    reach = REACH * sizes[first] + (sizes[first] + sizes[second]) / 2
+    near = np.linalg.norm(apart, axis=1) < reach
+    for i, rows in _by_grain(first[near], second[near], chosen):
+        yield i, second[near][rows].tolist()
 
 
-@dataclass(frozen=True)
-class _Push:
-    """The flow's force on one grain."""
-
-    table: ForceTable
-    ratio: float
-    tangent: Sequence[float]
-    normal: Sequence[float]
-
-    def seen(self, side: float) -> "_Push":
-        """The force as it is seen from the front, 1, or from behind, -1."""
-        # from behind, downstream along the bed is the other way
-        back = [self.tangent[0], self.tangent[1] * side]
-        return _Push(self.table, self.ratio * side, back, _seen(self.normal, side))
-
-    def flow_to_reach(self, x: float, z: float, goal: float) -> float:
-        """The flow at which the force over W along a direction reaches a goal."""
-        drag_arm = (self.tangent[0] * x + self.tangent[1] * z) * math.copysign(1.0, self.ratio)
-        lift_arm = self.normal[0] * x + self.normal[1] * z
-        return self.table.reaching(drag_arm, lift_arm, goal) / abs(self.ratio)
+def _by_grain(
+    first: IntArray, second: IntArray, chosen: BoolArray
+) -> Iterator[tuple[int, IntArray]]:
+    """The chosen grains, each with the places of its pairs, in order of the other's number."""
+    order = np.lexsort((second, first))
+    ends = np.searchsorted(first[order], np.arange(len(chosen) + 1))
+    for i in np.flatnonzero(chosen).tolist():
+        yield i, order[ends[i] : ends[i + 1]]
 
 
-@dataclass(frozen=True)
-class _Climb:
-    """The way of one grain over its neighbours; lengths in d, forces over its weight."""
-
-    start: Disc
-    others: Sequence[Disc]
-    push: _Push
-    along: Sequence[float]
-    marker: float
-
-    def first(self) -> float:
-        """The least flow at which it begins to roll over its foremost contact; 0 without any."""
-        pivot = self._foremost()
-        return self._flow_to_leave(self.start.place, pivot) if pivot else 0.0
-
-    def needed(self) -> tuple[float, list[Disc]]:
-        """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
-        place, pivot = self.start.place, self._foremost()
-        flow, way = 0.0, []
-        while pivot is not None:
-            way.append(pivot)
-            if len(way) > MOST_STEPS:
-                return math.inf, way
-            flow = max(flow, self._flow_to_leave(place, pivot))
-            met = self._next(place, pivot)
-            if met is None or math.isinf(flow):
-                break
-            place, pivot = met
-        return flow, way
-
-    def _foremost(self) -> Disc | None:
-        return foremost(self.start, self.others)
-
-    def _reach(self, other: Disc) -> float:
-        """Distance of the centres where the grain touches another."""
-        return self.start.radius + other.radius
-
-    def _flow_to_leave(self, place: Place, pivot: Disc) -> float:
-        """The flow at which the resultant passes through the contact: no moment about it."""
-        lean = _lean(place, pivot.place)
-        return self.push.flow_to_reach(math.cos(lean), math.sin(lean), math.sin(lean))
-
-    def _next(self, place: Place, pivot: Disc) -> tuple[Place, Disc] | None:
-        """Where the grain, rolling over its pivot, meets another before the criterion; which."""
-        turned = math.atan2(place[1] - pivot.z, place[0] - pivot.x)
-        meetings = [m for m in self._meetings(pivot) if -1.0 < m[0] < turned - 1e-9]
-        if not meetings:
-            return None
-        angle, met = max(meetings)
-        arm = self._reach(pivot)
-        at = (pivot.x + arm * math.cos(angle), pivot.z + arm * math.sin(angle))
-        start = self.start.place
-        travel = sum((a - b) * t for a, b, t in zip(at, start, self.along, strict=True))
-        own = 2 * self.start.radius
-        return (at, met) if travel < (self.marker - 1e-9) * own else None
-
-    def _meetings(self, pivot: Disc) -> Iterator[tuple[float, Disc]]:
-        """Direction from the pivot at which a grain on it would touch another, for each other."""
-        arm = self._reach(pivot)
-        for other in self.others:
-            apart, touch = math.dist(other.place, pivot.place), self._reach(other)
-            if abs(arm - touch) < apart < arm + touch:
-                direction = math.atan2(other.z - pivot.z, other.x - pivot.x)
-                cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
-                angle = direction + math.acos(cosine)
-                yield (angle if angle <= math.pi else angle - 2 * math.pi), other
-
-
-def _seen(vector: Sequence[float], side: float) -> list[float]:
-    return [vector[0] * side, vector[1]]
+def _foremost(grain: Disc, others: dict[int, Disc]) -> int | None:
+    """The contact of a grain that lies farthest round towards +x, from below."""
+    touching = [
+        k
+        for k, other in others.items()
+        if math.dist(other.place, grain.place) < (1 + TOUCH) * (grain.radius + other.radius)
+    ]
+    return max(touching, key=lambda k: _lean(grain.place, others[k].place), default=None)
 
 
 def _lean(place: Place, neighbour: Place) -> float:
-    """Direction to a neighbour: 0 below, pi/2 level and downstream."""
+    """Direction to a neighbour: 0 below, pi/2 level and towards +x."""
     return math.atan2(neighbour[0] - place[0], place[1] - neighbour[1])
+
+
+def _pyramids(
+    places: Places, sizes: FloatArray, chosen: BoolArray
+) -> Iterator[tuple[int, FloatArray]]:
+    """The chosen grains, each with the inward normals of the pyramid of its contacts, (k, 3).
+
+    With fewer than three contacts it contains no direction: its one side faces up.
+    """
+    first, second, apart = places.contacts(sizes)
+    directions = apart / np.linalg.norm(apart, axis=1)[:, None]
+    for i, rows in _by_grain(first, second, chosen):
+        own, sides = directions[rows], []
+        for one, other in combinations(range(len(own)), 2):
+            normal = np.cross(own[one], own[other])
+            others = own @ normal
+            if (others > -FLAT).all() or (others < FLAT).all():
+                sides.append(normal * (1 if others.sum() > 0 else -1))
+        yield i, np.array(sides if len(own) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
+
+
+def _in_plane(sides: FloatArray, direction: FloatArray) -> FloatArray:
+    """Part of each side's normal along a direction of the plane of the flow, shape (k,)."""
+    return np.asarray(sides[:, 0] * direction[0] + sides[:, 2] * direction[1])

@@ -15,7 +15,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from orchestrator.bed.cover import counted_segments
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.case import WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
@@ -31,6 +30,8 @@ GRAINS = "grains.csv"
 LIGGGHTS, in its case."""
 EDGE = 2.0
 """Length over which the edge of a bared part is rounded, d."""
+NEAREST = 0.25
+"""Least distance along x of a new corner from those of the bed line, d."""
 LEVEL = 1e-6
 """A bed that is less above the flat bed lies on it, d."""
 FAR = 1e9
@@ -228,12 +229,14 @@ def sunk(bed: LoadedBed, worn: Worn) -> BedLine:
     window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
     depth = np.convolve(depth, window, mode="same")
     places = x[_corners(depth)]
-    finer = line.with_corners(places[(places > line.x[0]) & (places < line.x[-1])].tolist())
+    # corners that nearly coincide would make cells that are far too short
+    far = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST
+    finer = line.with_corners(places[far & (places > line.x[0]) & (places < line.x[-1])].tolist())
     before, ground = np.array(finer.z), min(line.z[0], line.z[-1])
     z = before - np.interp(finer.x, x, depth, left=0.0, right=0.0)
     # a form wears down to the flat bed around it, unless counted grains lie as low as that
     low = np.maximum(line.z[1:], line.z[:-1]) <= ground + LEVEL
-    if not (low & counted_segments(line, bed.counts)).any():
+    if not (low & line.counted(bed.counts)).any():
         z = np.maximum(z, np.minimum(before, ground))
     inside = (np.array(finer.x) > line.x[1]) & (np.array(finer.x) < line.x[-2])
     return replace(finer, z=tuple(np.where(inside, z, before).tolist()))

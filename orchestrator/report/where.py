@@ -27,8 +27,6 @@ HEIGHT, BAR = 3.2, 0.6
 """Heights of a bed's three panels and of the colours below all, inches."""
 COLOURS = "plasma"
 UNMOVED = "0.75"
-NAMES = {"rushil": "hill of RUSHIL", "gaussian": "Gaussian hill", "cosine": "wave of a cosine"}
-"""Shapes whose own name says too little."""
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -75,7 +73,7 @@ def _bed(part: SubFigure, results: Results, scene_id: str, pile: Pile) -> None:
 
 def shape(bed: PileBed) -> str:
     """A bed line in a few words."""
-    words = [str(bed.profile or NAMES.get(bed.shape, bed.shape)), *map(str, bed.obstacles)]
+    words = [str(bed.profile or bed.form.label or bed.shape), *map(str, bed.obstacles)]
     if bed.forms > 1:
         every = f" every {bed.spacing:g} m" if bed.spacing else ""
         words[0] = f"{bed.forms} × {words[0]}{every}"

@@ -11,7 +11,7 @@ from orchestrator.study.closed_form import regime_of
 from orchestrator.study.part import Info, Scope
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
 from orchestrator.study.profile import Profile
-from orchestrator.study.scene import FIELDS_OF_SHAPES, Scene
+from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal
 
 PARTS: Mapping[str, type[Part]] = {
@@ -98,9 +98,9 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
     "piles": lambda scene: isinstance(scene.bed, PileBed),
-    "dunes": lambda scene: isinstance(scene.bed, PileBed) and scene.bed.shape == "dune",
+    "dunes": lambda scene: isinstance(scene.bed, PileBed) and "windward" in scene.bed.form.fields,
     "beds with level parts": lambda scene: (
-        isinstance(scene.bed, PileBed) and scene.bed.shape in FIELDS_OF_SHAPES["length"]
+        isinstance(scene.bed, PileBed) and "length" in scene.bed.form.fields
     ),
     "profiles": lambda scene: isinstance(scene.bed, PileBed) and bool(scene.bed.profile),
     "disordered piles": _is_disordered,

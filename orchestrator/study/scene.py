@@ -26,6 +26,7 @@ from orchestrator.study.parts import (
     PileBed,
     Protocol,
 )
+from orchestrator.study.shapes import having
 from orchestrator.study.sizes import Sizes, largest, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
@@ -50,16 +51,6 @@ a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002
 ROUGHEST = 1 / 3
 """Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the largest
 ratio measured; above 1/3 a grain would lie where the mean flow of the log law is at rest."""
-FORMS = ("triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid")
-FIELDS_OF_SHAPES = {
-    "windward": ("dune",),
-    "brink_radius": ("dune",),
-    "lee_slope_deg": ("triangle", "dune", "trapezoid", "step down"),
-    "length": ("trapezoid", "step up", "step down", "flat"),
-    "forms": FORMS,
-    "spacing": FORMS,
-}
-"""Fields that some shapes alone have."""
 Misfit = tuple[str, str, str]
 """A field that does not go with others, why, and what would."""
 
@@ -296,15 +287,16 @@ def pocket_cosine(bed: Bed) -> float:
 
 
 def _misfits_of_shape(bed: PileBed) -> Iterator[Misfit]:
-    (low, high), rises = BUILDABLE_DEG, bed.shape not in ("flat", "step down")
+    (low, high), rises = BUILDABLE_DEG, bed.form.rises
     name = f"a {bed.shape}" if bed.shape != "flat" else "a flat bed"
     if rises and not low <= bed.slope_deg <= high:
         what, remedy = f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
         yield "bed.slope_deg", what, remedy
     if bed.smoothing:
         yield "bed.smoothing", "it is of a profile", "leave it out"
-    for field, shapes in FIELDS_OF_SHAPES.items():
-        if getattr(bed, field) != PileBed.model_fields[field].default and bed.shape not in shapes:
+    for field, about in PileBed.model_fields.items():
+        shapes = having(field)
+        if shapes and bed.shape not in shapes and getattr(bed, field) != about.default:
             remedy = f"leave it out; it is of: {', '.join(shapes)}"
             yield f"bed.{field}", f"{name} has none", remedy
     if not rises and bed.slope_deg:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.bed.shapes import rushil_aspect
 from orchestrator.flow import diagnostics
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
@@ -17,6 +16,7 @@ from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.scene import Scene
+from orchestrator.study.shapes import rushil_aspect
 from orchestrator.study.study import Study
 from orchestrator.types import Row
 

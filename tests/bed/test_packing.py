@@ -1,4 +1,7 @@
-"""Where grains lie, which are exposed, and what must not change that."""
+"""Where grains of a lattice lie, which are exposed and may move, and what must not change that."""
+
+from dataclasses import replace
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -6,57 +9,77 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed import packing
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.line import BedLine, of_bed, triangle
+from orchestrator.bed.packing import Lattice, Packing, cover, pile
 from orchestrator.study.parts import Packing as Pattern
+from orchestrator.study.parts import UnfitError
+from orchestrator.types import BoolArray, FloatArray
+from tests.bed.test_line import BEDS, H, bed
 
-PATTERNS: tuple[Pattern, Pattern] = ("aligned", "horizontal")
-slopes = st.floats(10, 30)
-heights = st.floats(6, 25)
-
-
-def _pile(
-    slope: float, height: float, pattern: Pattern = "aligned", seed: int = 0
-) -> packing.Packing:
-    return packing.pile(
-        triangle(slope, height),
-        entrainment_angle_deg=60.0,
-        gap=1 / 30,
-        pattern=pattern,
-        mobile_layers=2,
-        seed=seed,
-    )
+D, GAP = 1e-3, 1 / 30
+PATTERNS = [pattern for pattern in get_args(Pattern) if pattern != "poured"]
+slopes, heights = st.floats(10, 30), st.floats(6, 25)
+patterns = st.sampled_from(PATTERNS)
 
 
-def _distances(centres: packing.FloatArray) -> packing.FloatArray:
-    gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
-    return np.asarray(gaps + 9 * np.eye(len(centres)))
+def _lattice(pattern: Pattern = "aligned", **changes: Any) -> Lattice:
+    disorder = 0.05 if pattern == "disordered" else 0.0
+    return replace(Lattice(60.0, GAP, pattern, mobile_layers=2, disorder=disorder), **changes)
+
+
+def _pile(slope: float, height: float, pattern: Pattern = "aligned", **changes: Any) -> Packing:
+    return pile(triangle(slope, height), _lattice(pattern, **changes))
+
+
+def _covered(name: str, pattern: Pattern = "aligned", **fields: Any) -> Packing:
+    shape = bed(**{**BEDS[name], **fields})
+    ground = of_bed(shape.model_copy(update={"obstacles": ()})).scaled(1 / D)
+    counts = shape.counts
+    counts = counts if isinstance(counts, str) else (counts[0] / D, counts[1] / D)
+    return cover(of_bed(shape).scaled(1 / D), ground, counts, _lattice(pattern))
+
+
+def _apart(centres: FloatArray) -> FloatArray:
+    """Distances of all grains from one another; 9 of each from itself."""
+    return np.asarray(np.linalg.norm(centres[:, None] - centres, axis=2) + 9 * np.eye(len(centres)))
+
+
+def _check(bed: Packing) -> None:
+    """No grain overlaps another, and each that may move rests on two, one of them lower."""
+    apart = _apart(bed.centres)
+    assert apart.min() > 1 - 1e-5
+    x, z = (bed.centres[None, :, i] - bed.centres[:, None, i] for i in (0, 1))
+    # in a row along 30 degrees one of the two is level with the grain
+    bears: BoolArray = (apart < 1 + 1e-3) & (z < 1e-3)
+    for side in (x <= 0, x > 0, z < -1e-6):
+        assert np.any(bears & side, axis=1)[bed.mobile].all()
+    assert bed.mobile[bed.windward].all()
+    assert not (bed.windward & bed.lee).any()
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("name", BEDS)
+def test_grains_of_any_bed_do_not_overlap_and_mobile_ones_rest(name: str, pattern: Pattern) -> None:
+    _check(_covered(name, pattern))
 
 
 @settings(max_examples=30, deadline=None)
-@given(slope=slopes, height=heights, pattern=st.sampled_from(PATTERNS))
-def test_grains_never_overlap(slope: float, height: float, pattern: Pattern) -> None:
-    assert _distances(_pile(slope, height, pattern).centres).min() > 1 - 1e-9
-
-
-@settings(max_examples=30, deadline=None)
-@given(slope=slopes, height=heights, pattern=st.sampled_from(PATTERNS))
-def test_every_mobile_grain_rests_on_two_below_it(
-    slope: float, height: float, pattern: Pattern
+@given(slope=slopes, height=heights, pattern=patterns, seed=st.integers(0, 10**6))
+def test_grains_of_a_pile_do_not_overlap_and_mobile_ones_rest(
+    slope: float, height: float, pattern: Pattern, seed: int
 ) -> None:
-    bed = _pile(slope, height, pattern)
-    touching = _distances(bed.centres) < 1 + 1e-6
-    lower = bed.centres[None, :, 1] < bed.centres[:, None, 1] - 1e-6
-    level = np.abs(bed.centres[None, :, 1] - bed.centres[:, None, 1]) <= 1e-6
-    supports = (touching & lower).sum(axis=1)
-    # in a row along 30 deg one of the two supports is level with the grain
-    assert np.all((supports + (touching & level).sum(axis=1))[bed.mobile] >= 2)
-    assert np.all(supports[bed.mobile] >= 1)
+    bed = _pile(slope, height, pattern, seed=seed if pattern == "disordered" else 0)
+    if pattern != "disordered":
+        _check(bed)
+    apart = _apart(bed.centres)
+    assert apart[bed.mobile].min() > 1 - 1e-9
+    assert ((apart < 1 + 1e-6).sum(axis=1)[bed.mobile] >= 2).all()
 
 
 @settings(max_examples=30, deadline=None)
 @given(slope=slopes, height=heights)
 def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height: float) -> None:
-    bed = _pile(slope, height)
+    bed, line = _pile(slope, height), triangle(slope, height)
     s = np.sort(bed.arc_length[bed.windward])
     # the crest grain sits over the crest itself, a little downstream of its own normal's foot
     np.testing.assert_allclose(np.diff(s)[:-1], 1.0, atol=1e-9)
@@ -64,136 +87,125 @@ def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height:
     assert s[-1] == pytest.approx(height / np.sin(np.radians(slope)))
     # the lowest grain's centre is at least as high as those of the flat bed
     assert abs(bed.count - height / np.sin(np.radians(slope))) <= 2
-
-
-@settings(max_examples=30, deadline=None)
-@given(slope=slopes, height=heights)
-def test_exposed_grains_lie_their_gap_above_the_bed_line(slope: float, height: float) -> None:
-    bed, line = _pile(slope, height), triangle(slope, height)
-    depth = line.depth(bed.centres[bed.windward], line.windward)
-    np.testing.assert_allclose(-depth, 0.5 + 1 / 30, atol=1e-9)
-
-
-@pytest.mark.parametrize("pattern", PATTERNS)
-def test_a_twin_has_the_grains_of_its_lattice_but_for_a_billionth(pattern: Pattern) -> None:
-    lattice, replica, other = (_pile(20.0, 15.0, pattern, seed) for seed in (0, 1, 2))
-    for one in (replica, other):
-        np.testing.assert_array_equal(one.windward, lattice.windward)
-        np.testing.assert_array_equal(one.mobile, lattice.mobile)
-        aside = np.abs(one.centres - lattice.centres)
-        assert 0 < aside[lattice.windward].min() <= aside.max() <= packing.PERTURBATION
-    assert not np.array_equal(replica.centres, other.centres)
-
-
-@settings(max_examples=20, deadline=None)
-@given(slope=slopes, pattern=st.sampled_from(PATTERNS), seed=st.integers(0, 2**32 - 1))
-def test_shifts_of_a_billionth_of_a_diameter_change_no_exposed_grain(
-    slope: float, pattern: Pattern, seed: int
-) -> None:
-    bed, line = _pile(slope, 15.0, pattern), triangle(slope, 15.0)
-    shift = np.random.default_rng(seed).uniform(-1e-9, 1e-9, bed.centres.shape)
-    before = packing.exposed(bed.centres, line)
-    after = packing.exposed(bed.centres + shift, line)
-    np.testing.assert_array_equal(before, after)
-
-
-@pytest.mark.parametrize("pattern", PATTERNS)
-def test_the_crest_grain_is_windward_exposed_and_mobile(pattern: Pattern) -> None:
-    bed = _pile(20.0, 12.0, pattern)
-    top = int(bed.centres[:, 1].argmax())
-    assert bed.windward[top]
-    assert bed.mobile[top]
+    over = line.over(bed.centres[bed.windward], line.top - 1)
+    np.testing.assert_allclose(over, 0.5 + GAP, atol=1e-9)
 
 
 def test_counts_of_the_papers_pile() -> None:
     # 0.02 m at 15 deg is 77.27 diameters of 1 mm of face, the first grain half a grain up it
     assert _pile(15.0, 20.0).count == 78
     assert _pile(15.0, 200.0).count == 773
-
-
-def test_exposed_and_mobile_grains() -> None:
-    bed = _pile(15.0, 20.0)
-    assert not np.any(bed.windward & bed.lee)
-    assert np.all(bed.mobile[bed.windward])
     # two layers of 78 and 77 grains, less what has no place at the toe and the crest
-    assert int(bed.mobile.sum()) == pytest.approx(2 * bed.count, abs=4)
+    assert int(_pile(15.0, 20.0).mobile.sum()) == pytest.approx(2 * 78, abs=4)
 
 
-def test_horizontal_packing_is_a_stair() -> None:
-    bed = _pile(20.0, 12.0, "horizontal")
-    z = bed.centres[bed.windward][:, 1]
-    steps = np.unique(np.round(z, 6))
-    np.testing.assert_allclose(np.diff(steps), np.sin(np.radians(60)), atol=1e-6)
-
-
-def test_arc_length_runs_over_the_crest() -> None:
-    line = triangle(30.0, 10.0)
-    points = np.array([[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0]])
-    np.testing.assert_allclose(line.nearest(points)[1], [0.0, 20.0, 40.0], atol=1e-12)
-
-
-def _disordered(slope: float, seed: int, size: float = 0.05) -> packing.Packing:
-    return packing.pile(
-        triangle(slope, 15.0),
-        entrainment_angle_deg=60.0,
-        gap=1 / 30,
-        pattern="disordered",
-        mobile_layers=2,
-        disorder=size,
-        seed=seed,
-    )
-
-
-@settings(max_examples=30, deadline=None)
-@given(slope=slopes, seed=st.integers(0, 10**6), size=st.floats(1e-4, 0.2))
-def test_disordered_mobile_grains_rest_on_two_and_overlap_with_none(
-    slope: float, seed: int, size: float
+@settings(max_examples=20, deadline=None)
+@given(slope=slopes, pattern=st.sampled_from(["aligned", "horizontal"]), seed=st.integers(1, 10**9))
+def test_shifts_of_a_billionth_of_a_diameter_decide_nothing(
+    slope: float, pattern: Pattern, seed: int
 ) -> None:
-    bed = _disordered(slope, seed, size)
-    gaps = _distances(bed.centres)
-    assert gaps[bed.mobile].min() > 1 - 1e-9
-    assert np.all((gaps < 1 + 1e-6).sum(axis=1)[bed.mobile] >= 2)
+    lattice, replica = _pile(slope, 15.0, pattern), _pile(slope, 15.0, pattern, seed=seed)
+    np.testing.assert_array_equal(replica.windward, lattice.windward)
+    np.testing.assert_array_equal(replica.mobile, lattice.mobile)
+    aside = np.abs(replica.centres - lattice.centres)
+    assert 0 < aside[lattice.windward].min() <= aside.max() <= packing.PERTURBATION
+    line = triangle(slope, 15.0)
+    tangents = line.tangents[np.where(lattice.centres[:, 0] <= line.crest[0] + 1e-6, 1, 2)]
+    before, after = (packing.exposed(one.centres, tangents) for one in (lattice, replica))
+    np.testing.assert_array_equal(before, after)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(pattern: Pattern) -> None:
+    faces = []
+    for layers in (1, 2, 4):
+        bed = _pile(20.0, 15.0, pattern, mobile_layers=layers)
+        top = int(bed.centres[:, 1].argmax())
+        assert bed.windward[top]
+        faces.append(bed.centres[bed.windward])
+    np.testing.assert_array_equal(faces[0], faces[1])
+    np.testing.assert_array_equal(faces[0], faces[2])
+    most, more = (_pile(20.0, 10.0, pattern, mobile_layers=n).mobile for n in (20, 1000))
+    np.testing.assert_array_equal(most, more)
+
+
+def test_level_rows_are_a_stair() -> None:
+    bed = _pile(20.0, 12.0, "horizontal")
+    steps = np.unique(np.round(bed.centres[bed.windward, 1], 6))
+    np.testing.assert_allclose(np.diff(steps), np.sin(np.radians(60)), atol=1e-6)
 
 
 @settings(max_examples=20, deadline=None)
 @given(slope=slopes, seed=st.integers(0, 10**6))
 def test_disorder_hardly_changes_how_many_are_exposed(slope: float, seed: int) -> None:
-    bed = _disordered(slope, seed)
+    bed = _pile(slope, 15.0, "disordered", seed=seed)
     assert bed.count == pytest.approx(_pile(slope, 15.0).count, abs=3)
-    top = int(bed.centres[:, 1].argmax())
-    assert bed.windward[top]
+    again, other = (_pile(slope, 15.0, "disordered", seed=seed + n) for n in (0, 1))
+    np.testing.assert_array_equal(bed.centres, again.centres)
+    assert not np.array_equal(bed.centres, other.centres)
 
 
-def test_a_seed_is_one_packing() -> None:
-    same = _disordered(20.0, 3).centres
-    np.testing.assert_array_equal(same, _disordered(20.0, 3).centres)
-    assert not np.array_equal(same, _disordered(20.0, 4).centres)
+@pytest.mark.parametrize("name", ["curved dune", "cosine", "gaussian", "flat", "train"])
+def test_exposed_grains_follow_the_bed_one_by_one(name: str) -> None:
+    found, line = _covered(name), of_bed(bed(**BEDS[name])).scaled(1 / D)
+    centres = found.centres[found.windward]
+    segment, along = line.nearest(centres)
+    np.testing.assert_allclose(line.over(centres, segment), 0.5 + GAP, atol=0.1)
+    assert np.median(np.diff(np.sort(along))) == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize("pattern", ["aligned", "horizontal", "disordered"])
-def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(pattern: Pattern) -> None:
-    faces = []
-    for layers in (1, 2, 4):
-        found = packing.pile(
-            triangle(20.0, 15.0),
-            entrainment_angle_deg=60.0,
-            gap=1 / 30,
-            pattern=pattern,
-            mobile_layers=layers,
-            disorder=0.05,
-            seed=3 if pattern == "disordered" else 0,
-        )
-        faces.append(found.centres[found.windward])
-    np.testing.assert_array_equal(faces[0], faces[1])
-    np.testing.assert_array_equal(faces[0], faces[2])
+def test_which_part_is_counted() -> None:
+    windward, everything = _covered("triangle"), _covered("triangle", counted="all")
+    part = _covered("triangle", counted=(0.02, 0.04))
+    assert abs(windward.count - _pile(15.0, H / D).count) <= 1
+    assert windward.centres[windward.windward, 0].max() < H / np.tan(np.radians(15)) / D + 1
+    assert everything.count > 1.8 * windward.count
+    assert part.count == pytest.approx(20 / np.cos(np.radians(15)), abs=1)
+    x = part.centres[part.windward, 0] * D
+    assert 0.02 <= x.min() <= x.max() <= 0.04
+    assert _covered("apart").count == pytest.approx(3 * windward.count, abs=3)
+    with pytest.raises(UnfitError, match=r"bed.counted: no grain is counted"):
+        _covered("step down", counted="windward")
 
 
-def test_no_pile_has_more_rows_than_its_height() -> None:
-    line = triangle(20.0, 10.0)
-    most, more = (
-        packing.pile(
-            line, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=n
-        )
-        for n in (20, 1000)
-    )
-    np.testing.assert_array_equal(most.mobile, more.mobile)
+def test_no_grain_moves_at_an_obstacle() -> None:
+    found = _covered("block on it")
+    ((start, end),) = of_bed(bed(**BEDS["block on it"])).scaled(1 / D).bare
+    x = found.centres[found.mobile, 0]
+    assert not ((x > start - 1) & (x < end + 1)).any()
+    assert found.count < _covered("triangle").count
+
+
+def test_a_bed_that_bends_more_sharply_than_a_grain_is_refused() -> None:
+    trough = bed(forms=40, shape="cosine", height=2e-3, slope_deg=50.0)
+    with pytest.raises(UnfitError, match="more sharply than a grain at"):
+        packing.offset(of_bed(trough).scaled(1 / D), 3.0)
+
+
+def _unshadowed(x: FloatArray, z: FloatArray, r: FloatArray, y: Any = 0.0, w: Any = 0) -> BoolArray:
+    places = packing.Places.of(np.column_stack([x, np.zeros_like(x)]), y, w)
+    return packing.unshadowed(places, z, r)
+
+
+def test_equal_grains_are_exposed_alike_by_both_rules() -> None:
+    line: BedLine = triangle(20.0, 12.0)
+    lattice = _pile(20.0, 12.0)
+    segment, along = line.nearest(lattice.centres)
+    free = _unshadowed(along, line.over(lattice.centres, segment), lattice.sizes / 2)
+    face = (segment == line.top - 1) & (along < line.crest_s - 1) & (along > 1)
+    np.testing.assert_array_equal(free[face], lattice.windward[face])
+
+
+def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:
+    along, height = np.array([0.0, 0.7, 2.0]), np.array([1.0, 0.5, 0.5])
+    radii = np.array([1.0, 0.3, 0.5])
+    assert _unshadowed(along, height, radii).tolist() == [True, False, True]
+    assert _unshadowed(along, height, radii / 2).tolist() == [True, True, True]
+
+
+def test_a_grain_across_the_sides_covers_and_touches() -> None:
+    x, z, y = np.zeros(2), np.array([0.0, 0.9]), np.array([0.1, 3.8])
+    for width, free, contacts in ((4.0, [False, True], 1), (0.0, [True, True], 0)):
+        assert _unshadowed(x, z, np.full(2, 0.5), y, width).tolist() == free
+        places = packing.Places.of(np.column_stack([x, z]), y, width)
+        assert len(places.contacts(np.ones(2))[0]) == 2 * contacts

@@ -1,5 +1,6 @@
-"""Beds that LIGGGHTS pours: the same from the same seed, a lattice where grains rain as one."""
+"""Beds that LIGGGHTS pours, in the plane and in strips with periodic sides."""
 
+import shutil
 import subprocess
 from functools import cached_property
 from pathlib import Path
@@ -7,51 +8,75 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.typing import NDArray
 
 from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine
-from orchestrator.bed.places import Places
-from orchestrator.bed.poured_case import BED, DUMP, PouredBed
-from orchestrator.bed.shapes import triangle
-from orchestrator.errors import SolverError
-from orchestrator.runs import engine
+from orchestrator.bed.packing import Places
+from orchestrator.bed.poured import BED, DUMP, PouredBed
+from orchestrator.errors import InputError, SolverError
+from orchestrator.runs import assets, engine
+from orchestrator.study import study
 from orchestrator.study.sizes import LogNormal, Sizes
-from tests.bed import by_hand
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-SURFACE = 0.5 + 1 / 30
+SURFACE, WIDTH = 0.5 + 1 / 30, 4.0
 MIXED = LogNormal(sigma_g=1.3)
+LOOSE, CLOSE = 0.536, 0.634
+"""Volume fractions of random packings of equal frictional spheres: the loosest and the closest (C.
+Song, P. Wang, H. A. Makse, Nature 453, 2008, doi:10.1038/nature06981), whose grains have 4 to 6
+contacts."""
 
 
-def _bed(sizes: Sizes | None = MIXED, seed: int = 1) -> PouredBed:
+def _plane(sizes: Sizes | None = MIXED, seed: int = 1) -> PouredBed:
     line = BedLine((-10.0, 0.0, 14.0, 34.0), (0.0, 0.0, 0.0, 0.0), 1.0)
     return PouredBed(line, 3.0, SURFACE, sizes, 1.0, 35.0, seed)
 
 
-def _poured(one: PouredBed, cases: Path) -> Path:
-    engine.execute(one, cases, 120.0)
-    return cases / one.name
+def _strip(length: float = 8.0, width: float = WIDTH) -> PouredBed:
+    line = BedLine((-4.0, 0.0, length, length + 4.0), (0.0, 0.0, 0.0, 0.0), 1.0)
+    return PouredBed(line, 4.0, SURFACE, None, 1.0, 35.0, 1, width)
+
+
+def _run(bed: PouredBed, cases: Path) -> Path:
+    engine.execute(bed, cases, 600.0)
+    return cases / bed.name
 
 
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return _poured(_bed(), tmp_path_factory.mktemp("cases"))
+    return _run(_plane(), tmp_path_factory.mktemp("cases"))
 
 
-def _grains(directory: Path) -> tuple[FloatArray, FloatArray]:
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _run(_strip(), tmp_path_factory.mktemp("cases"))
+
+
+def _grains(directory: Path, width: float = 0.0) -> tuple[Places, FloatArray]:
     rows = pd.read_csv(directory / BED)
-    return rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
+    centres = rows[["x_over_d", "z_over_d"]].to_numpy(float)
+    return Places.of(centres, rows["y_over_d"].to_numpy(float), width), rows["size"].to_numpy(float)
 
 
-def test_the_same_seed_gives_the_same_bytes_by_hand(mixed: Path, tmp_path: Path) -> None:
-    assert by_hand.is_the_same(mixed, tmp_path / "copy")
-    assert _bed(seed=2).id != _bed().id
+def _contacts(places: Places, sizes: FloatArray) -> IntArray:
+    """How many grains each grain touches."""
+    return np.bincount(places.contacts(sizes)[0], minlength=len(sizes))
+
+
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+def test_the_same_seed_gives_the_same_bytes_by_hand(
+    request: pytest.FixtureRequest, name: str, tmp_path: Path
+) -> None:
+    case, copy = request.getfixturevalue(name), tmp_path / "copy"
+    shutil.copytree(case, copy)
+    (copy / DUMP).unlink()
+    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert (copy / DUMP).read_bytes() == (case / DUMP).read_bytes()
+    assert _plane(seed=2).id != _plane().id
 
 
 def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
-    from orchestrator.runs import assets
-
     assets.copy_template("liggghts/poured", tmp_path / "copy")
     ended = subprocess.run(["./Allrun"], cwd=tmp_path / "copy", capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
@@ -59,42 +84,64 @@ def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
 
 
 def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
-    centres, sizes = _grains(mixed)
-    touching = poured.contacts(Places.of(centres), sizes)
-    number = np.bincount(touching.ravel(), minlength=len(sizes))
-    lying = np.arange(len(sizes)) >= len(_bed().mould.floor)
+    places, sizes = _grains(mixed)
+    lying = np.arange(len(sizes)) >= len(_plane().mould.floor)
+    number = _contacts(places, sizes)
     assert np.mean(number[lying] >= 2) > 0.98
+    x, _, z = places.xyz.T
     # settled again after the cut, a grain may have come up by a little, never by a layer
-    assert centres[:, 1].max() < SURFACE + 0.3
-    overlap = (sizes[touching[:, 0]] + sizes[touching[:, 1]]) / 2 - np.hypot(
-        *(centres[touching[:, 0]] - centres[touching[:, 1]]).T
-    )
-    fixed = (touching < len(_bed().mould.floor)).all(axis=1)
-    assert overlap[~fixed].max() < 0.01
-
-
-def test_packing_and_contacts_lie_between_loose_and_close(mixed: Path) -> None:
-    centres, sizes = _grains(mixed)
-    inner = (centres[:, 1] > -2.5) & (centres[:, 1] < -1) & (np.abs(centres[:, 0] - 7) < 14)
-    number = np.bincount(poured.contacts(Places.of(centres), sizes).ravel(), minlength=len(sizes))[
-        inner
-    ]
+    assert z.max() < SURFACE + 0.3
+    first, second, apart = places.contacts(sizes)
+    overlap = (sizes[first] + sizes[second]) / 2 - np.linalg.norm(apart, axis=1)
+    assert overlap[lying[first] | lying[second]].max() < 0.01
     # discs in the plane: three contacts hold a frictional packing, four one without friction
-    assert 3.0 < number.mean() < 4.0
+    inner = (z > -2.5) & (z < -1) & (np.abs(x - 7) < 14)
+    assert 3.0 < number[inner].mean() < 4.0
+
+
+def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Path) -> None:
+    places, sizes = _grains(strip, WIDTH)
+    x, _, z = places.xyz.T
+    low, high, half = -2.5, -1.0, 6.0
+    inner, r = np.abs(x - x.mean()) < half, sizes / 2
+    below, above = (np.clip(end - z, -r, r)[inner] for end in (low, high))
+    cut = np.pi * (r[inner] ** 2 * (above - below) - (above**3 - below**3) / 3)
+    assert LOOSE < cut.sum() / (2 * half * WIDTH * (high - low)) < CLOSE
+    number = _contacts(places, sizes)[inner & (z > low) & (z < high)]
+    assert 4 < number.mean() < 6
+    assert np.mean(number >= 3) > 0.98
+
+
+def test_where_the_sides_are_changes_neither_who_is_exposed_nor_who_touches(strip: Path) -> None:
+    places, sizes = _grains(strip, WIDTH)
+    x, y, z = places.xyz.T
+
+    def judged(shift: float) -> tuple[BoolArray, set[tuple[int, int]]]:
+        moved = Places.of(np.column_stack([x, z]), y + shift, WIDTH)
+        flat = Places.of(np.column_stack([x, 0 * x]), moved.xyz[:, 1], WIDTH)
+        first, second, _ = moved.contacts(sizes)
+        pairs = set(zip(first.tolist(), second.tolist(), strict=True))
+        return packing.unshadowed(flat, z, sizes / 2), pairs
+
+    free, touching = judged(0.0)
+    assert 0.8 < free.sum() / (WIDTH * np.ptp(x)) < 2.0
+    for shift in (0.5, 1.7, 3.9):
+        again, pairs = judged(shift)
+        np.testing.assert_array_equal(again, free)
+        assert pairs == touching
 
 
 def test_one_size_is_the_equal_case(tmp_path: Path) -> None:
-    equal, mixture = (_poured(_bed(sizes), tmp_path) for sizes in (None, ((1.0, 1.0),)))
+    equal, mixture = (_run(_plane(sizes), tmp_path) for sizes in (None, ((1.0, 1.0),)))
     assert equal.name != mixture.name
-    for one, other in zip(_grains(equal), _grains(mixture), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(_grains(equal)[0].xyz, _grains(mixture)[0].xyz, rtol=0, atol=1e-12)
 
 
 class Lattice(PouredBed):
     """Equal grains that rain row by row, each above its pocket."""
 
     @cached_property
-    def _grains(self) -> tuple[FloatArray, FloatArray]:
+    def grains(self) -> tuple[FloatArray, FloatArray]:
         floor = self.mould.floor
         rows = [floor[: len(floor) - row] + np.array([row / 2, 0.0, 1.1 * row]) for row in range(5)]
         centres = np.vstack(rows)
@@ -102,33 +149,13 @@ class Lattice(PouredBed):
 
 
 def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> None:
-    one = _bed(None)
-    lattice = Lattice(one.line, 3.0, SURFACE, None, 1.0, 35.0, 0)
-    centres, _ = _grains(_poured(lattice, tmp_path))
-    row = np.rint((centres[:, 1] + 3) / np.sin(np.pi / 3))
-    np.testing.assert_allclose(centres[:, 1] + 3, row * np.sin(np.pi / 3), atol=2e-3)
-    place = centres[:, 0] - row / 2 - lattice.mould.floor[0, 0]
+    lattice = Lattice(_plane().line, 3.0, SURFACE, None, 1.0, 35.0, 0)
+    x, _, z = _grains(_run(lattice, tmp_path))[0].xyz.T
+    row = np.rint((z + 3) / np.sin(np.pi / 3))
+    np.testing.assert_allclose(z + 3, row * np.sin(np.pi / 3), atol=2e-3)
+    place = x - row / 2 - lattice.mould.floor[0, 0]
     np.testing.assert_allclose(place, np.rint(place), atol=5e-3)
     assert row.max() == 4
-
-
-def test_equal_grains_are_exposed_as_those_of_a_lattice() -> None:
-    line = triangle(20.0, 12.0)
-    lattice = packing.pile(
-        line, entrainment_angle_deg=60.0, gap=1 / 30, pattern="aligned", mobile_layers=2
-    )
-    segment, along = line.nearest(lattice.centres)
-    away = np.einsum("nk,nk->n", lattice.centres - line.corners[segment], line.normals[segment])
-    free = poured.unshadowed(along, away, lattice.sizes / 2)
-    face = (segment == line.windward) & (along < line.crest_s - 1) & (along > 1)
-    np.testing.assert_array_equal(free[face], lattice.windward[face])
-
-
-def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:
-    along, height = np.array([0.0, 0.7, 2.0]), np.array([1.0, 0.5, 0.5])
-    radii = np.array([1.0, 0.3, 0.5])
-    assert poured.unshadowed(along, height, radii).tolist() == [True, False, True]
-    assert poured.unshadowed(along, height, radii / 2).tolist() == [True, True, True]
 
 
 @pytest.mark.parametrize("width", [0.0, 8.0])
@@ -137,40 +164,64 @@ def test_grains_in_the_air_touch_nothing(sizes: Sizes | None, width: float) -> N
     # a step that is nearly upright, and a slope: their fixed grains stand beside those in the air
     line = BedLine((-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0)
     bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3, width)
-    centres, diameters = bed._grains
+    centres, diameters = bed.grains
     fixed, (start, end) = len(bed.mould.floor), bed.mould.ends
-    touching = poured.contacts(Places(centres, width), diameters, 0.0)
-    assert not (touching.max(axis=1) >= fixed).any()
+    first, second, _ = Places(centres, width).contacts(diameters, 0.0)
+    assert (first < fixed).all()
+    assert (second < fixed).all()
     falling = centres[fixed:, 0]
     assert (falling - diameters[fixed:] / 2 > start).all()
     assert (falling + diameters[fixed:] / 2 < end).all()
 
 
-def test_a_mould_that_holds_nothing_says_so(tmp_path: Path) -> None:
-    directory = tmp_path / "case"
-    directory.mkdir()
-    table = "stage,step,grains,ke\n1,5,3,0.0\n2,9,3,0.0\n3,12,{}\n"
-    (directory / "settling.csv").write_text(table.format("0,0.0"))
-    with pytest.raises(SolverError, match="no grain of the poured bed is left"):
-        _bed()._check_rest(directory)
-    (directory / "settling.csv").write_text(table.format("3,1.0"))
-    with pytest.raises(SolverError, match="does not come to rest"):
-        _bed()._check_rest(directory)
+@pytest.mark.parametrize(
+    ("last", "word"),
+    [("0,0.0", "no grain of the poured bed is left"), ("3,1.0", "does not come to rest")],
+)
+def test_a_bed_that_is_none_or_moves_is_noticed(tmp_path: Path, last: str, word: str) -> None:
+    table = f"stage,step,grains,ke\n1,5,3,0.0\n2,9,3,0.0\n3,12,{last}\n"
+    (tmp_path / "settling.csv").write_text(table)
+    (tmp_path / "log.liggghts").write_text("the protocol has ended")
+    with pytest.raises(SolverError, match=word):
+        _plane().collect(tmp_path)
 
 
 def test_a_grain_stands_as_high_as_its_lowest_point_over_the_local_bed() -> None:
     line = BedLine((-9.0, 0.0, 60.0, 69.0), (0.0, 0.0, 0.0, 0.0), 1.0)
-    x = np.arange(0.5, 60)
-    height = np.where(x == 30.5, 0.4, 0.0) + 0.5
-    row = packing.Packing(
-        centres=np.column_stack([x, height]),
-        sizes=np.where(x == 40.5, 0.8, 1.0),
-        mobile=np.ones(60, bool),
-        windward=np.ones(60, bool),
-        lee=np.zeros(60, bool),
-        arc_length=x,
-    )
-    found = poured.standing(row, line)
+    x, every = np.arange(0.5, 60), np.ones(60, bool)
+    centres = np.column_stack([x, np.where(x == 30.5, 0.4, 0.0) + 0.5])
+    sizes = np.where(x == 40.5, 0.8, 1.0)
+    found = poured.standing(packing.Packing(centres, sizes, every, every, ~every, x), line)
     assert found[5] == pytest.approx(0.0, abs=1e-12)
     assert found[30] == pytest.approx(0.4 - 0.4 / 10, rel=0.1)
     assert found[40] == pytest.approx(0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("bed", "grain", "method", "word"),
+    [
+        ('packing = "poured", width = 2.5', "", "dem", "less than 3 of the largest grains"),
+        ('packing = "poured", width = 4.0', "{ sigma_g = 1.4 }", "dem", "at least 5.88"),
+        ('packing = "aligned", width = 5.0', "", "dem", "one layer in the plane"),
+        ('packing = "poured", width = 5.0', "", "peeling", "in the plane of the flow alone"),
+        ('packing = "poured", width = 80.0', "", "dem", "bed.width"),
+    ],
+)
+def test_a_strip_that_cannot_be_is_refused(bed: str, grain: str, method: str, word: str) -> None:
+    text = f"""
+    grain = {{ diameter = 1e-3 {", sizes = " + grain if grain else ""} }}
+    bed = {{ kind = "pile", shape = "flat", length = 0.02, {bed} }}
+    flow = {{ model = "flat" }}
+    protocol = {{ method = "{method}" }}
+    """
+    with pytest.raises(InputError, match=rf"bed\.width.*{word}|{word}.*"):
+        _ = study.parse(text, name="strip", where="test").scenes
+
+
+def test_a_bed_of_too_many_or_too_few_grains_is_refused() -> None:
+    _strip(length=200.0).check_size()
+    with pytest.raises(InputError, match=r"bed\.width"):
+        _strip(length=1000.0, width=20.0).check_size()
+    for length in (1.0, 1e-9):
+        with pytest.raises(InputError, match=r"bed\.length: a poured bed of .* grains"):
+            _strip(length=length).check_size()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import between_flats
+from orchestrator.bed.line import between_flats
 from orchestrator.errors import Exploded, InputError, SolverError, Stalled
 from orchestrator.flow import diagnostics
 from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase

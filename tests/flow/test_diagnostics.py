@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.line import triangle
 from orchestrator.flow import diagnostics, theory
 from orchestrator.flow.stress import WallStress
 

@@ -9,7 +9,7 @@ import meshio
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import between_flats, of_bed
+from orchestrator.bed.line import between_flats, of_bed
 from orchestrator.errors import SolverError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import Mesh, first_cell_heights, smallest_jacobian, write_mesh
@@ -17,7 +17,8 @@ from orchestrator.flow.model import model
 from orchestrator.runs import assets, case
 from orchestrator.study import study
 from orchestrator.study.scene import default_first_cell_height
-from tests.bed.test_shapes import SHAPES, H, bed
+from tests.bed.test_line import BEDS as SHAPES
+from tests.bed.test_line import H, bed
 from tests.flow.conftest import PILE
 
 

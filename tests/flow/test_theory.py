@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.bed.line import BedLine
-from orchestrator.bed.shapes import triangle
+from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS
 from orchestrator.flow.stress import WallStress

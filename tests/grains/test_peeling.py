@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from orchestrator.bed.packing import Places
 from orchestrator.grains import peeling
 from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.types import FloatArray
 
-FloatArray = NDArray[np.float64]
-MARKER = 0.3
+CRITERION = 0.3
 
 
 def _flows(
@@ -32,9 +32,7 @@ def _flows(
     loading = Loading(square, lifting, np.sqrt(drag), along, outward)
     table = ForceTable(square, lifting, weight=1.0, unit=1.0)
     tables = [table] * len(centres)
-    return peeling.flows(
-        centres, np.ones(len(centres)), loading, tables, along=along, marker=MARKER
-    )
+    return peeling.flows(Places.of(centres), np.ones(len(centres)), loading, tables, CRITERION)
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
@@ -48,8 +46,8 @@ def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(size: flo
         *np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2),
     )
     tables = [ForceTable(np.square, np.zeros_like, weight=1.0, unit=1.0)] * 3
-    alone = peeling.pivots(centres, sizes, loading, tables)
-    found = peeling.flows(centres, sizes, loading, tables, along=loading.along, marker=MARKER)
+    alone = peeling.pivots(Places.of(centres), sizes, loading, tables)
+    found = peeling.flows(Places.of(centres), sizes, loading, tables, CRITERION)
     assert found[0] == alone[0] == pytest.approx(math.sqrt(0.5 / half), rel=1e-9)
 
 
@@ -75,8 +73,7 @@ def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(slope_deg: float)
 
     def leaving(places: FloatArray, by: FloatArray, way: FloatArray, out: FloatArray) -> FloatArray:
         loading = Loading(np.square, np.square, by, way, out)
-        push = np.where(by < 0, -1.0, 1.0)[:, None] * way
-        return peeling.flows(places, sizes, loading, tables, along=push, marker=MARKER)
+        return peeling.flows(Places.of(places), sizes, loading, tables, CRITERION)
 
     back = leaving(centres, -ratio, along, outward)
     turned = leaving(centres * turn, ratio, -along * turn, outward * turn)

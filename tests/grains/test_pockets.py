@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from orchestrator.bed.places import Places
-from orchestrator.grains import deck, motion, pockets, protocol, threshold
+from orchestrator.bed.packing import Places
+from orchestrator.grains import deck, motion, peeling, protocol, threshold
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.runs import assets
 from orchestrator.study.parts import Grain, Protocol
@@ -50,9 +50,9 @@ def _loading() -> Loading:
 def test_the_pyramid_of_three_contacts_is_the_closed_form() -> None:
     places, loading = _grains(), _loading()
     tables = [ForceTable(np.square, np.zeros_like, 1.0, 0.5)] * len(loading.ratio)
-    found = pockets.pivots(places, np.ones(len(tables)), loading, tables)[3::4]
+    found = peeling.pivots(places, np.ones(len(tables)), loading, tables)[3::4]
     np.testing.assert_allclose(found**2, [_drag(turned) for turned in TURNED], rtol=1e-9)
-    angles = pockets.pivot_angles_deg(places, np.ones(len(tables)), loading.along)[3::4]
+    angles = peeling.pivot_angles_deg(places, np.ones(len(tables)), loading.along)[3::4]
     np.testing.assert_allclose(np.tan(np.radians(angles)), found**2, rtol=1e-9)
 
 

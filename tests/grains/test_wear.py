@@ -25,8 +25,8 @@ from orchestrator.study import study
 from orchestrator.study.parts import Grain
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
-from tests.bed.test_shapes import SHAPES
-from tests.bed.test_shapes import bed as bed_of
+from tests.bed.test_line import BEDS
+from tests.bed.test_line import bed as bed_of
 
 PILE = """
 grain = {{ diameter = 1e-3, stiffness = 1e3 }}
@@ -46,7 +46,7 @@ def _scene(more: str = "") -> Scene:
     return found
 
 
-BEDS = """
+METHODS = """
 [[group]]
 [group.axes]
 "protocol.method" = ["peeling", "dem"]
@@ -65,7 +65,7 @@ class Done(NamedTuple):
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """One pile by both methods, on a bed that changes and on a frozen one."""
     space = Workspace(tmp_path_factory.mktemp("wear") / "out")
-    asked = study.parse(PILE.format(more=BEDS), name="wear", where="test")
+    asked = study.parse(PILE.format(more=METHODS), name="wear", where="test")
     planned = plan.make(asked)
     with space.held(STUDY, "wear"):
         assert not pipeline.complete(planned.cases, space, workers=2, limit_s=600.0)
@@ -85,11 +85,10 @@ def worn(results: Results) -> dict[str, Done]:
 
 X, Z = (0.0, 0.02, 0.06, 0.1, 0.14, 0.18), (0.0, 0.0, -0.01, 0.005, 0.0, 0.0)
 WORN: dict[str, dict[str, Any]] = {
-    **SHAPES,
-    "step up": {"shape": "step up", "slope_deg": 25.0},
+    **BEDS,
     "everything": {"counted": "all"},
     "trough": {"profile": Profile("trough", X, Z, "", "trough"), "height": 0.015},
-    "level behind a fence": {**SHAPES["flat"], **SHAPES["fence"]},
+    "level behind a fence": {**BEDS["flat"], **BEDS["fence"]},
 }
 
 

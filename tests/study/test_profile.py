@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import of_bed
+from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.study import profile, study
 from orchestrator.study.parts import PileBed

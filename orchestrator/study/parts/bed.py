@@ -1,25 +1,25 @@
 """The bed of a scene: one grain on its neighbours, or grains under a bed line."""
 
 from math import radians, tan
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, InstanceOf, PlainSerializer, field_validator
 
 from orchestrator.study.part import Height, Info, Length, Part, Roughness, unless
 from orchestrator.study.profile import Profile
+from orchestrator.study.shapes import SHAPES, Shape
 
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
-Shape = Literal[
-    "triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "step up", "step down", "flat"
-]
+if TYPE_CHECKING:
+    ShapeName = str
+else:
+    ShapeName = Literal[tuple(SHAPES)]
 Range = tuple[float, float]
 File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
 BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
     "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
 }
-SLIP_FACE_DEG = 30.0
-"""Lee slope of a dune and of a step down."""
 LEVEL = 4.0
 """Length of level bed with grains, over the height."""
 
@@ -88,23 +88,13 @@ class PileBed(Bed):
     """height of the forms that the flow goes over; that of a profile follows from it, and over a
     flat bed with obstacles the flow is measured in the height of the tallest"""
     shape: Annotated[
-        Shape,
+        ShapeName,
         unless("triangle"),
         Info(
             "shape",
             column="bed_shape",
             scope="piles",
-            choices={
-                "triangle": "two straight faces",
-                "dune": "a windward side and a slip face",
-                "cosine": "one wave of a cosine, from trough to trough",
-                "gaussian": "a Gaussian hill",
-                "rushil": "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
-                "trapezoid": "two straight faces and a level top",
-                "step up": "a straight face up to higher ground",
-                "step down": "a straight face down to lower ground",
-                "flat": "level bed",
-            },
+            choices={name: shape.meaning for name, shape in SHAPES.items()},
         ),
     ] = "triangle"
     """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
@@ -210,10 +200,14 @@ class PileBed(Bed):
         return tuple(value) if isinstance(value, list) else value
 
     @property
+    def form(self) -> Shape:
+        """The facts of its shape."""
+        return SHAPES[self.shape]
+
+    @property
     def lee_slope(self) -> float:
         """Slope of a straight lee side, degrees."""
-        steep = self.shape in ("dune", "step down")
-        return self.lee_slope_deg or (SLIP_FACE_DEG if steep else self.slope_deg)
+        return self.lee_slope_deg or self.form.lee_slope_deg or self.slope_deg
 
     @property
     def level_length(self) -> float:
@@ -230,8 +224,7 @@ class PileBed(Bed):
     @property
     def counts(self) -> str | Range:
         """Which exposed grains are counted."""
-        everywhere = self.profile or self.shape in ("flat", "step down")
-        return self.counted or ("all" if everywhere else "windward")
+        return self.counted or ("all" if self.profile else self.form.counted)
 
     @property
     def is_level(self) -> bool:

@@ -5,30 +5,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.bed.shapes import of_bed, rushil_aspect, rushil_hill, triangle
+from orchestrator.bed.line import of_bed, triangle
 from orchestrator.study.parts import Obstacle, PileBed, UnfitError
+from orchestrator.study.shapes import SHAPES, rushil_aspect, rushil_hill
 
 H = 0.02
 
 
 def bed(**fields: Any) -> PileBed:
-    common = {"kind": "pile", "height": H, "roughness": H / 600, "slope_deg": 15.0}
-    return PileBed.model_validate({**common, **fields})
+    common = {"kind": "pile", "height": H, "roughness": H / 600}
+    slope = 15.0 if SHAPES[fields.get("shape", "triangle")].rises else 0.0
+    return PileBed.model_validate({"slope_deg": slope, **common, **fields})
 
 
-SHAPES: dict[str, dict[str, Any]] = {
-    "triangle": {},
-    "dune": {"shape": "dune"},
+BEDS: dict[str, dict[str, Any]] = {
+    **{name: {"shape": name} for name in SHAPES},
     "curved dune": {"shape": "dune", "windward": "curved"},
     "rounded dune": {"shape": "dune", "brink_radius": H},
     "curved and rounded": {"shape": "dune", "windward": "curved", "brink_radius": H},
-    "cosine": {"shape": "cosine"},
-    "gaussian": {"shape": "gaussian"},
-    "rushil": {"shape": "rushil"},
-    "trapezoid": {"shape": "trapezoid"},
-    "step up": {"shape": "step up", "slope_deg": 40.0},
-    "step down": {"shape": "step down", "slope_deg": 0.0},
-    "flat": {"shape": "flat", "slope_deg": 0.0},
     "train": {"shape": "dune", "forms": 5},
     "apart": {"forms": 3, "spacing": 0.3},
     "fence": {"obstacles": (Obstacle(kind="fence", x=-0.1, height=0.01),)},
@@ -42,15 +36,27 @@ def test_the_triangle_is_what_a_bed_is_by_default() -> None:
     assert "shape" not in bed().model_dump()
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", BEDS)
 def test_a_line_goes_downstream_between_flat_beds(name: str) -> None:
-    line = of_bed(bed(**SHAPES[name]))
+    line = of_bed(bed(**BEDS[name]))
     assert np.all(np.diff(line.x) > 0)
     assert line.x[1] - line.x[0] == pytest.approx(10 * H)
     assert line.x[-1] - line.x[-2] == pytest.approx(20 * H)
     assert line.z[0] == line.z[1]
     assert line.z[-1] == pytest.approx(line.z[-2])
     assert np.interp(0.0, line.x, line.arc_lengths) == 0
+
+
+@pytest.mark.parametrize("name", [name for name in BEDS if SHAPES.get(name)])
+def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
+    shape, line = SHAPES[name], of_bed(bed(shape=name))
+    if shape.rises:
+        assert max(line.z) == pytest.approx(H)
+        assert line.slopes_deg.max() == pytest.approx(15.0, rel=0.01)
+    if "lee_slope_deg" in shape.fields:
+        assert line.slopes_deg.min() == pytest.approx(-(shape.lee_slope_deg or 15.0))
+        other = of_bed(bed(shape=name, lee_slope_deg=22.0))
+        assert other.slopes_deg.min() == pytest.approx(-22.0)
 
 
 @pytest.mark.parametrize(("aspect", "slope"), [(3.0, 26.2), (5.0, 16.4), (8.0, 10.5)])
@@ -64,18 +70,8 @@ def test_the_hills_of_rushil_have_their_length(aspect: float, slope: float) -> N
     assert slopes[0] / slopes[1] == pytest.approx(1 / (2**1.5 - 1), rel=0.06)
 
 
-@pytest.mark.parametrize(
-    "name", ["triangle", "dune", "cosine", "gaussian", "rushil", "trapezoid", "train"]
-)
-def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
-    line = of_bed(bed(**SHAPES[name]))
-    assert max(line.z) == pytest.approx(H)
-    assert line.slopes_deg.max() == pytest.approx(15.0, rel=0.01)
-
-
-def test_a_dune_has_a_slip_face_and_its_brink_may_be_rounded() -> None:
-    sharp, rounded = (of_bed(bed(**SHAPES[name])) for name in ("dune", "rounded dune"))
-    assert sharp.slopes_deg.min() == pytest.approx(-30.0)
+def test_the_brink_of_a_dune_may_be_rounded() -> None:
+    sharp, rounded = (of_bed(bed(**BEDS[name])) for name in ("dune", "rounded dune"))
     assert sharp.bends_deg.max() == pytest.approx(45.0)
     assert rounded.bends_deg.max() < 2.1
     # the arc lies within a radius of the tip, under it
@@ -83,32 +79,31 @@ def test_a_dune_has_a_slip_face_and_its_brink_may_be_rounded() -> None:
     assert rounded.slopes_deg.min() == pytest.approx(-30.0)
 
 
-def test_beyond_its_ends_the_end_of_a_line_is_nearest() -> None:
-    line = of_bed(bed())
+def test_the_nearest_place_on_a_line() -> None:
+    line = triangle(30.0, 10.0)
+    points = np.array([[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0]])
+    np.testing.assert_allclose(line.nearest(points)[1], [0.0, 20.0, 40.0], atol=1e-12)
     far = 10 * line.x[-1]
     segment, s = line.nearest(np.array([[-far, 0.0], [far, 0.0]]))
     assert segment.tolist() == [0, len(line.lengths) - 1]
     assert s.tolist() == [line.arc_lengths[0], line.arc_lengths[-1]]
 
 
-def test_forms_of_a_train_are_alike() -> None:
-    line, one = of_bed(bed(**SHAPES["apart"])), of_bed(bed())
+def test_forms_of_a_train_are_alike_and_do_not_overlap() -> None:
+    line, alone = of_bed(bed(**BEDS["apart"])), of_bed(bed())
+    x = np.linspace(0, alone.x[-2], 50)
     for place in range(3):
-        x = np.linspace(0, one.x[-2], 50)
-        np.testing.assert_allclose(line.height(x + 0.3 * place), one.height(x), atol=1e-12)
-
-
-def test_forms_that_overlap_are_refused() -> None:
+        np.testing.assert_allclose(line.height(x + 0.3 * place), alone.height(x), atol=1e-12)
     with pytest.raises(UnfitError, match=r"bed.spacing: forms 0.149\d* m long overlap at 0.1 m"):
         of_bed(bed(forms=2, spacing=0.1))
 
 
-@pytest.mark.parametrize(("name", "x", "z"), [("fence", -0.1, 0.01), ("cylinder", 0.3, 0.005)])
-def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str, x: float, z: float) -> None:
-    line = of_bed(bed(**SHAPES[name]))
-    assert float(line.height(np.array(x))) == pytest.approx(z)
+@pytest.mark.parametrize("name", ["fence", "cylinder"])
+def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str) -> None:
+    line, (obstacle,) = of_bed(bed(**BEDS[name])), BEDS[name]["obstacles"]
+    assert float(line.height(np.array(obstacle.x))) == pytest.approx(obstacle.height)
     ((start, end),) = line.bare
-    assert start < x < end
+    assert obstacle.x - obstacle.reach <= start < obstacle.x < end <= obstacle.x + obstacle.reach
     assert np.abs(line.slopes_deg).max() < 75.1
     np.testing.assert_allclose(line.height(np.array([start, end])), 0.0, atol=1e-12)
 
@@ -117,7 +112,7 @@ def test_an_obstacle_stands_on_the_bed_and_is_bare(name: str, x: float, z: float
     ("name", "slope"), [("triangle", 15.0), ("dune", 15.0), ("step up", 0.0), ("train", 0.0)]
 )
 def test_the_roof_is_clear_of_the_forms(name: str, slope: float) -> None:
-    line = of_bed(bed(**SHAPES[name]))
+    line = of_bed(bed(**BEDS[name]))
     found, ridge = line.roof(0.001)
     assert found == pytest.approx(slope, abs=1e-9)
     inner = line.corners[1:-1] - ridge

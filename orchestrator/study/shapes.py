@@ -1,0 +1,220 @@
+"""The shapes of a form on the bed: what each is called, which fields it has, and its corners.
+
+The corners of a form, shape (n, 2), go downstream from its foot at the origin to its toe, m. A new
+shape is one entry of `SHAPES`; mesh, packing, checks, labels and the study file follow.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from math import cos, exp, log, pi, radians, sin, sqrt, tan
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from orchestrator.types import FloatArray
+
+if TYPE_CHECKING:
+    from orchestrator.study.parts.bed import PileBed
+
+CHORDS = 40
+"""Chords of the windward side of a form that is a curve."""
+GAUSSIAN_END = 3.5
+"""Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its height."""
+ARC_DEG = 2.0
+"""Bend of the bed between two chords of a rounded brink."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The facts of one shape.
+
+    Attributes
+    ----------
+    name, meaning : str
+        What a study file calls it, and its description there.
+    corners : callable
+        Corners of one form of a `PileBed`.
+    fields : tuple of str
+        Fields of the bed that not all shapes have, and this one has.
+    rises : bool
+        Whether it has a windward side, whose slope is the bed's.
+    lee_slope_deg : float or None
+        Slope of the lee side by default; None: that of the windward side.
+    counted : {"windward", "all"}
+        Which exposed grains are counted by default.
+    label : str
+        Its name in figures.
+    """
+
+    name: str
+    meaning: str
+    corners: Callable[["PileBed"], FloatArray]
+    fields: tuple[str, ...] = ()
+    rises: bool = True
+    lee_slope_deg: float | None = None
+    counted: Literal["windward", "all"] = "windward"
+    label: str = ""
+
+
+def _faces(bed: "PileBed", top: float = 0.0) -> FloatArray:
+    """Two straight faces, with a level top between them."""
+    up, down = (bed.height / tan(radians(slope)) for slope in (bed.slope_deg, bed.lee_slope))
+    ends = [[up, bed.height], [up + top, bed.height]] if top else [[up, bed.height]]
+    return np.array([[0, 0], *ends, [up + top + down, 0]])
+
+
+def _dune(bed: "PileBed") -> FloatArray:
+    """A windward side, straight or curved, and a slip face; its brink sharp or rounded."""
+    if bed.windward == "curved":
+        t = np.linspace(0, 1, CHORDS + 1)
+        face = bed.height / tan(radians(bed.slope_deg))
+        windward = np.column_stack([pi / 2 * face * t, bed.height / 2 * (1 - np.cos(pi * t))])
+    else:
+        windward = _faces(bed)[:2]
+    slip = windward[-1] + [bed.height / tan(radians(bed.lee_slope)), -bed.height]
+    corners = np.vstack([windward, slip])
+    return _rounded(corners, bed.brink_radius) if bed.brink_radius else corners
+
+
+def _rounded(corners: FloatArray, radius: float) -> FloatArray:
+    """A dune with an arc in place of its brink, which touches the line before and behind it."""
+    brink = len(corners) - 2
+    steps = np.diff(corners, axis=0)
+    rise = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    behind = rise[brink]
+    # the arc begins on the chord from which it can reach the slip face
+    for first in range(brink - 1, -1, -1):
+        start, direction = corners[first], rise[first]
+        ways = np.array([[cos(direction), -cos(behind)], [sin(direction), -sin(behind)]])
+        meet = start + np.linalg.solve(ways, corners[brink] - start)[0] * ways[:, 0]
+        cut = radius * tan((direction - behind) / 2)
+        if cut <= np.hypot(*(meet - start)):
+            break
+    count = int(np.ceil(np.degrees(direction - behind) / ARC_DEG)) + 1
+    angles = np.linspace(direction, behind, count)
+    begin = meet - cut * np.array([cos(direction), sin(direction)])
+    centre = begin + radius * np.array([sin(direction), -cos(direction)])
+    arc = centre + radius * np.column_stack([-np.sin(angles), np.cos(angles)])
+    # no sliver between a corner and the arc
+    near = np.hypot(*(arc[0] - corners[first])) < np.hypot(*(arc[1] - arc[0])) / 2
+    return np.vstack([corners[: first + (not near or not first)], arc, corners[brink + 1 :]])
+
+
+def _cosine(bed: "PileBed") -> FloatArray:
+    t = np.linspace(0, 1, 2 * CHORDS + 1)
+    length = pi * bed.height / tan(radians(bed.slope_deg))
+    return np.column_stack([length * t, bed.height / 2 * (1 - np.cos(2 * pi * t))])
+
+
+def _gaussian(bed: "PileBed") -> FloatArray:
+    t = np.linspace(-GAUSSIAN_END, GAUSSIAN_END, 3 * CHORDS + 1)
+    deviation = bed.height / tan(radians(bed.slope_deg)) / sqrt(exp(1))
+    end = exp(-(GAUSSIAN_END**2) / 2)
+    z = bed.height * (np.exp(-(t**2) / 2) - end) / (1 - end)
+    return np.column_stack([deviation * (t + GAUSSIAN_END), z])
+
+
+def _rushil(bed: "PileBed") -> FloatArray:
+    x, z = rushil_hill(rushil_aspect(bed.slope_deg))
+    return bed.height * np.column_stack([x - x[0], z])
+
+
+def rushil_hill(aspect: float) -> tuple[FloatArray, FloatArray]:
+    """X from the top and z of a hill of RUSHIL over its height, by its half length over that.
+
+    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
+    case 69: xi = a sin(t) runs from one foot to the other.
+    """
+    t = np.linspace(-pi / 2, pi / 2, 100 * CHORDS + 1)
+    m = 1 / aspect + sqrt(1 / aspect**2 + 1)
+    q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
+    xs, zs = aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+    # equal steps of t would crowd at the feet, where x is level in it
+    x = np.linspace(-aspect, aspect, 2 * CHORDS + 1)
+    return x, np.interp(x, xs, zs)
+
+
+@cache
+def rushil_aspect(slope_deg: float) -> float:
+    """Half length over height of the hill of RUSHIL whose steepest slope is given, degrees."""
+
+    def steeper(logarithm: float) -> float:
+        x, z = rushil_hill(exp(logarithm))
+        return float(np.max(np.diff(z) / np.diff(x))) - tan(radians(slope_deg))
+
+    return exp(brentq(steeper, log(0.1), log(1e3)))
+
+
+def _step_up(bed: "PileBed") -> FloatArray:
+    face = bed.height / tan(radians(bed.slope_deg))
+    return np.array([[0, 0], [face, bed.height], [face + bed.level_length, bed.height]])
+
+
+def _step_down(bed: "PileBed") -> FloatArray:
+    face = bed.height / tan(radians(bed.lee_slope))
+    return np.array([[0, 0], [bed.level_length, 0], [bed.level_length + face, -bed.height]])
+
+
+TRAIN, LEE = ("forms", "spacing"), ("lee_slope_deg",)
+SLIP_FACE_DEG = 30.0
+"""Lee slope of a dune and of a step down."""
+SHAPES = {
+    shape.name: shape
+    for shape in (
+        Shape("triangle", "two straight faces", _faces, (*TRAIN, *LEE)),
+        Shape(
+            "dune",
+            "a windward side and a slip face",
+            _dune,
+            ("windward", "brink_radius", *TRAIN, *LEE),
+            lee_slope_deg=SLIP_FACE_DEG,
+        ),
+        Shape(
+            "cosine",
+            "one wave of a cosine, from trough to trough",
+            _cosine,
+            TRAIN,
+            label="wave of a cosine",
+        ),
+        Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, label="Gaussian hill"),
+        Shape(
+            "rushil",
+            "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
+            _rushil,
+            TRAIN,
+            label="hill of RUSHIL",
+        ),
+        Shape(
+            "trapezoid",
+            "two straight faces and a level top",
+            lambda bed: _faces(bed, bed.level_length),
+            ("length", *TRAIN, *LEE),
+        ),
+        Shape("step up", "a straight face up to higher ground", _step_up, ("length",)),
+        Shape(
+            "step down",
+            "a straight face down to lower ground",
+            _step_down,
+            ("length", *LEE),
+            rises=False,
+            lee_slope_deg=SLIP_FACE_DEG,
+            counted="all",
+        ),
+        Shape(
+            "flat",
+            "level bed",
+            lambda bed: np.array([[0, 0], [bed.level_length, 0]]),
+            ("length",),
+            rises=False,
+            counted="all",
+        ),
+    )
+}
+"""All shapes, by what a study file calls them."""
+
+
+def having(field: str) -> tuple[str, ...]:
+    """Names of the shapes that have a field of the bed which others do not have; maybe none."""
+    return tuple(name for name, shape in SHAPES.items() if field in shape.fields)
