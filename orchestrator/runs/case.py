@@ -1,29 +1,32 @@
-"""A case directory: who it is, what it holds, how far it came. It knows nothing of any solver."""
+"""A case directory: its identity, its files, how far it came. It knows nothing of any solver."""
 
+import contextlib
 import os
 import re
+import stat
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
-from functools import cached_property
+from functools import cache, cached_property
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any, ClassVar
 
-from orchestrator.errors import SolverError
-from orchestrator.runs import assets
+from orchestrator.errors import OrchestratorError, SolverError
 from orchestrator.runs.files import (
+    TEMPORARY,
+    Folder,
     canonical_json,
     digest_file,
     digest_files,
     digest_text,
     read_json,
-    remove_empty_folders,
     size_of,
     write_durably,
     write_json,
 )
-from orchestrator.runs.folder import TEMPORARY, Folder
 
+PACKAGE = Path(__file__).resolve().parents[1]
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """Name of a case's directory."""
 IDENTITY = "case.json"
@@ -32,6 +35,48 @@ FAILED = "failed.json"
 CHECKSUMS = "results.sha256"
 LOG = "log.Allrun"
 STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
+GENERATED = (
+    *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
+    *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
+)
+"""Files that a run by hand leaves in the template's own folder; no part of the template."""
+
+
+def templates() -> Path:
+    """The folder of the solvers' templates: beside the package, or inside it in a wheel."""
+    inside = PACKAGE / "templates"
+    return inside if inside.is_dir() else PACKAGE.parent / "templates"
+
+
+@cache
+def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
+    """Path, mode and content of each file of a template, read once.
+
+    Raises
+    ------
+    OrchestratorError
+        If the package lacks it.
+    """
+    root = templates() / name
+    if not root.is_dir():
+        raise OrchestratorError(
+            "the package lacks this directory of templates",
+            where=str(root),
+            remedy="install the package again",
+        )
+    files = []
+    for path in sorted(path for path in root.rglob("*") if path.is_file()):
+        parts = path.relative_to(root).parts
+        if not any(fnmatchcase(part, pattern) for part in parts for pattern in GENERATED):
+            files.append(("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes()))
+    return tuple(files)
+
+
+@cache
+def template_digest(name: str) -> str:
+    """One digest of every file of a template, names included."""
+    digests = {path: sha256(content).hexdigest() for path, _, content in template_files(name)}
+    return digest_text(canonical_json(digests))
 
 
 class Case(ABC):
@@ -106,7 +151,7 @@ class Case(ABC):
                 {
                     "kind": self.kind,
                     "recipe": self.recipe,
-                    "template": assets.template_digest(self.template),
+                    "template": template_digest(self.template),
                     "parameters": self.parameters,
                     "needs": [case.id for case in self.needs],
                 }
@@ -122,24 +167,40 @@ class Case(ABC):
 def prepare(case: Case, cases: Path) -> Path:
     """Make the case's directory afresh, inputs and identity, and return it.
 
-    What an interrupted run left there is thrown away: it is never trusted half-written. What else
-    lies there, an input that someone has changed too, is kept aside: a solver might read it.
+    The files that an interrupted run left there are removed: they are never trusted half-written.
+    Other files, also inputs that a user has changed, are kept aside: a solver might read them.
     """
     cases.mkdir(parents=True, exist_ok=True)
-    is_ours = _made_by(case, cases / case.name)
+    old = cases / case.name
+    identity = read_json(old / IDENTITY)
+    inputs = identity.get("inputs_sha256") if isinstance(identity, dict) else None
+    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
+    names = {path for path, _, _ in template_files(case.template)}
+
+    def is_ours(name: str) -> bool:
+        if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
+            return bool(inputs[name] == _digest(old / name))
+        path = PurePosixPath(name)
+        final = path.with_name(TEMPORARY.sub(r"\1", path.name)).as_posix()
+        return final in names or _fits(final, patterns)
+
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
-    assets.copy_template(case.template, directory)
+    directory.mkdir()
+    for name, mode, content in template_files(case.template):
+        (directory / name).parent.mkdir(parents=True, exist_ok=True)
+        (directory / name).write_bytes(content)
+        (directory / name).chmod(mode)
     case.write(directory, cases)
-    inputs = [path for path in directory.rglob("*") if path.is_file()]
+    written = [path for path in directory.rglob("*") if path.is_file()]
     identity = {
         "id": case.id,
         "kind": case.kind,
         "recipe": case.recipe,
         "template": case.template,
-        "template_sha256": assets.template_digest(case.template),
+        "template_sha256": template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
-        "inputs_sha256": digest_files(inputs, root=directory),
+        "inputs_sha256": digest_files(written, root=directory),
         "programs": case.versions(),
     }
     write_json(directory / IDENTITY, identity)
@@ -151,24 +212,22 @@ def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s
     results = digest_files(_matching(directory, case.results), root=directory)
     derived = digest_files(_matching(directory, case.derived), root=directory)
     bulky = (path.relative_to(directory).as_posix() for path in _matching(directory, case.bulky))
-    stamps = {name: list(_stamp(directory / name)) for name in {*results, *derived, *bulky}}
+    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     write_durably(directory / CHECKSUMS, sums)
     (directory / FAILED).unlink(missing_ok=True)
-    write_json(
-        directory / DONE,
-        {
-            "id": case.id,
-            "ended": "done",
-            "solver_s": solver_s,
-            "cpu_s": cpu_s,
-            "wall_s": wall_s,
-            "results_sha256": results,
-            "derived_sha256": derived,
-            "stamps": stamps,
-            "bytes": size_of(directory),
-        },
-    )
+    marker = {
+        "id": case.id,
+        "ended": "done",
+        "solver_s": solver_s,
+        "cpu_s": cpu_s,
+        "wall_s": wall_s,
+        "results_sha256": results,
+        "derived_sha256": derived,
+        "stamps": stamps,
+        "bytes": size_of(directory),
+    }
+    write_json(directory / DONE, marker)
 
 
 def fail(directory: Path, error: SolverError) -> None:
@@ -177,27 +236,55 @@ def fail(directory: Path, error: SolverError) -> None:
         write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
 
 
+def ended(directory: Path) -> tuple[str, str] | None:
+    """In which way the case in a directory failed, and why; None if it is not known to have."""
+    if not os.path.isfile(directory / FAILED):  # nor where it cannot be seen
+        return None
+    state = read_json(directory / FAILED)
+    if not isinstance(state, dict):
+        return "", "its note of failure cannot be read"
+    return str(state.get("ended", "")), str(state.get("cause", ""))
+
+
 def failure(directory: Path) -> str | None:
     """Why the case in a directory failed, or None if it is not known to have failed.
 
     The word for its end comes first where it says more than that it failed.
     """
-    path = directory / FAILED
-    if not os.path.isfile(path):  # nor where it cannot be seen
+    end = ended(directory)
+    if end is None or end[0] in ("", SolverError.ended):
+        return end and end[1]
+    return f"{end[0]}: {end[1]}"
+
+
+def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
+    """The marker of a finished case, or None where anything about it cannot be trusted.
+
+    A bulky file may be missing: `prune` drops it, and no table is made of it.
+    """
+    directory = cases / case.name
+    identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
+    if not (isinstance(identity, dict) and isinstance(state, dict)):
         return None
-    state = read_json(path)
-    if not isinstance(state, dict):
-        return "its note of failure cannot be read"
-    ended, cause = (str(state.get(key, "")) for key in ("ended", "cause"))
-    return cause if ended in ("", SolverError.ended) else f"{ended}: {cause}"
-
-
-def ended(directory: Path) -> tuple[str, str]:
-    """In which way the case in a directory failed, and why; empty where it is not known to have."""
-    state = read_json(directory / FAILED)
-    if not isinstance(state, dict):
-        return "", ""
-    return str(state.get("ended", "")), str(state.get("cause", ""))
+    if not identity.get("id") == state.get("id") == case.id:
+        return None
+    digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
+    try:
+        marked = (directory / DONE).stat().st_mtime_ns
+        for name, digest in digests.items():
+            path = directory / name
+            if _fits(name, case.bulky) and not os.path.lexists(path):
+                continue
+            # Digests of a thousand piles are those of 7 GB: they are compared only if size or time
+            # have changed. A file written in the same tick of the clock as the marker may have
+            # changed since without a trace, so its digest decides.
+            size, changed = _stamp(path)
+            untouched = [size, changed] == stamps.get(name) and changed < marked
+            if not untouched and digest_file(path) != digest:
+                return None
+    except OSError:
+        return None
+    return state if digests else None
 
 
 def is_done(case: Case, cases: Path) -> bool:
@@ -205,15 +292,11 @@ def is_done(case: Case, cases: Path) -> bool:
     return done_state(case, cases) is not None
 
 
-def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
-    """The marker of a finished case, or None where anything about it cannot be trusted."""
-    directory = cases / case.name
-    identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
-    if not isinstance(identity, dict) or identity.get("id") != case.id:
-        return None
-    if not isinstance(state, dict) or state.get("id") != case.id:
-        return None
-    return state if _vouched(case, directory, state) else None
+def is_whole(case: Case, cases: Path) -> bool:
+    """Whether a case is done and has all of its files: none was pruned, or a rerun made it anew."""
+    state = read_json(cases / case.name / DONE)
+    names = state.get("stamps", {}) if isinstance(state, dict) else {"": 0}
+    return all((cases / case.name / name).is_file() for name in names)
 
 
 def prune(case: Case, cases: Path) -> None:
@@ -225,11 +308,11 @@ def prune(case: Case, cases: Path) -> None:
     directory, state = cases / case.name, done_state(case, cases)
     if state is None:
         return
-    left_by_run = {directory / name for name in state["stamps"]}
-    files = [path for path in _matching(directory, case.bulky) if path in left_by_run]
-    for path in files:
-        path.unlink()
-    remove_empty_folders(directory, (path.parent for path in files))
+    for path in _matching(directory, case.bulky):
+        if path.relative_to(directory).as_posix() in state["stamps"]:
+            path.unlink()
+            with contextlib.suppress(OSError):  # it is not empty
+                os.removedirs(path.parent)
     marker = directory / DONE
     size_without_marker = size_of(directory) - marker.stat().st_size
     if state["bytes"] != size_without_marker:
@@ -237,24 +320,13 @@ def prune(case: Case, cases: Path) -> None:
 
 
 def size(directory: Path, state: Mapping[str, Any]) -> int:
-    """Bytes on disk of the case in a directory, whose marker says what it came to at its end."""
-    told = state.get("bytes")
-    try:
-        return told + (directory / DONE).stat().st_size if type(told) is int else size_of(directory)
-    except OSError:
-        return size_of(directory)
-
-
-def is_whole(case: Case, cases: Path) -> bool:
-    """Whether a case is done and has all of its files: none was pruned, or a rerun made it anew."""
-    state = read_json(cases / case.name / DONE)
-    if not isinstance(state, dict):
-        return False
-    return all((cases / case.name / name).is_file() for name in state.get("stamps", {}))
+    """Bytes on disk of the case in a directory, whose marker has its size at its end."""
+    size = state.get("bytes")
+    return size + size_of(directory / DONE) if type(size) is int else size_of(directory)
 
 
 def names_in(cases: Path) -> list[str]:
-    """Names of the directories of cases that are there, whoever asked for them."""
+    """Names of the directories of cases that are there, whichever study asked for them."""
     try:
         return sorted(name for name in os.listdir(cases) if NAME.fullmatch(name))
     except (FileNotFoundError, NotADirectoryError):
@@ -263,73 +335,31 @@ def names_in(cases: Path) -> list[str]:
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     """The programs, with versions, that some of the cases in a directory were made with."""
-    found: dict[str, str] = {}
+    versions: dict[str, str] = {}
     for name in sorted(names):
         identity = read_json(cases / name / IDENTITY)
-        found.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
-    return found
-
-
-def _vouched(case: Case, directory: Path, state: dict[str, Any]) -> bool:
-    """Whether the files of a case are those of its marker; bulky files may be missing."""
-    digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
-    try:
-        marked = (directory / DONE).stat().st_mtime_ns
-        return bool(digests) and all(
-            (_fits(name, case.bulky) and not os.path.lexists(directory / name))
-            or _untouched(directory / name, stamps.get(name), marked)
-            or digest_file(directory / name) == digest
-            for name, digest in digests.items()
-        )
-    except OSError:
-        return False
+        versions.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
+    return versions
 
 
 def _stamp(path: Path) -> tuple[int, int]:
     """Size, bytes, and time of the last change, ns."""
-    found = path.stat()
-    return found.st_size, found.st_mtime_ns
-
-
-def _untouched(path: Path, stamp: Any, marked: int) -> bool:
-    """Whether a file is as it was when the case was marked as done, at that time in ns.
-
-    Digests of a thousand piles are those of 7 GB. A file that was written in the same tick of the
-    clock as the marker may have been changed since without a trace: its digest has to tell.
-    """
-    size, changed = _stamp(path)
-    return [size, changed] == stamp and changed < marked
+    state = path.stat()
+    return state.st_size, state.st_mtime_ns
 
 
 def _matching(directory: Path, patterns: tuple[str, ...]) -> list[Path]:
     """The files in a directory that fit a pattern; no link is followed."""
     walked = (Path(path) / file for path, _, files in os.walk(directory) for file in files)
-    found = (path for path in walked if path.is_file() and not path.is_symlink())
-    return sorted(path for path in found if _fits(path.relative_to(directory).as_posix(), patterns))
+    files = (path for path in walked if path.is_file() and not path.is_symlink())
+    return sorted(path for path in files if _fits(path.relative_to(directory).as_posix(), patterns))
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:
     """Whether each part of a path fits that of a pattern."""
     parts = name.split("/")
     split = (pattern.split("/") for pattern in patterns)
-    return any(len(one) == len(parts) and all(map(fnmatchcase, parts, one)) for one in split)
-
-
-def _made_by(case: Case, directory: Path) -> Callable[[str], bool]:
-    """Tell the files of a case's run, and its inputs as they were written, from all others."""
-    told = read_json(directory / IDENTITY)
-    inputs = told.get("inputs_sha256") if isinstance(told, dict) else None
-    known = inputs if isinstance(inputs, dict) else {}
-    patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
-
-    def is_ours(name: str) -> bool:
-        if name in known and not _fits(name, case.made):
-            return bool(known[name] == _digest(directory / name))
-        path = PurePosixPath(name)
-        meant = path.with_name(TEMPORARY.sub(r"\1", path.name)).as_posix()
-        return meant in assets.template_names(case.template) or _fits(meant, patterns)
-
-    return is_ours
+    return any(len(each) == len(parts) and all(map(fnmatchcase, parts, each)) for each in split)
 
 
 def _digest(path: Path) -> str | None:

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import contextlib
+import heapq
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -9,6 +10,7 @@ from concurrent.futures import Executor, Future
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from orchestrator.errors import (
@@ -21,9 +23,7 @@ from orchestrator.errors import (
 )
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process
-from orchestrator.runs.agenda import Agenda
 from orchestrator.runs.case import Case
-from orchestrator.runs.cores import Cores
 
 POLL_S = 0.2
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -73,6 +73,38 @@ class Pool:
     task: Callable[[Case], float]
     places: int
     lost: tuple[type[Exception], ...] = ()
+
+
+class Cores:
+    """The cores of this machine, of which a solver takes one or several while it runs.
+
+    The first solver in the queue is served first: one that needs two cores does not wait for ever
+    while others take each single core that falls free.
+
+    Parameters
+    ----------
+    count : int
+        Number of cores.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = self._free = count
+        self._queue = threading.Lock()
+        self._changed = threading.Condition()
+
+    @contextlib.contextmanager
+    def held(self, wanted: int) -> Iterator[None]:
+        """Hold as many cores as are wanted, or all where there are fewer."""
+        taken = min(wanted, self._count)
+        with self._queue, self._changed:
+            self._changed.wait_for(lambda: self._free >= taken)
+            self._free -= taken
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._free += taken
+                self._changed.notify()
 
 
 @contextlib.contextmanager
@@ -190,8 +222,8 @@ def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
     SolverError
         Naming what is missing, or too old, and what to install.
     """
-    one_of_each = {one.kind: one for one in cases}.values()
-    for future in [pool.executor.submit(one.versions) for one in one_of_each]:
+    kinds = {case.kind: case for case in cases}.values()
+    for future in [pool.executor.submit(case.versions) for case in kinds]:
         try:
             future.result()
         except pool.lost as error:
@@ -203,45 +235,78 @@ def run(
 ) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet.
 
+    A case starts once those that it needs have ended. Of the cases that may start, the one with
+    the most expensive chain of cases behind it is the first.
+
     Parameters
     ----------
     todo : mapping of str to Case
-        By name; what a case needs is either here too or done already.
+        By name; the needs of each case are either here too or done already.
     pool : Pool
         Where they run.
     report : callable
-        Told of each case as it ends.
+        Receives the outcome of each case as it ends.
     watch : callable, optional
-        Told of the cases that are running, a few times a second.
+        Receives the cases that are running, a few times a second.
 
     Returns
     -------
     dict of str to OrchestratorError
-        The cases that failed, with why; what needed them is among them.
+        The cases that failed, with why; those that need them are among them.
 
     Raises
     ------
     Interrupted
         If the pool was stopped.
     """
-    agenda = Agenda(todo)
+    needs = {
+        name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()
+    }
+    chains = _chains(todo, needs)
+    sorter = TopologicalSorter(needs)
+    sorter.prepare()
+    ready: list[tuple[float, int, str]] = []
+    places = {name: place for place, name in enumerate(todo)}
     running: dict[Future[float], Case] = {}
     failed: dict[str, OrchestratorError] = {}
-    while agenda or running:
-        while len(running) < pool.places and (case := agenda.next()):
-            running[pool.executor.submit(pool.task, case)] = case
-        # a wait without a limit would not let the main thread see a signal
-        ended, _ = concurrent.futures.wait(
-            running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
-        )
-        watch(running.values())
-        for future in ended:
-            outcome = _outcome(running.pop(future), future, pool)
-            for each in (outcome, *_after(outcome, agenda)):
-                report(each)
-                if each.error:
-                    failed[each.case.name] = each.error
+
+    def settle(outcome: Outcome) -> None:
+        if outcome.error:
+            failed[outcome.case.name] = outcome.error
+        report(outcome)
+        sorter.done(outcome.case.name)
+
+    while sorter.is_active():
+        for name in sorter.get_ready():
+            heapq.heappush(ready, (-chains[name], places[name], name))
+        while ready and len(running) < pool.places:
+            case = todo[heapq.heappop(ready)[-1]]
+            lost = next((need.name for need in case.needs if need.name in failed), None)
+            if lost:
+                cause = SolverError(f"it needs {lost}, which failed", where=case.name)
+                settle(Outcome(case, error=cause))
+            else:
+                running[pool.executor.submit(pool.task, case)] = case
+        if running:
+            # a wait without a limit would not let the main thread see a signal
+            ended, _ = concurrent.futures.wait(
+                running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
+            )
+            watch(running.values())
+            for future in ended:
+                settle(_outcome(running.pop(future), future, pool))
     return failed
+
+
+def _chains(todo: Mapping[str, Case], needs: Mapping[str, Collection[str]]) -> dict[str, float]:
+    """Cost of each case and of the most expensive chain of cases that need it, s."""
+    behind = dict.fromkeys(todo, 0.0)
+    chains = {}
+    for name in reversed([*TopologicalSorter(needs).static_order()]):
+        chains[name] = todo[name].cost_s + behind[name]
+        for need in needs[name]:
+            behind[need] = max(behind[need], chains[name])
+    return chains
 
 
 def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
@@ -257,7 +322,7 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
         return Outcome(case, error=of_shortage(error))
     except pool.lost as error:
         return Outcome(case, error=_loss(error, case.name))
-    except Exception as error:  # one case is lost by it, not the study
+    except Exception as error:  # a fault in the reading of one case costs that case, not the study
         return Outcome(case, error=of_fault(error, case.name))
 
 
@@ -267,13 +332,3 @@ def _loss(error: Exception, where: str) -> SolverError:
         where=where,
         remedy="the logs of their jobs say more: out of memory, or of time?",
     )
-
-
-def _after(outcome: Outcome, agenda: Agenda) -> Iterator[Outcome]:
-    """Let the agenda know how a case ended; the cases that are lost with it."""
-    if not outcome.error:
-        agenda.done(outcome.case)
-        return
-    for without, need in agenda.lost(outcome.case):
-        error = SolverError(f"it needs {need.name}, which failed", where=without.name)
-        yield Outcome(without, error=error)

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.progress import BarColumn, Progress, TextColumn
 
 from orchestrator.runs.case import Case
 from orchestrator.runs.engine import Outcome
@@ -41,13 +41,12 @@ class Display:
             console=self._console,
             disable=not sys.stderr.isatty(),
         )
-        self._task: TaskID | None = None
+        self._task = self._bar.add_task(
+            "", total=1.0, ended=0, count=forecast.count, left=self._time_left()
+        )
 
     def __enter__(self) -> Self:
         self._bar.start()
-        self._task = self._bar.add_task(
-            "", total=1.0, ended=0, count=self._forecast.count, left=self._time_left()
-        )
         return self
 
     def __exit__(
@@ -81,9 +80,8 @@ class Display:
         self._show()
 
     def _show(self) -> None:
-        if self._task is not None:
-            done, left = self._forecast.done, self._time_left()
-            self._bar.update(self._task, completed=done, ended=self._ended, left=left)
+        done, left = self._forecast.done, self._time_left()
+        self._bar.update(self._task, completed=done, ended=self._ended, left=left)
 
     def _time_left(self) -> str:
         return f"about {human(self._forecast.left_s())} left"
@@ -99,7 +97,7 @@ class Forecast:
     workers : int
         Cores that the runs share.
     after_s : float
-        What is known to follow the last run, s.
+        Expected time of what follows the last run, s.
     """
 
     def __init__(self, todo: Collection[Case], workers: int, after_s: float = 0.0) -> None:
@@ -118,7 +116,7 @@ class Forecast:
         self._going = {case.name: (case.kind, part * case.cost_s) for case, part in running}
 
     def ended(self, outcome: Outcome) -> None:
-        """Take note of a case that has ended: it is not to come, and shows the pace of its kind."""
+        """Take note of a case that has ended: it shows the pace of its kind."""
         kind, cost = outcome.case.kind, outcome.case.cost_s
         self._going.pop(outcome.case.name, None)
         self._left[kind] -= cost
@@ -140,8 +138,8 @@ class Forecast:
     def _costs(self, pace: Callable[[str], float]) -> float:
         """Time left of the runs, s, at a pace for each kind."""
         left = sum(cost * pace(kind) for kind, cost in self._left.items())
-        gone = sum(cost * pace(kind) for kind, cost in self._going.values())
-        return max(0.0, left - gone) / self._workers
+        past = sum(cost * pace(kind) for kind, cost in self._going.values())
+        return max(0.0, left - past) / self._workers
 
     def _pace(self, kind: str) -> float:
         """Time of a case over its expected cost; a new kind goes as the others do."""

@@ -1,0 +1,94 @@
+"""The process that a user started: its signals, and standard streams that may be closed or full."""
+
+import codecs
+import errno
+import io
+import os
+import signal
+import sys
+from typing import Any, NoReturn, TextIO
+
+ENDING = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT),
+    *(signal.SIGUSR1, signal.SIGUSR2, signal.SIGXCPU),
+)
+"""The signals by which a user, a closing terminal or a queue asks a command to end. The last three
+are a queue's, before it kills, and the system's at a limit of processor time."""
+LETTERS = "orchestrator.letters"
+"""Name of the way to write letters that an encoding lacks."""
+
+
+def listen() -> None:
+    """Let each of `ENDING` interrupt the command; an ignored one, as under nohup, stays so."""
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+
+
+def _interrupt(number: int, frame: object) -> NoReturn:
+    # a closing terminal asks several times: only the keyboard may break into the end of the command
+    for each in ENDING:
+        signal.signal(each, signal.SIG_DFL if each == signal.SIGINT else signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+class Stream(io.FileIO):
+    """A standard stream that keeps its first failure instead of raising it: the study goes on.
+
+    Attributes
+    ----------
+    failure : OSError or None
+        Why something was lost; None if its reader has gone, who misses nothing.
+    """
+
+    failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write what can be written; the rest is lost."""
+        try:
+            return super().write(data) or len(data)
+        except OSError as error:
+            if error.errno != errno.EPIPE:
+                self.failure = self.failure or error
+            return len(data)
+
+
+def take() -> None:
+    """Make the standard output and error of this process such streams, open or not."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:  # closed: else the next file that is opened would be written into
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+    codecs.register_error(LETTERS, _letters)
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _text(1, sys.stdout)
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _text(2, sys.stderr)
+
+
+def lost() -> OSError | None:
+    """Why a part of the printed answer is lost, if it is."""
+    sys.stdout.flush()
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw.failure if isinstance(raw, Stream) else None
+
+
+def _text(number: int, given: TextIO | None) -> TextIO:
+    stream = Stream(number, "w", closefd=False)
+    if given is not None:
+        given.flush()
+    return io.TextIOWrapper(
+        io.BufferedWriter(stream),
+        encoding=given.encoding if given is not None else "utf-8",
+        errors=LETTERS,
+        line_buffering=number == 2 or stream.isatty(),
+    )
+
+
+def _letters(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Bytes of a file's name as they are, and letters that the encoding lacks as numbers."""
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.backslashreplace_errors(error)
