@@ -22,7 +22,7 @@ from orchestrator.errors import (
     of_shortage,
     of_system,
 )
-from orchestrator.runs import signals, streams
+from orchestrator.runs import terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ INTERRUPTED = 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
-    signals.listen()
-    streams.take()
+    terminal.listen()
+    terminal.take()
     # numpy raises at import where this variable is not an integer
     if not re.fullmatch("[0-9]{1,11}", os.environ.get("SOURCE_DATE_EPOCH", "0")):
         del os.environ["SOURCE_DATE_EPOCH"]
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.simplefilter("default", UserWarning)
     options = _parser().parse_args(arguments)
     code = _code(options)
-    lost = streams.lost()
+    lost = terminal.lost()
     if lost and not code:
         print(f"orchestrator: the answer could not be written: {lost.strerror}", file=sys.stderr)
         return 1
@@ -247,10 +247,10 @@ def _end(page: Path, failures: dict[str, OrchestratorError], answer: str = "") -
 
 
 def _status(options: argparse.Namespace) -> int:
-    from orchestrator.runs import status
+    from orchestrator.runs import workspace
 
-    found = status.read(options.directory)
-    print(status.text(found))
+    found = workspace.status(options.directory)
+    print(workspace.status_text(found))
     return 3 if found.failed else 0
 
 
@@ -263,9 +263,8 @@ def _gallery(options: argparse.Namespace) -> int:
 
 def _prune(options: argparse.Namespace) -> int:
     from orchestrator import pipeline
-    from orchestrator.runs import prune
 
-    print(prune.text(pipeline.prune(options.directory)))
+    print(pipeline.prune(options.directory))
     return 0
 
 

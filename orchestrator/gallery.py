@@ -8,8 +8,8 @@ from urllib.parse import quote
 from orchestrator import face
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.report import FIGURES, PAGE, page
-from orchestrator.runs.claim import STUDY
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
+from orchestrator.runs.workspace import STUDY
 
 NAME = "gallery.html"
 PICTURES = ("bed-*.svg", "shields.svg")

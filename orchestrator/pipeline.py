@@ -1,5 +1,6 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
+import os
 import sys
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,14 +11,12 @@ from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.report.guest import Guest
-from orchestrator.runs import case, cluster, engine
-from orchestrator.runs import prune as pruning
+from orchestrator.runs import case, cluster, engine, workspace
 from orchestrator.runs.case import Case
-from orchestrator.runs.claim import STUDY, told
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
 from orchestrator.runs.progress import Display, Forecast
-from orchestrator.runs.workspace import MARKERS, STATE, Workspace
+from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, read_marker
 from orchestrator.study.study import Study, parse
 
 
@@ -117,16 +116,18 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
         If the directory is of another study file of the same name, which is still there.
     """
     about = {"study": study.text, "tolerance": study.tolerance}
-    before = told(space.root, STUDY) or {}
+    before = read_marker(space.root, STUDY) or {}
     changed = any(before.get(key, value) != value for key, value in about.items())
-    file = str(before.get("file", ""))
-    if changed and file not in ("", study.file) and Path(file).is_file():
+    # relative: a copy of file and directory together is a study of its own
+    file = os.path.relpath(study.file, space.root) if study.file else ""
+    other = str(before.get("file", ""))
+    if changed and other not in ("", file) and (space.root / other).is_file():
         raise InputError(
-            f"the directory holds the study of another file, {file}",
+            f"the directory holds the study of another file, {other}",
             where=str(space.root),
             remedy="choose another with --out",
         )
-    space.describe(STUDY, study.name, list(planned.cases), **about, file=study.file)
+    space.describe(STUDY, study.name, list(planned.cases), **about, file=file)
     return changed
 
 
@@ -182,7 +183,7 @@ def _answer(study: Study, planned: Plan, space: Workspace) -> str:
     return report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
 
 
-def prune(directory: Path) -> pruning.Pruned:
+def prune(directory: Path) -> str:
     """Drop the bulky files of a study's finished cases, but for those that its page shows.
 
     Raises
@@ -198,7 +199,7 @@ def prune(directory: Path) -> pruning.Pruned:
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}
-        return pruning.prune(space, {name: planned.cases[name] for name in done}, shown)
+        return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
 
 
 def reopen(space: Workspace) -> tuple[Study, Plan]:

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.report.results import Results
-from orchestrator.runs import assets, process
+from orchestrator.runs import process
+from orchestrator.runs.case import templates
 from orchestrator.solvers import liggghts
 from tests import small_study
 from tests.faults import bench
@@ -34,7 +35,7 @@ def pytest_configure() -> None:
 @pytest.fixture
 def run_check(tmp_path: Path) -> Deck:
     """Run one of the check decks with LIGGGHTS and return what it said."""
-    shutil.copytree(assets.templates() / "liggghts", tmp_path / "liggghts")
+    shutil.copytree(templates() / "liggghts", tmp_path / "liggghts")
 
     def run(deck: str, **variables: float) -> str:
         folder = tmp_path / "liggghts" / "checks"

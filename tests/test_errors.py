@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import InputError, of_system
-from orchestrator.runs.status import Status
-from orchestrator.runs.status import text as status_text
+from orchestrator.runs.workspace import Status, status_text
 from tests.conftest import Command
 
 

@@ -21,8 +21,8 @@ from orchestrator.benchmark.pack import STUDY, Pack
 from orchestrator.benchmark.problem import Problem
 from orchestrator.errors import InputError, SolverError
 from orchestrator.plan import Plan
-from orchestrator.runs import assets, engine, process
-from orchestrator.runs.case import Case, done_state
+from orchestrator.runs import engine, process
+from orchestrator.runs.case import Case, done_state, templates
 from orchestrator.solvers import liggghts
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
@@ -172,7 +172,7 @@ def check(kind: str, told: Mapping[str, Any], folder: Path) -> Given:
         If it did not come to its end.
     """
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(assets.templates() / "liggghts", folder)
+    shutil.copytree(templates() / "liggghts", folder)
     command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
     for name, value in _variables(kind, told).items():
         command += ["-var", name, repr(value)]

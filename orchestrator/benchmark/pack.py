@@ -14,7 +14,7 @@ from orchestrator.benchmark import intake
 from orchestrator.benchmark.intake import SCENES
 from orchestrator.benchmark.problem import ASK, SCENE, SCHEMA, Problem, csv
 from orchestrator.errors import InputError
-from orchestrator.runs import claim
+from orchestrator.runs import workspace
 from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
 
 MANIFEST = "manifest.json"
@@ -147,8 +147,8 @@ def write(
         If the directory holds something else.
     """
     name, text = study
-    with claim.claimed(root, claim.PACK, name) as folder:
-        about = {"kind": claim.PACK.word, "name": name}
+    with workspace.claimed(root, workspace.PACK, name) as folder:
+        about = {"kind": workspace.PACK.word, "name": name}
         folder.note(MANIFEST, text_of(about))  # it is no pack until all is there
         listed = list(problems)
         scenes = folder.clear(SCENES, intake.is_member)

@@ -12,7 +12,7 @@ from orchestrator.errors import printable
 from orchestrator.report import document
 from orchestrator.report.document import Section
 from orchestrator.report.facts import Sheet
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 WIDE = 100
 """Characters of a message before it is broken."""

@@ -14,7 +14,7 @@ import pandas as pd
 from orchestrator.benchmark.pack import Pack
 from orchestrator.benchmark.verdict import Contender, Verdict, failures
 from orchestrator.report import FIGURES, settings
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from orchestrator.tables import text
 
 PAGE = "comparison.html"

@@ -18,10 +18,9 @@ from orchestrator.benchmark.solver import Solver, split
 from orchestrator.benchmark.verdict import OURS, USED, compared
 from orchestrator.benchmark.watch import Watch
 from orchestrator.errors import InputError
-from orchestrator.runs import claim, confined
+from orchestrator.runs import confined, workspace
 from orchestrator.runs.confined import Limits, Used
-from orchestrator.runs.files import text_of
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder, text_of
 
 LOG = "log.txt"
 
@@ -84,21 +83,21 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
     alone = results[0] if len(results) == 1 and made[0] else usual(root)
     place = out or alone
     same = place.absolute() == results[0].absolute() and bool(made[0])
-    kind = claim.RESULTS if same else claim.COMPARISON
+    kind = workspace.RESULTS if same else workspace.COMPARISON
     name = made[0]["name"] if same else chosen.root.name
     contenders = [compared(chosen, names, one) for one in results]
     notes = [
         _note(one.name, told.get("hidden")) for one, told in zip(contenders, made, strict=True)
     ]
     _check_apart(place.absolute(), chosen)
-    with claim.claimed(place, kind, name) as folder:
+    with workspace.claimed(place, kind, name) as folder:
         return report.write(chosen, contenders, folder, notes)
 
 
 def _made(results: Path) -> dict[str, Any]:
     """The notes of `run` in its results; empty for results of something else."""
-    told = claim.told(results, claim.RESULTS)
-    return told if told and told["kind"] == claim.RESULTS.word else {}
+    told = workspace.read_marker(results, workspace.RESULTS)
+    return told if told and told["kind"] == workspace.RESULTS.word else {}
 
 
 def usual(root: Path) -> Path:
@@ -152,7 +151,7 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
     solver = Solver(split(command), limits, _secrets(chosen, out))
     ours = Ours(chosen, out / OURS / "cases")
     ours.check(names)
-    with claim.claimed(out, claim.RESULTS, command) as folder:
+    with workspace.claimed(out, workspace.RESULTS, command) as folder:
         _check_answers(folder, chosen)
         ours.root.mkdir(parents=True, exist_ok=True)  # no link is on the way: the claim has looked
         note = _note(out.name, confined.hides())
@@ -172,7 +171,11 @@ def _secrets(chosen: Pack, out: Path) -> list[Path]:
     here = Path.cwd()
     places = (chosen.root.parent, out.parent, here, here / "results", here / "packs")
     beside = (path for place in places if place.is_dir() for path in place.iterdir())
-    known = {path.resolve() for path in beside if any(claim.told(path, k) for k in claim.KINDS)}
+    known = {
+        path.resolve()
+        for path in beside
+        if any(workspace.read_marker(path, kind) for kind in workspace.KINDS)
+    }
     found = known | {chosen.root.resolve(), out.resolve()}
     # what lies in another is hidden with it
     return sorted(path for path in found if found.isdisjoint(path.parents))
@@ -204,7 +207,7 @@ def _check_answers(folder: Folder, chosen: Pack) -> None:
             remedy="choose another with --out, or remove it",
         )
     about = {**told, "pack": chosen.digest, "hidden": confined.hides()}
-    folder.note(claim.RESULTS.marker, text_of(about))
+    folder.note(workspace.RESULTS.marker, text_of(about))
 
 
 def _attempt(name: str, solver: Solver, folder: Folder, watch: Watch, *, again: bool) -> None:

@@ -7,7 +7,7 @@ from orchestrator.benchmark import answer
 from orchestrator.benchmark.answer import FILE, AnswerError
 from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import InputError
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 Mark = tuple[int, int, int]
 """When a file was written, when it was changed at all, and how long it is."""

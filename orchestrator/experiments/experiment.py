@@ -15,8 +15,7 @@ from orchestrator.report import document, settings
 from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
 from orchestrator.runs.case import programs
-from orchestrator.runs.claim import EXPERIMENT
-from orchestrator.runs.workspace import MARKERS, Workspace
+from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables import text

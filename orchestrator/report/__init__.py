@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from orchestrator.plan import Plan
     from orchestrator.runs.case import Case
-    from orchestrator.runs.folder import Folder
+    from orchestrator.runs.files import Folder
     from orchestrator.study.study import Study
     from orchestrator.tables import Tables
 

@@ -9,7 +9,7 @@ import pandas as pd
 from orchestrator.report import facts, page, style
 from orchestrator.report.facts import Sheet
 from orchestrator.report.figure import Figure
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 LONG = 60
 """Rows of a table that is folded away."""

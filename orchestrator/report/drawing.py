@@ -27,7 +27,7 @@ from orchestrator.report.figure import Figure
 from orchestrator.report.pictures import bed, flow, mesh
 from orchestrator.report.results import Results
 from orchestrator.runs import process
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 Draw = Callable[[Results], Iterable[Figure]]
 SECTIONS: tuple[tuple[int, tuple[Draw, ...]], ...] = (

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
 from orchestrator.report import FIGURES
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""

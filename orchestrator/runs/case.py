@@ -236,10 +236,10 @@ def fail(directory: Path, error: SolverError) -> None:
         write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
 
 
-def ended(directory: Path) -> tuple[str, str] | None:
-    """In which way the case in a directory failed, and why; None if it is not known to have."""
+def ended(directory: Path) -> tuple[str, str]:
+    """In which way the case in a directory failed, and why; empty if it is not known to have."""
     if not os.path.isfile(directory / FAILED):  # nor where it cannot be seen
-        return None
+        return "", ""
     state = read_json(directory / FAILED)
     if not isinstance(state, dict):
         return "", "its note of failure cannot be read"
@@ -251,10 +251,10 @@ def failure(directory: Path) -> str | None:
 
     The word for its end comes first where it says more than that it failed.
     """
-    end = ended(directory)
-    if end is None or end[0] in ("", SolverError.ended):
-        return end and end[1]
-    return f"{end[0]}: {end[1]}"
+    if not os.path.isfile(directory / FAILED):
+        return None
+    word, cause = ended(directory)
+    return cause if word in ("", SolverError.ended) else f"{word}: {cause}"
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:

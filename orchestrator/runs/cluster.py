@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -76,16 +77,15 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         If the queue does not take the jobs.
     """
     try:
-        import dask
-        import dask_jobqueue
-        import distributed
+        libraries: list[Any] = [*map(import_module, ("dask", "dask_jobqueue", "distributed"))]
     except ImportError as error:
         raise InputError(
             f"a cluster needs the package's extra [cluster]: {error.name} is not installed",
             where="--cluster",
             remedy="pip install 'dask-jobqueue>=0.9', with the Python that runs this",
         ) from None
-    kind = getattr(dask_jobqueue, SYSTEMS[queue.system])
+    dask, jobqueue, distributed = libraries
+    kind = getattr(jobqueue, SYSTEMS[queue.system])
     submit = kind.job_cls.submit_command.split()[0]
     if not shutil.which(submit):
         raise OrchestratorError(

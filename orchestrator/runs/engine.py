@@ -259,9 +259,7 @@ def run(
     Interrupted
         If the pool was stopped.
     """
-    needs = {
-        name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()
-    }
+    needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
     chains = _chains(todo, needs)
     sorter = TopologicalSorter(needs)
     sorter.prepare()

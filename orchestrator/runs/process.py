@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError
-from orchestrator.runs import signals
+from orchestrator.runs import terminal
 
 GRACE_S = 2.0
 """Time between SIGTERM and SIGKILL."""
@@ -349,7 +349,7 @@ def shortages() -> Iterator[OrchestratorError]:
 
 def follow(parent: int) -> None:
     """Make this forked process end with its parent, and leave the signals of a user to that."""
-    for number in signals.ENDING:
+    for number in terminal.ENDING:
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""A directory of results: whose it is, who holds it, how far its study came, and how to shrink it."""
+"""A directory of results: whose it is, who holds it, how far its study came, what it can drop."""
 
 import contextlib
 import csv
@@ -104,12 +104,12 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
             ) from None
         _check(folder, kind, name)  # another process may have been first
         folder.drop_temporaries(RECORD, kind.marker)
-        if new and told(root, kind) is None:
+        if new and read_marker(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
         yield folder
 
 
-def told(root: Path, kind: Kind) -> dict[str, Any] | None:
+def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
     """Content of the marker of a kind; None where there is none, or it is not this program's."""
     value = read_json(root / kind.marker)
     return value if isinstance(value, dict) and {"kind", "name"} <= value.keys() else None
@@ -118,7 +118,7 @@ def told(root: Path, kind: Kind) -> dict[str, Any] | None:
 def _check(folder: Folder, kind: Kind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
     for other in KINDS:
-        marker = told(folder.root, other)
+        marker = read_marker(folder.root, other)
         if marker and (marker["kind"], marker["name"]) != (kind.word, name):
             raise InputError(
                 f"the directory holds the {marker['kind']} {marker['name']}, "
@@ -128,7 +128,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
             )
     # a study whose marker is lost still has its cases
     has_cases = kind.marker == STUDY.marker and names_in(folder.root / "cases")
-    if told(folder.root, kind) is None and not has_cases:
+    if read_marker(folder.root, kind) is None and not has_cases:
         with os.scandir(folder.root) as entries:
             strange = sorted(entry.name for entry in entries if not _is_nothing(Path(entry.path)))
         if strange:
@@ -234,7 +234,7 @@ class Workspace:
         """
         whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
         value = {**whose, **about, "cases": cases}
-        if told(self.root, kind) != value:
+        if read_marker(self.root, kind) != value:
             self.folder.put(kind.marker, text_of(value))
 
     def description(self) -> dict[str, Any]:
@@ -255,11 +255,10 @@ class Workspace:
         except OSError:
             pass
         value = read_json(path)
-        names = value.get("cases") if isinstance(value, dict) else None
-        if isinstance(names, list):
-            texts = [value.get("name"), value.get("study", ""), *names]
+        if isinstance(value, dict) and isinstance(value.get("cases"), list):
+            texts = [value.get("name"), value.get("study", ""), *value["cases"]]
             if all(isinstance(text, str) for text in texts):
-                return dict(value)
+                return value
         raise InputError(
             "there is no study in this directory",
             where=str(self.root),

@@ -18,7 +18,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from orchestrator.errors import InputError, unknown_key
-from orchestrator.runs import assets
 from orchestrator.study import sizes
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
@@ -27,6 +26,7 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.profile import Files, read_text
 from orchestrator.study.scene import Scene, roughness_length
 
+PRESETS = Path(__file__).parent / "presets"
 TIME_LIMIT_S = 3600.0
 LONGEST_S = 1e8
 """Longest time limit: three years."""
@@ -120,7 +120,7 @@ class Study:
 
 def presets(folders: Iterable[Path] = ()) -> dict[str, Path]:
     """The study files that the package brings by name, with those in some other folders."""
-    listed = (path for folder in (assets.presets(), *folders) for path in folder.glob("*.toml"))
+    listed = (path for folder in (PRESETS, *folders) for path in folder.glob("*.toml"))
     return {path.stem: path for path in sorted(listed)}
 
 

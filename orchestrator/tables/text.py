@@ -8,7 +8,7 @@ from pathlib import PurePath
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from orchestrator.tables.columns import COLUMNS
 
 BEGINS = ("=", "+", "-", "@", "\t", "\n")

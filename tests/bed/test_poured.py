@@ -14,7 +14,7 @@ from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Places
 from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
-from orchestrator.runs import assets, engine
+from orchestrator.runs import engine
 from orchestrator.study import study
 from orchestrator.study.sizes import LogNormal, Sizes
 from orchestrator.types import BoolArray, FloatArray, IntArray

@@ -16,8 +16,7 @@ from orchestrator.benchmark.export import export
 from orchestrator.benchmark.problem import EXPECTED
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
-from orchestrator.runs.claim import STUDY
-from orchestrator.runs.workspace import Workspace
+from orchestrator.runs.workspace import STUDY, Workspace
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from tests.benchmark.conftest import ROOT

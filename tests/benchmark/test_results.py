@@ -12,7 +12,7 @@ from orchestrator.benchmark import answer, runner
 from orchestrator.benchmark.answer import AnswerError
 from orchestrator.benchmark.runner import Choice
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.runs import claim
+from orchestrator.runs import workspace
 from tests.benchmark.programs import SMALL, TAIL, TWO, program, run
 
 
@@ -55,7 +55,7 @@ def test_results_of_another_solver_or_pack_stay(
         run(all_levels, tmp_path, TAIL)
     run(formulas, tmp_path, TAIL)
     (results / ".lock").unlink()
-    with claim.claimed(results, claim.RESULTS, program(tmp_path, TAIL)):
+    with workspace.claimed(results, workspace.RESULTS, program(tmp_path, TAIL)):
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):
             run(formulas, tmp_path, TAIL)
         with pytest.raises(OrchestratorError, match=r"is held|being run|is in use|holds it"):

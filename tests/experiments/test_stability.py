@@ -15,8 +15,7 @@ from orchestrator.experiments import stability, stability_figures
 from orchestrator.experiments.experiment import Runs
 from orchestrator.experiments.stability import NOTICED, Axis, Judged, Map
 from orchestrator.fidelity import calibration, limits
-from orchestrator.runs.claim import EXPERIMENT
-from orchestrator.runs.workspace import Workspace
+from orchestrator.runs.workspace import EXPERIMENT, Workspace
 
 ALL = stability.load_all()
 SMALL = """

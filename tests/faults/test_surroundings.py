@@ -2,7 +2,6 @@
 
 import os
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -143,64 +142,6 @@ def test_two_drivers_at_once(pile: Bench, ledger: Ledger) -> None:
         pile.check_finished()
 
 
-WITHOUT_LOCKS = (
-    "-c",
-    """
-import errno, fcntl, sys
-from orchestrator import cli
-from orchestrator.runs import lock
-def flock(*_):
-    raise OSError(errno.ENOLCK, "No locks available")
-fcntl.flock, lock.BEAT_S = flock, 0.5
-sys.exit(cli.main(sys.argv[1:]))
-""",
-)
-"""A driver on a file system that knows no locks."""
-
-
-def test_two_drivers_where_the_file_system_knows_no_locks(cells: Bench, ledger: Ledger) -> None:
-    with ledger.fault("two drivers, no locks", "begin"):
-        drivers = [cells.start(python=WITHOUT_LOCKS), cells.start(python=WITHOUT_LOCKS)]
-        ends = [ended(driver) for driver in drivers]
-        assert sorted(code for code, _ in ends) == [0, 1], ends
-        cells.check_finished()
-    with ledger.fault("SIGKILL to the driver, no locks", "grains"):
-        (cells.out / "report.json").unlink()
-        driver = cells.start(python=WITHOUT_LOCKS)
-        assert wait_for(lambda: not _same_or_empty(cells.out / ".lock", b""), driver)
-        driver.kill()
-        ended(driver)
-        code, said = ended(cells.start(python=WITHOUT_LOCKS))
-        assert code == 0, said
-        cells.check_finished()
-
-
-def _same_or_empty(path: Path, content: bytes) -> bool:
-    return path.read_bytes() in (b"", content)
-
-
-@pytest.mark.parametrize("beats", [True, False])
-def test_a_holder_on_another_machine_is_believed_while_it_lives(
-    cells: Bench, ledger: Ledger, beats: bool
-) -> None:
-    note = '{{"beat":{},"host":"elsewhere","pid":7,"started":"then"}}\n'
-    cells.out.mkdir()
-    path = cells.out / ".lock"
-    path.write_text(note.format(0))
-    with ledger.fault("another machine, no locks", "living" if beats else "gone"):
-        driver = cells.start(python=WITHOUT_LOCKS)
-        for count in range(1, 200):
-            if driver.poll() is not None:
-                break
-            if beats:
-                path.write_text(note.format(count))
-            time.sleep(0.1)
-        code, said = ended(driver)
-        assert code == (1 if beats else 0), said
-        assert ("process 7 on elsewhere" in said) == beats
-        cells.check_finished()
-
-
 LIMITS = {"ulimit -n": "16", "ulimit -v": "600000"}
 
 
@@ -235,27 +176,3 @@ def test_a_directory_that_may_not_be_entered(cells: Bench, ledger: Ledger, name:
         assert f"{closed}" in said
         assert "Permission denied" in said
         cells.check_finished()
-
-
-def test_a_case_that_is_immutable(cells: Bench, ledger: Ledger) -> None:
-    cells.study()
-    (cell,) = case_of(cells.out, "cells")
-    (cell / "done.json").unlink()
-    if os.geteuid() != 0 or subprocess.run(["chattr", "+i", cell], capture_output=True).returncode:
-        pytest.skip("no file can be made immutable here")
-    with ledger.fault("an immutable directory", "grains"):
-        code, said = cells.study()
-        subprocess.run(["chattr", "-i", cell], check=True)
-        assert code == 3, said
-        assert f"{cell.name}" in said
-        assert "Operation not permitted (is it immutable" in said
-        cells.check_finished()
-
-
-def test_what_the_linker_says_is_no_failure(pile: Bench, ledger: Ledger) -> None:
-    with ledger.fault("a library that cannot be preloaded", "flow and grains"):
-        code, said = ended(pile.start(under=("env", "LD_PRELOAD=/nowhere/libnone.so")))
-        assert code == 0, said
-        logs = [path for path in pile.out.glob("cases/*/log.*") if b"ld.so" in path.read_bytes()]
-        assert {"log.liggghts", "log.simpleFoam"} <= {path.name for path in logs}
-        pile.check_finished()

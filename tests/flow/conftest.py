@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.flow.case import FlowCase
-from orchestrator.runs import assets, case, process
+from orchestrator.runs import case, process
+from orchestrator.runs.case import templates
 from tests.conftest import Shared
 
 PILE = FlowCase(
@@ -52,4 +53,4 @@ def solve(shared: Shared) -> Solve:
 @pytest.fixture
 def template(tmp_path: Path) -> Path:
     """A copy of the template, as it lies."""
-    return Path(shutil.copytree(assets.templates() / "openfoam" / "pile", tmp_path / "pile"))
+    return Path(shutil.copytree(templates() / "openfoam" / "pile", tmp_path / "pile"))

@@ -14,7 +14,8 @@ from orchestrator.errors import SolverError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.mesh import Mesh, first_cell_heights, smallest_jacobian, write_mesh
 from orchestrator.flow.model import model
-from orchestrator.runs import assets, case
+from orchestrator.runs import case
+from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.study.scene import default_first_cell_height
 from tests.bed.test_line import BEDS as SHAPES
@@ -96,7 +97,7 @@ def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> Non
     made = written(template)
     np.testing.assert_allclose(made.points, given.points, atol=1e-9)
     assert (template / "pile.geo").read_bytes() == (
-        assets.templates() / "openfoam/pile/pile.geo"
+        templates() / "openfoam/pile/pile.geo"
     ).read_bytes()
 
 

@@ -17,7 +17,7 @@ from orchestrator.grains import deck
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.runs import assets
+from orchestrator.runs.case import templates
 
 WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
@@ -105,7 +105,7 @@ def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
 
 def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
     copy = tmp_path / "bed"
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     assert (copy / "samples.csv").read_text().splitlines()[-1].split(",")[3] == "0"
@@ -113,7 +113,7 @@ def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
 
 def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
     copy, shared = tmp_path / "bed", tmp_path / "shared"
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     shared.mkdir()
     untouched = shared.stat().st_mtime_ns
     # MPI's own would be made here, and removed while another run starts
@@ -123,7 +123,7 @@ def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
 
 def _shared(copy: Path, ranks: int) -> None:
     """Let some processes share the template's grains."""
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     numbers = copy / "parameters.liggghts"
     numbers.write_text(numbers.read_text().replace("ranks equal 1 ", f"ranks equal {ranks} "))
 

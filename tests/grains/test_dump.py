@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.grains import deck, dump, motion, protocol
-from orchestrator.runs import assets
+from orchestrator.runs.case import templates
 
 SLOPE = np.radians(20.0)
 
@@ -19,7 +19,7 @@ SLOPE = np.radians(20.0)
 @pytest.fixture(scope="module")
 def grains() -> deck.GrainTable:
     """The grains of the template's own pile, under a flow that takes them one after the other."""
-    lines = (assets.templates() / "liggghts" / "bed" / "grains.data").read_text().splitlines()
+    lines = (templates() / "liggghts" / "bed" / "grains.data").read_text().splitlines()
     rows = np.array([line.split() for line in lines[lines.index("Atoms") + 2 :]], float)
     return deck.GrainTable(
         position=rows[:, 4:],
@@ -49,7 +49,7 @@ def _finer_steps(copy: Path, flows: deck.FloatArray) -> None:
 
 def _run(folder: Path, stir: float) -> Path:
     copy = folder / f"stir-{stir}"
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     text = (copy / "parameters.liggghts").read_text()
     (copy / "parameters.liggghts").write_text(re.sub(r"( stir equal) \S+", rf"\1 {stir}", text))
     _finer_steps(copy, protocol.flows(0.98, 1.5, 0.01))

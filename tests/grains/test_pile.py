@@ -12,7 +12,7 @@ from orchestrator import plan, tables
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from orchestrator.study import study
 from tests import small_study
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from orchestrator.bed.packing import Places
 from orchestrator.grains import deck, motion, peeling, protocol, threshold
 from orchestrator.grains.loading import ForceTable, Loading
-from orchestrator.runs import assets
+from orchestrator.runs.case import templates
 from orchestrator.study.parts import Grain, Protocol
 
 FloatArray = NDArray[np.float64]
@@ -78,7 +78,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
     copy = tmp_path / "bed"
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     deck.write(
         copy, grains, numbers, rising, _loading().in_steps(rising.tolist()) * weight, margin=3 * d
     )

@@ -12,7 +12,8 @@ import pytest
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.grains import rest
 from orchestrator.grains.deck import GrainTable
-from orchestrator.runs import assets, case
+from orchestrator.runs import case
+from orchestrator.runs.case import templates
 from orchestrator.runs.files import read_json
 
 DIAMETER, DENSITY, GRAVITY, STIFFNESS = 1e-3, 2500.0, 9.806076000000001, 1e3
@@ -22,7 +23,7 @@ WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 @pytest.fixture(scope="module")
 def grains() -> GrainTable:
     """Those of the template's own pile; rest looks at how many may move."""
-    lines = (assets.templates() / "liggghts" / "bed" / "grains.data").read_text().splitlines()
+    lines = (templates() / "liggghts" / "bed" / "grains.data").read_text().splitlines()
     rows = np.array([line.split() for line in lines[lines.index("Atoms") + 2 :]], float)
     return GrainTable(
         position=rows[:, 4:],
@@ -37,7 +38,7 @@ def grains() -> GrainTable:
 def _settled(folder: Path, *, time_step: float, damping: float) -> Path:
     """The template's pile with a contact law of its own, run to its end."""
     copy = folder / "bed"
-    shutil.copytree(assets.templates() / "liggghts" / "bed", copy)
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
     text = (copy / "parameters.liggghts").read_text()
     for name, value in (
         ("time_step", time_step),

@@ -19,8 +19,7 @@ from orchestrator.grains.wear import Worn
 from orchestrator.report import wear as wear_figure
 from orchestrator.report.pictures import bed
 from orchestrator.report.results import Results
-from orchestrator.runs.claim import STUDY
-from orchestrator.runs.workspace import Workspace
+from orchestrator.runs.workspace import STUDY, Workspace
 from orchestrator.study import study
 from orchestrator.study.parts import Grain
 from orchestrator.study.profile import Profile

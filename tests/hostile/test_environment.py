@@ -89,7 +89,7 @@ import orchestrator.benchmark.runner, orchestrator.pipeline
 import orchestrator.experiments.ladder.run, orchestrator.experiments.stability.run
 assert "matplotlib" not in sys.modules
 from orchestrator.report import settings
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 with settings.own():
     from orchestrator.benchmark import page
     from orchestrator.experiments.ladder import page as ladder

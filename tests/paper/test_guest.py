@@ -10,7 +10,7 @@ import pytest
 from orchestrator import paper, report
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.report.results import Results
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from orchestrator.study import study
 
 PACKAGE = Path(paper.__file__).parents[1]

@@ -10,7 +10,7 @@ import pytest
 from orchestrator import report, tables
 from orchestrator.report import settings
 from orchestrator.report.results import Results
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 
 @pytest.fixture(scope="session")

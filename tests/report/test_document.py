@@ -9,7 +9,7 @@ import pytest
 from orchestrator.report import document, style
 from orchestrator.report.document import Section
 from orchestrator.report.figure import Figure
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from tests.report.test_page import Page
 
 TITLE = "Speed & <accuracy>"

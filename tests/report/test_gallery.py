@@ -7,7 +7,7 @@ import pytest
 import orchestrator
 from orchestrator import gallery, tables
 from orchestrator.errors import OrchestratorError
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 
 GRAIN = "grain = { diameter = 1e-3 }\nprotocol = { method = 'pivot' }\n"
 

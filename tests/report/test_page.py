@@ -19,7 +19,7 @@ from matplotlib.colors import to_hex, to_rgb
 from orchestrator.report import page as page_module
 from orchestrator.report.results import Results
 from orchestrator.report.style import NOTE
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from tests.report.conftest import only, write
 from tests.small_study import TITLE
 

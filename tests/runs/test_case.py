@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import pytest
 
-from orchestrator.runs import assets, case
-from orchestrator.runs.case import Case
+from orchestrator.runs import case
+from orchestrator.runs.case import Case, templates
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def test_the_id_is_that_of_parameters_and_template() -> None:
 
 def test_a_prepared_case_is_a_copy_of_its_template_with_inputs(tmp_path: Path) -> None:
     directory = case.prepare(Tiny(1.0), tmp_path)
-    for path in (assets.templates() / "liggghts/checks").iterdir():
+    for path in (templates() / "liggghts/checks").iterdir():
         assert (directory / path.name).read_bytes() == path.read_bytes()
     identity = json.loads((directory / case.IDENTITY).read_text())
     assert identity["parameters"] == {"size": 1.0}

@@ -1,52 +1,171 @@
-"""Cases in a pool: what one of them does wrong, the others do not pay for."""
+"""Cases in a pool: their order, the cores that they take, the time left, and what a fault costs."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator.errors import SolverError
 from orchestrator.runs import case, engine
 from orchestrator.runs.case import Case
-from orchestrator.runs.engine import Outcome
+from orchestrator.runs.engine import Cores, Outcome, Pool
+from orchestrator.runs.progress import Forecast
 
 
 @dataclass(frozen=True)
-class Division(Case):
-    """A case whose program divides 42 by a number, which the reading of its result does again."""
+class Step(Case):
+    """A case whose program divides 42 by a number, as the reading of its result does."""
 
-    by: int
-    kind: ClassVar[str] = "division"
+    size: float
+    after: tuple[Case, ...] = ()
+    by: int = 1
+    kind: ClassVar[str] = "step"
     template: ClassVar[str] = "liggghts/checks"
     recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("result.txt",)
 
     @property
     def parameters(self) -> dict[str, Any]:
-        return {"by": self.by}
+        return {"size": self.size, "by": self.by}
 
     @property
     def cost_s(self) -> float:
-        return 1.0
+        return self.size
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        return self.after
 
     def write(self, directory: Path, cases: Path) -> None:
-        (directory / "Allrun").write_text(f"#!/bin/sh\necho $((42/{self.by})) > result.txt\n")
-        (directory / "Allrun").chmod(0o755)
+        (directory / "Allrun").write_text(f"echo $((42/{self.by})) > result.txt\n")
 
     def collect(self, directory: Path) -> None:
-        assert (directory / "result.txt").is_file()
+        if not (directory / "result.txt").is_file():
+            raise SolverError("no result")
         42 // (self.by - 6)
 
     def versions(self) -> dict[str, str]:
         return {}
 
 
-def test_a_fault_of_the_program_loses_one_case_and_says_where_it_is(tmp_path: Path) -> None:
-    todo = {one.name: one for one in map(Division, (2, 6, 7))}
-    told: list[Outcome] = []
+@dataclass(frozen=True)
+class Other(Step):
+    """A case of another kind."""
+
+    kind: ClassVar[str] = "other"
+
+
+def _order(places: int, *cases: Case) -> list[str]:
+    """Names of cases in the order in which a pool without solvers starts them."""
+    started: list[str] = []
+
+    def task(one: Case) -> float:
+        started.append(one.name)
+        return one.cost_s
+
+    with ThreadPoolExecutor(1) as threads:
+        todo = {one.name: one for one in cases}
+        assert not engine.run(todo, Pool(threads, task, places), lambda _: None)
+    return started
+
+
+def test_the_start_of_the_most_expensive_chain_comes_first() -> None:
+    shared = Step(1.0)
+    dear, cheap, single = Step(50.0, (shared,)), Step(2.0, (shared,)), Step(30.0)
+    expected = [one.name for one in (shared, dear, single, cheap)]
+    assert _order(1, cheap, single, dear, shared) == expected
+
+
+def test_a_case_waits_for_all_that_it_needs_and_for_nothing_that_is_done() -> None:
+    first, second, done = Step(1.0), Step(2.0), Step(3.0)
+    both = Step(4.0, (first, second, done))
+    assert _order(3, both, first, second)[-1] == both.name
+
+
+def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) -> None:
+    fault, lost = Step(1.0, by=6), Step(2.0, by=0)
+    second = Step(3.0, (lost,))
+    third, fine = Step(4.0, (second,)), Step(5.0, by=7)
+    outcomes: list[Outcome] = []
+    todo = {one.name: one for one in (fault, lost, second, third, fine)}
     with engine.local(tmp_path, workers=2, limit_s=60.0) as pool:
-        failed = engine.run(todo, pool, told.append)
-    assert list(failed) == [Division(6).name]
-    (error,) = failed.values()
-    assert "a fault of this program: ZeroDivisionError" in str(error)
-    assert "test_engine.py, line" in str(error)
-    assert len(told) == 3
-    assert all(case.is_done(one, tmp_path) == (one.by != 6) for one in todo.values())
+        failed = engine.run(todo, pool, outcomes.append)
+    assert failed.keys() == {one.name for one in (fault, lost, second, third)}
+    assert "a fault of this program: ZeroDivisionError" in str(failed[fault.name])
+    assert f"it needs {lost.name}, which failed" in str(failed[second.name])
+    assert case.failure(tmp_path / lost.name) == "no result"
+    assert len(outcomes) == 5
+    assert case.is_done(fine, tmp_path)
+
+
+def test_the_time_left_follows_the_pace_of_each_kind() -> None:
+    steps, others = [Step(10.0), Step(20.0)], [Other(100.0), Other(300.0)]
+    forecast = Forecast([*steps, *others], workers=2)
+    assert forecast.left_s() == pytest.approx(430 / 2)
+    forecast.ended(Outcome(steps[0], 5.0))  # half of the estimate: the best guess for others
+    assert forecast.left_s() == pytest.approx(0.5 * 420 / 2)
+    forecast.ended(Outcome(others[0], 200.0))
+    assert forecast.left_s() == pytest.approx((0.5 * 20 + 2 * 300) / 2)
+    forecast.ended(Outcome(others[1], error=SolverError("died")))
+    assert forecast.left_s() == pytest.approx(0.5 * 20 / 2)
+
+
+def test_progress_goes_on_within_a_case_and_until_the_figures_are_drawn() -> None:
+    first, second = Step(10.0), Step(30.0)
+    forecast = Forecast([first, second], workers=1, after_s=10.0)
+    shares = [forecast.done]
+    forecast.going([(first, 0.5)])
+    shares.append(forecast.done)
+    forecast.ended(Outcome(first, 10.0))
+    shares.append(forecast.done)
+    forecast.ended(Outcome(second, 30.0))
+    shares.append(forecast.done)
+    assert shares == pytest.approx([0.0, 0.1, 0.2, 0.8])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 4), st.lists(st.integers(1, 3), min_size=1, max_size=12))
+def test_no_more_cores_are_taken_than_there_are(count: int, wanted: list[int]) -> None:
+    cores, lock = Cores(count), threading.Lock()
+    taken, largest = 0, 0
+
+    def solve(number: int) -> None:
+        nonlocal taken, largest
+        with cores.held(number):
+            with lock:
+                taken += min(number, count)
+                largest = max(largest, taken)
+            with lock:
+                taken -= min(number, count)
+
+    with ThreadPoolExecutor(6) as pool:
+        list(pool.map(solve, wanted))
+    assert largest <= count
+    assert taken == 0
+
+
+def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
+    cores, served = Cores(2), []
+
+    def solve(name: str, wanted: int) -> None:
+        with cores.held(wanted):
+            served.append(name)
+
+    with cores.held(1):
+        large = threading.Thread(target=solve, args=("large", 2))
+        large.start()
+        while not cores._queue.locked():
+            pass
+        small = threading.Thread(target=solve, args=("small", 1))
+        small.start()
+        # one core is free, but the large one asked first
+        small.join(timeout=0.2)
+        assert served == []
+    large.join()
+    small.join()
+    assert served == ["large", "small"]

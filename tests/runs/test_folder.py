@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.runs import claim
-from orchestrator.runs.folder import KEPT, RECORD, Folder
+from orchestrator.runs import workspace
+from orchestrator.runs.files import KEPT, RECORD, Folder
 
 MINE = pytest.mark.filterwarnings("ignore:.*not what this program wrote")
 
@@ -149,26 +149,30 @@ def test_without_its_record_nothing_is_lost(folder: Folder, harm: bytes) -> None
 def test_a_directory_belongs_to_one_thing(tmp_path: Path) -> None:
     root = tmp_path / "out"
     for _ in range(2):
-        with claim.claimed(root, claim.RESULTS, "mine") as folder:
+        with workspace.claimed(root, workspace.RESULTS, "mine") as folder:
             folder.put("comparison.csv", "one")
-    for kind, name in ((claim.RESULTS, "yours"), (claim.STUDY, "mine"), (claim.PACK, "mine")):
+    for kind, name in (
+        (workspace.RESULTS, "yours"),
+        (workspace.STUDY, "mine"),
+        (workspace.PACK, "mine"),
+    ):
         with (
             pytest.raises(InputError, match=r"holds the benchmark of the solver mine, not"),
-            claim.claimed(root, kind, name),
+            workspace.claimed(root, kind, name),
         ):
             pass
     assert folder.is_whole()
 
 
 def test_a_directory_of_others_is_not_entered(tmp_path: Path, outside: Path) -> None:
-    for kind in claim.KINDS:
-        with pytest.raises(InputError, match=r"a\.csv"), claim.claimed(outside, kind, "mine"):
+    for kind in workspace.KINDS:
+        with pytest.raises(InputError, match=r"a\.csv"), workspace.claimed(outside, kind, "mine"):
             pass
         (tmp_path / "new").mkdir()
         (tmp_path / "new" / kind.marker).write_text('{"title": "something else"}')
         with (
             pytest.raises(InputError, match=kind.marker),
-            claim.claimed(tmp_path / "new", kind, "mine"),
+            workspace.claimed(tmp_path / "new", kind, "mine"),
         ):
             pass
         (tmp_path / "new" / kind.marker).unlink()
@@ -178,17 +182,17 @@ def test_a_directory_of_others_is_not_entered(tmp_path: Path, outside: Path) -> 
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     with (
-        claim.claimed(tmp_path / "out", claim.RESULTS, "mine"),
+        workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"),
         pytest.raises(OrchestratorError, match="in use by process"),
-        claim.claimed(tmp_path / "out", claim.RESULTS, "mine"),
+        workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"),
     ):
         pass
 
 
-@pytest.mark.parametrize("name", [claim.LOCK, claim.RESULTS.marker, RECORD])
+@pytest.mark.parametrize("name", [workspace.LOCK, workspace.RESULTS.marker, RECORD])
 def test_a_claim_follows_no_link(tmp_path: Path, outside: Path, name: str) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / name).symlink_to(outside / "a.csv")
-    with pytest.raises(InputError), claim.claimed(tmp_path / "out", claim.RESULTS, "mine"):
+    with pytest.raises(InputError), workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"):
         pass
     assert (outside / "a.csv").read_text() == "precious"

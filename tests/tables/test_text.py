@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator import tables
 from orchestrator.errors import OrchestratorError
-from orchestrator.runs.folder import Folder
+from orchestrator.runs.files import Folder
 from orchestrator.tables.columns import COLUMNS
 
 FORMULAS = ["=1+1", "+A1", "-A1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0", "-rf"]
