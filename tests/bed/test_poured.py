@@ -77,7 +77,7 @@ def test_the_same_seed_gives_the_same_bytes_by_hand(
 
 
 def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
-    assets.copy_template("liggghts/poured", tmp_path / "copy")
+    shutil.copytree(templates() / "liggghts" / "poured", tmp_path / "copy")
     ended = subprocess.run(["./Allrun"], cwd=tmp_path / "copy", capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     assert (tmp_path / "copy" / DUMP).stat().st_size > 1000
