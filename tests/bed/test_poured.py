@@ -15,6 +15,7 @@ from orchestrator.bed.packing import Places
 from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.runs import engine
+from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.study.sizes import LogNormal, Sizes
 from orchestrator.types import BoolArray, FloatArray, IntArray
