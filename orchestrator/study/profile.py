@@ -20,7 +20,7 @@ SHAPE_FIELDS = (
     *("length", "forms", "spacing"),
 )
 """Fields of a bed that a profile replaces."""
-LARGEST = 20_000_000
+LARGEST = 20 * 2**20
 """Bytes of a file."""
 LARGEST_NUMBER = 1e5
 """Largest coordinate, m."""
@@ -115,19 +115,20 @@ class Files:
             raise InputError(what, where=f"{where}: bed.profile", remedy="name a file")
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value
-        place = str(self.folder / name)
-        profile = read_profile(self._text(name), Path(name).name, place, smoothing)
+        place = f"{where}: bed.profile: {self.folder / name}"
+        profile = read_profile(self._text(name, place), Path(name).name, place, smoothing)
         slope = round(profile.steepest_deg, 2)
         return {"profile": profile, "height": profile.height, "slope_deg": slope}
 
-    def sieve(self, name: str) -> list[list[float]]:
+    def sieve(self, name: str, where: str) -> list[list[float]]:
         """The rows of a sieve table, diameter (m) and fraction; errors as of `bed`."""
-        _, *columns = read_columns(self._text(name), SIEVE_COLUMNS, str(self.folder / name))
+        place = f"{where}: grain.sizes: {self.folder / name}"
+        _, *columns = read_columns(self._text(name, place), SIEVE_COLUMNS, place)
         return [list(row) for row in np.column_stack(columns).tolist()]
 
-    def _text(self, name: str) -> str:
+    def _text(self, name: str, where: str) -> str:
         if name not in self.texts:
-            self.texts[name] = read_text(self.folder / name, LARGEST)
+            self.texts[name] = read_text(self.folder / name, LARGEST, where)
             head = "" if self.added else "\n[profiles]\n"
             # a JSON string is a TOML string, but for the mark of deletion
             text = json.dumps(self.texts[name], ensure_ascii=False).replace("\x7f", "\\u007f")
@@ -138,8 +139,8 @@ class Files:
         return text
 
 
-def read_text(path: Path, largest: int) -> str:
-    """The text of a file of the user, of so many bytes at most.
+def read_text(path: Path, largest: int, where: str) -> str:
+    """The text of a file of the user, of so many bytes at most; `where` names it in messages.
 
     Raises
     ------
@@ -150,14 +151,14 @@ def read_text(path: Path, largest: int) -> str:
         with opened(path) as stream:
             content = stream.read(largest + 1)
         if len(content) > largest:
-            raise ValueError(f"larger than {largest / 1e6:.0f} MB")
+            raise ValueError(f"larger than {largest // 2**20} MiB")
         text = content.decode("utf-8-sig")  # some editors begin with a mark of the encoding
         if "\0" in text:
             raise ValueError("binary, not text")
     except (OSError, ValueError) as error:
         what = f"not a readable text file: {getattr(error, 'strerror', None) or error}"
         remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
-        raise InputError(what, where=str(path), remedy=remedy) from None
+        raise InputError(what, where=where, remedy=remedy) from None
     return text
 
 

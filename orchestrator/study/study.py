@@ -147,7 +147,7 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
             where=source,
             remedy=f"presets: {', '.join(sorted(brought))}; or give the path of a TOML file",
         )
-    text = read_text(path, MOST_BYTES)
+    text = read_text(path, MOST_BYTES, source)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":
@@ -298,7 +298,7 @@ def make_scene(
     if files and bed["kind"] == "pile" and "profile" in bed:
         bed |= files.bed(bed, where)
     if files and isinstance(grain.get("sizes"), str):
-        grain["sizes"] = files.sieve(grain["sizes"])
+        grain["sizes"] = files.sieve(grain["sizes"], where)
     try:
         mixture = sizes.read(grain.get("sizes"))
         if isinstance(mixture, tuple):
