@@ -126,11 +126,11 @@ def _run(
         )
         report.seek(0)
         told = report.read()
-        said = process.last_line(printed)
+        said = process.last_words(log)
         if os.fstat(printed.fileno()).st_size > limits.printed:
             printed.truncate(limits.printed)
-    if told and not ended.timed_out:
+    if told and ended.over != "time":
         return Used(**json.loads(told), said=said)
     late = f"it did not end within {limits.seconds:g} s and was killed"
-    why = late if ended.timed_out else f"it could not be watched: {said}"
+    why = late if ended.over == "time" else f"it could not be watched: {said}"
     return Used(None, why, ended.seconds, said=said)

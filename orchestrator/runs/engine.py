@@ -78,33 +78,25 @@ class Pool:
 class Cores:
     """The cores of this machine, of which a solver takes one or several while it runs.
 
-    The first solver in the queue is served first: one that needs two cores does not wait for ever
+    The first in the queue is served first: a solver that needs two cores does not wait for ever
     while others take each single core that falls free.
-
-    Parameters
-    ----------
-    count : int
-        Number of cores.
     """
 
     def __init__(self, count: int) -> None:
-        self._count = self._free = count
+        self._count, self._free = count, threading.Semaphore(count)
         self._queue = threading.Lock()
-        self._changed = threading.Condition()
 
     @contextlib.contextmanager
     def held(self, wanted: int) -> Iterator[None]:
         """Hold as many cores as are wanted, or all where there are fewer."""
         taken = min(wanted, self._count)
-        with self._queue, self._changed:
-            self._changed.wait_for(lambda: self._free >= taken)
-            self._free -= taken
+        with self._queue:
+            for _ in range(taken):
+                self._free.acquire()
         try:
             yield
         finally:
-            with self._changed:
-                self._free += taken
-                self._changed.notify()
+            self._free.release(taken)
 
 
 @contextlib.contextmanager
@@ -198,7 +190,7 @@ def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) ->
             where=str(directory),
             remedy="make room, then the same command continues",
         )
-    if ended.timed_out:
+    if ended.over == "time":
         raise SolverError(
             f"the solver did not end within {limit_s:g} s and was killed",
             where=str(directory),

@@ -13,12 +13,12 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from orchestrator.errors import Interrupted, OrchestratorError, SolverError
+from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import terminal
 
 GRACE_S = 2.0
@@ -26,19 +26,15 @@ GRACE_S = 2.0
 POLL_S = 0.1
 DISK_S = 5.0
 """Time between two looks at the space on the disk; a program is ended if two find it full."""
-ROOM = 2**16
-"""Space that must be left on the disk, bytes."""
 TRIES = 3
-"""Runs of a program that is killed from outside. One killed three times is no accident: it is out
-of memory, say."""
-LAST_LETTERS = 200
-"""Largest part of a log's last line that a message repeats."""
+"""Runs of a program that is killed from outside. One killed three times is out of memory, say."""
+QUERY_S = 30.0
+"""Time limit of a program that is asked for its version, s."""
+QUERY_BYTES = 1_000_000
 TAIL = 2**16
 """Part of a log in which its last line is looked for, bytes: a log may be of any size."""
 _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 """Signals that come from outside; those of a crash would come again."""
-_SET_DEATH_SIGNAL = 1
-"""PR_SET_PDEATHSIG of Linux."""
 _GUARD = """
 exec 9<&0 </dev/null
 ( trap '' TERM INT HUP QUIT; ( read -r _ <&9; kill -KILL 0 ) >/dev/null 2>&1 & )
@@ -59,10 +55,8 @@ class Ended:
     ----------
     returncode : int
         As `subprocess` gives it: negative where a signal ended the program.
-    seconds : float
-        Wall time, s.
-    cpu_s : float
-        Processor time of the program and all that it waited for, s; 0 if it was killed.
+    seconds, cpu_s : float
+        Wall time; processor time of the program and all that it waited for, 0 if it was killed, s.
     over : str
         The limit at which it was killed: "time", "output" or "disk"; empty if it ended by itself.
     peak_mib : float
@@ -74,11 +68,6 @@ class Ended:
     cpu_s: float
     over: str = ""
     peak_mib: float = 0.0
-
-    @property
-    def timed_out(self) -> bool:
-        """Whether it was killed at its time limit."""
-        return self.over == "time"
 
     @property
     def may_pass(self) -> bool:
@@ -96,7 +85,7 @@ def run(
     limit_s: float,
     stop: threading.Event | None = None,
     env: Mapping[str, str | None] | None = None,
-    output_limit: int | None = None,
+    output_limit: float = float("inf"),
     file_limit: int | None = None,
     tries: int = 1,
     fds: Sequence[int] = (),
@@ -118,14 +107,10 @@ def run(
         Set by another thread to end the program early.
     env : mapping, optional
         Added to this process's environment; None removes a variable.
-    output_limit : int, optional
-        Limit of the log's size, bytes.
-    file_limit : int, optional
-        Limit of the size of each file that the program writes, bytes.
+    output_limit, file_limit : int, optional
+        Limits of the log's size and of that of each file that the program writes, bytes.
     tries : int, optional
         Number of runs in all if the program is killed from outside; it must start afresh each time.
-    fds : sequence of int, optional
-        Open files that it inherits beside its output.
 
     Raises
     ------
@@ -134,7 +119,8 @@ def run(
     """
     # OpenFOAM takes its case directory from PWD, not from getcwd; a relative PATH would be
     # another one in another working directory
-    given = {**os.environ, "PATH": _search_path(), "PWD": str(cwd), **(env or {})}
+    path = os.pathsep.join(map(os.path.abspath, os.get_exec_path()))
+    given = {**os.environ, "PATH": path, "PWD": str(cwd), **(env or {})}
     blocks = "" if file_limit is None else str(file_limit // 512)
     for _ in range(tries):
         began, over, usage = time.monotonic(), "", None
@@ -169,25 +155,30 @@ def _wait(
     deadline: float,
     stop: threading.Event | None,
     log: BinaryIO,
-    output_limit: int | None,
+    output_limit: float,
     cwd: Path,
 ) -> str:
     """Wait until a program has ended, or return the limit that it has reached."""
     looked, was_full = time.monotonic(), False
-    with _end_of(process) as end:
+    handle = os.pidfd_open(process.pid)  # becomes ready at the end: no core is spent on asking
+    try:
+        end = select.poll()
+        end.register(handle, select.POLLIN)
         while not end.poll(1000 * POLL_S):
             if stop is not None and stop.is_set():
                 raise Interrupted("stopped", remedy="the same command continues")
             now = time.monotonic()
             if now > deadline:
                 return "time"
-            if output_limit is not None and os.fstat(log.fileno()).st_size > output_limit:
+            if os.fstat(log.fileno()).st_size > output_limit:
                 return "output"
             if now > looked + DISK_S:
                 is_full = _is_full(cwd)
                 if is_full and was_full:
                     return "disk"
                 looked, was_full = now, is_full
+    finally:
+        os.close(handle)
     return ""
 
 
@@ -195,63 +186,35 @@ def _is_full(folder: Path) -> bool:
     """Whether no room is left on the disk, or within the quota, of a folder."""
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
-            os.posix_fallocate(file.fileno(), 0, ROOM)
+            os.posix_fallocate(file.fileno(), 0, 2**16)
     except OSError as error:
         return error.errno in (errno.ENOSPC, errno.EDQUOT)
     return False
 
 
-@contextlib.contextmanager
-def _end_of(process: "subprocess.Popen[bytes]") -> Iterator[select.poll]:
-    """A handle that becomes ready when a program ends: no core is spent on asking."""
-    handle = os.pidfd_open(process.pid)
-    end = select.poll()
-    end.register(handle, select.POLLIN)
-    try:
-        yield end
-    finally:
-        os.close(handle)
-
-
 def _end_group(process: "subprocess.Popen[bytes]") -> None:
     """Kill what is left of a program's group; a program that still runs is asked first."""
-    if process.returncode is None:
-        with contextlib.suppress(ProcessLookupError):
+    with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
+        if process.returncode is None:
             os.killpg(process.pid, signal.SIGTERM)
-        with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(GRACE_S)
-    # the guard is in the group until now, so its number is of no other group
     with contextlib.suppress(ProcessLookupError):
+        # the guard is in the group until now, so its number is of no other group
         os.killpg(process.pid, signal.SIGKILL)
     assert process.stdin
     process.stdin.close()
     process.wait()
 
 
-def _search_path() -> str:
-    return os.pathsep.join(map(os.path.abspath, os.get_exec_path()))
-
-
 def last_words(log: Path) -> str:
-    """The end of the last line of a log; nothing where it holds none."""
+    """The last 200 letters of the last line of a log; nothing where it holds none."""
     try:
         with log.open("rb") as stream:
-            return last_line(stream)
+            stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL))
+            lines = stream.read().decode(errors="replace").strip().splitlines()
     except OSError:
         return ""
-
-
-def last_line(stream: BinaryIO) -> str:
-    """The end of the last line of an open log."""
-    size = stream.seek(0, os.SEEK_END)
-    stream.seek(max(0, size - TAIL))
-    lines = stream.read().decode(errors="replace").strip().splitlines()
-    return lines[-1][-LAST_LETTERS:] if lines else ""
-
-
-QUERY_S = 30.0
-"""Time limit of a program that is asked for its version, s."""
-QUERY_BYTES = 1_000_000
+    return lines[-1][-200:] if lines else ""
 
 
 @dataclass(frozen=True)
@@ -273,14 +236,11 @@ class Reply:
     def gist(self) -> str:
         """How it ended and its most telling line, for a message."""
         lines = [line.strip() for line in self.text.splitlines() if line.strip()]
-        telling = (line for line in lines if re.search(r"error|cannot|fail", line, re.IGNORECASE))
-        line = next(telling, lines[-1] if lines else "")
-        how = (
-            f"was killed by {signal.Signals(-self.returncode).name}"
-            if self.returncode < 0
-            else f"ended with {self.returncode}"
-        )
-        return f"it {how} and printed {f'“{line}”' if line else 'nothing'}"
+        telling = [line for line in lines if re.search("error|cannot|fail", line, re.IGNORECASE)]
+        line = f"“{[*telling, *lines[-1:]][0]}”" if lines else "nothing"
+        if self.returncode < 0:
+            return f"it was killed by {signal.Signals(-self.returncode).name} and printed {line}"
+        return f"it ended with {self.returncode} and printed {line}"
 
 
 def find(name: str, *, remedy: str) -> str:
@@ -292,12 +252,11 @@ def find(name: str, *, remedy: str) -> str:
         If there is none that may be run.
     """
     path = shutil.which(name)
-    if path:
-        return os.path.abspath(path)
-    for place in (Path(folder, name).absolute() for folder in os.get_exec_path()):
-        if place.is_file():
-            raise SolverError(f"{place} may not be run", remedy=f"chmod +x {place}")
-    raise SolverError(f"the program {name} is not in PATH", remedy=remedy)
+    if path is None:
+        if path := shutil.which(name, os.F_OK):
+            raise SolverError(f"{path} may not be run", remedy=f"chmod +x {path}")
+        raise SolverError(f"the program {name} is not in PATH", remedy=remedy)
+    return os.path.abspath(path)
 
 
 def ask(path: str, *arguments: str, env: Mapping[str, str | None] | None = None) -> Reply:
@@ -308,43 +267,34 @@ def ask(path: str, *arguments: str, env: Mapping[str, str | None] | None = None)
     SolverError
         If it does not end.
     """
+    command = [path, *arguments]
     with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder, "log")
-        ended = run(
-            [path, *arguments],
-            cwd=Path(folder),
-            log=log,
-            limit_s=QUERY_S,
-            env=env,
-            output_limit=QUERY_BYTES,
-        )
+        here, log = Path(folder), Path(folder, "log")
+        ended = run(command, cwd=here, log=log, limit_s=QUERY_S, env=env, output_limit=QUERY_BYTES)
         with log.open("rb") as stream:
             text = stream.read(QUERY_BYTES).decode(errors="replace")
-    if ended.timed_out:
+    if ended.over == "time":
         raise SolverError(
-            f"{' '.join([path, *arguments])} did not end within {QUERY_S:g} s",
+            f"{' '.join(command)} did not end within {QUERY_S:g} s",
             remedy="try it by hand: what does it wait for?",
         )
     return Reply(text, ended.returncode)
 
 
-LEAST = {
-    "open files": (resource.RLIMIT_NOFILE, 64, "ulimit -n", 1),
-    "memory": (resource.RLIMIT_AS, 2_000_000, "ulimit -v", 1024),
-}
-"""The limit, its least value, the command that sets it, and the size of its unit. A small study on
-two cores took 40 files; and 1.9e6 kB of addresses, of which it used a tenth."""
+def shortage() -> str:
+    """The limit of the shell that is too low for a study, or nothing: libraries crash beyond it.
 
-
-def shortages() -> Iterator[OrchestratorError]:
-    """The limits of the shell that are too low for a study: libraries crash beyond them."""
-    for what, (number, least, command, unit) in LEAST.items():
+    A small study on two cores took 40 files; and 1.9e6 kB of addresses, a tenth of it in use.
+    """
+    least = (
+        ("open files", resource.RLIMIT_NOFILE, 64, 1, "n"),
+        ("memory", resource.RLIMIT_AS, 2_000_000, 1024, "v"),
+    )
+    for what, number, value, unit, option in least:
         soft, _ = resource.getrlimit(number)
-        if soft != resource.RLIM_INFINITY and soft < least * unit:
-            yield OrchestratorError(
-                f"the limit of {what} is {soft // unit}, less than a study needs",
-                remedy=f"{command} {least}, or more",
-            )
+        if soft != resource.RLIM_INFINITY and soft < value * unit:
+            return f"the limit of {what} is {soft // unit}: raise it, ulimit -{option} {value}"
+    return ""
 
 
 def follow(parent: int) -> None:
@@ -352,6 +302,6 @@ def follow(parent: int) -> None:
     for number in terminal.ENDING:
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)

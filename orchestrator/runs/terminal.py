@@ -1,6 +1,5 @@
 """The process that a user started: its signals, and standard streams that may be closed or full."""
 
-import codecs
 import errno
 import io
 import os
@@ -14,8 +13,6 @@ ENDING = (
 )
 """The signals by which a user, a closing terminal or a queue asks a command to end. The last three
 are a queue's, before it kills, and the system's at a limit of processor time."""
-LETTERS = "orchestrator.letters"
-"""Name of the way to write letters that an encoding lacks."""
 
 
 def listen() -> None:
@@ -60,18 +57,10 @@ def take() -> None:
             os.fstat(number)
         except OSError:  # closed: else the next file that is opened would be written into
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    codecs.register_error(LETTERS, _letters)
     if sys.stdout is sys.__stdout__:
         sys.stdout = _text(1, sys.stdout)
     if sys.stderr is sys.__stderr__:
         sys.stderr = _text(2, sys.stderr)
-
-
-def lost() -> OSError | None:
-    """Why a part of the printed answer is lost, if it is."""
-    sys.stdout.flush()
-    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
-    return raw.failure if isinstance(raw, Stream) else None
 
 
 def _text(number: int, given: TextIO | None) -> TextIO:
@@ -81,14 +70,13 @@ def _text(number: int, given: TextIO | None) -> TextIO:
     return io.TextIOWrapper(
         io.BufferedWriter(stream),
         encoding=given.encoding if given is not None else "utf-8",
-        errors=LETTERS,
+        errors="backslashreplace",
         line_buffering=number == 2 or stream.isatty(),
     )
 
 
-def _letters(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Bytes of a file's name as they are, and letters that the encoding lacks as numbers."""
-    try:
-        return codecs.lookup_error("surrogateescape")(error)
-    except UnicodeError:
-        return codecs.backslashreplace_errors(error)
+def lost() -> OSError | None:
+    """Why a part of the printed answer is lost, if it is."""
+    sys.stdout.flush()
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw.failure if isinstance(raw, Stream) else None

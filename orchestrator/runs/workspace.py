@@ -88,8 +88,8 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     OrchestratorError
         If another process holds it, or the shell's limits are too low for any work.
     """
-    for shortage in process.shortages():
-        raise shortage
+    if shortage := process.shortage():
+        raise OrchestratorError(shortage)
     folder = Folder(root)
     with contextlib.ExitStack() as stack:
         try:

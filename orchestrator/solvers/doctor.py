@@ -97,8 +97,8 @@ def _tool(name: str) -> Finding:
 
 
 def _limits() -> Finding:
-    low = [str(error) for error in process.shortages()]
-    return Finding("limits", not low, "; ".join(low) or "enough memory and open files")
+    low = process.shortage()
+    return Finding("limits", not low, low or "enough memory and open files")
 
 
 def _disk(folder: Path) -> Finding:

@@ -231,7 +231,7 @@ def test_a_time_limit_ends_the_solver(tmp_path: Path) -> None:
         directory = case.prepare(SLOW, tmp_path / f"{limit_s}")
         edit(directory / "system/controlDict", "endTime             1000;", "endTime 1000000;")
         edit(directory / "system/fvSolution", "    residualControl", "    never")
-        assert allrun(directory, limit_s=limit_s).timed_out
+        assert allrun(directory, limit_s=limit_s).over == "time"
         if has_begun(directory):
             break
     pid = solver_pid(directory)
