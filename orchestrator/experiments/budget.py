@@ -4,7 +4,8 @@ A choice is changed alone, within what measurements and good practice leave open
 on the cheapest levels that feel it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ from orchestrator.report import document
 from orchestrator.report.document import Section
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene, roughness_length
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 COARSE = level("flow", "coarse")
@@ -50,8 +51,7 @@ QUANTITIES = ("shields", "ustar0")
 at which they moved."""
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
-Alternatives = Mapping[str, Fields]
-"""Values of fields by the name of the alternative."""
+FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,14 @@ class Choice:
 
     Attributes
     ----------
-    name : str
-        What tables and figures call it.
-    why : str
-        Why its alternatives are as good.
-    others : callable
-        The alternatives for a scene, or their fields.
+    name, why : str
+        What tables and figures call it, and why its alternatives are as good.
+    field : str
+        The field that it changes.
+    values, times, beside : tuple
+        Its alternatives: values of the field, factors of the scene's value, and sums to it.
+    packings : str
+        Whether "all" piles have it, "lattices" or "poured" beds alone.
     of_solved_flow : bool
         Whether it moves nothing under a flow that is not solved.
     dynamic : bool
@@ -74,7 +76,11 @@ class Choice:
 
     name: str
     why: str
-    others: Callable[[Scene], Alternatives]
+    field: str
+    values: tuple[Any, ...] = ()
+    times: tuple[float, ...] = ()
+    beside: tuple[float, ...] = ()
+    packings: str = "all"
     of_solved_flow: bool = False
     dynamic: bool = False
 
@@ -87,63 +93,34 @@ class Choice:
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """The scene with each alternative that it can have, by the alternative's name."""
-        if self.of_solved_flow and scene.flow.model != "solve":
+        others = "lattices" if scene.is_poured else "poured"
+        if self.packings == others or (self.of_solved_flow and scene.flow.model != "solve"):
             return
-        for name, fields in self.others(scene).items():
-            other = _with(scene, fields)
-            if other is not None and other != scene:
+        for name, fields in self._alternatives(scene).items():
+            try:
+                other = changed(scene, fields)
+            except InputError:  # the scene cannot have it
+                continue
+            if other != scene and (self.name != "force law" or law_holds(other)):
                 yield f"{self.name}: {name}", other
 
-
-def _with(scene: Scene, fields: Fields) -> Scene | None:
-    """A scene with some fields changed; None where they are refused."""
-    try:
-        return changed(scene, fields)
-    except InputError:
-        return None
-
-
-def _values(field: str, *values: Any) -> Callable[[Scene], Alternatives]:
-    return lambda scene: {f"{value}": {field: value} for value in values}
-
-
-def _times(field: str, *factors: float) -> Callable[[Scene], Alternatives]:
-    return lambda scene: {f"{by:g} times": {field: by * value_of(scene, field)} for by in factors}
-
-
-def _beside(field: str, *steps: float) -> Callable[[Scene], Alternatives]:
-    return lambda scene: {f"{by:+g}°": {field: value_of(scene, field) + by} for by in steps}
+    def _alternatives(self, scene: Scene) -> dict[str, Fields]:
+        if self.name == "packing":
+            return _packings(scene)
+        if self.name == "force law":  # peeling knows no torque
+            laws = {name: law for name, law in LAWS.items() if not law.turns}
+            return {law.label: {self.field: name} for name, law in laws.items()}
+        value = value_of(scene, self.field)
+        if self.name == "first cell":
+            value = scene.first_cell_height
+        return {
+            **{f"{one}": {self.field: one} for one in self.values},
+            **{f"{by:g} times": {self.field: by * value} for by in self.times},
+            **{f"{by:+g}°": {self.field: value + by} for by in self.beside},
+        }
 
 
-def _first_cells(scene: Scene) -> Alternatives:
-    height = scene.first_cell_height
-    return {f"{by:g} times": {"flow.first_cell_height": by * height} for by in (0.5, 2.0)}
-
-
-def _roughness(scene: Scene) -> Alternatives:
-    d = scene.grain.diameter
-    return {part: {"bed.roughness": roughness_length(part, d)} for part in ("d/10", "d/30")}
-
-
-def _laws(scene: Scene) -> Alternatives:
-    """The laws that hold at the scene, without those that need a torque."""
-    named: dict[str, Fields] = {
-        law.label: {"forces.law": name} for name, law in LAWS.items() if not law.turns
-    }
-    others = {name: _with(scene, fields) for name, fields in named.items()}
-    return {name: named[name] for name, other in others.items() if other and law_holds(other)}
-
-
-def _pockets(scene: Scene) -> Alternatives:
-    """Angles of a lattice's pockets; the grains of a poured bed have their own."""
-    return {} if scene.is_poured else _beside("bed.entrainment_angle_deg", -5.0, 5.0)(scene)
-
-
-def _exposures(scene: Scene) -> Alternatives:
-    return _values("forces.exposure", "alike", "protrusion")(scene) if scene.is_poured else {}
-
-
-def _packings(scene: Scene) -> Alternatives:
+def _packings(scene: Scene) -> dict[str, Fields]:
     """Other seeds of a poured bed; else the other packings of the plane, random gaps by seeds."""
     if scene.is_poured:
         return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
@@ -155,68 +132,15 @@ def _packings(scene: Scene) -> Alternatives:
     }
 
 
-CHOICES = (
-    Choice(
-        "first cell",
-        "A wall function asks for no one height of the cells on the bed.",
-        _first_cells,
-        of_solved_flow=True,
-    ),
-    Choice(
-        "turbulence model",
-        "No model is right for all flows that separate.",
-        _values("flow.turbulence_model", "kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"),
-        of_solved_flow=True,
-    ),
-    Choice(
-        "reading of the stress",
-        "The paper reads it off the first cells by Eq. 10.",
-        _values("forces.stress", "wall", "eq10"),
-        of_solved_flow=True,
-    ),
-    Choice(
-        "averaging length",
-        "The stress at a sharp crest has no limit; it is averaged on a length.",
-        _times("forces.averaging_length", 0.5, 2.0),
-        of_solved_flow=True,
-    ),
-    Choice("force law", "All laws that hold at the Re* of the scene.", _laws),
-    Choice(
-        "roughness length",
-        "Measured ones of beds of equal grains are between d/30 and d/10.",
-        _roughness,
-    ),
-    Choice("entrainment angle", "The pockets of one bed differ by more than that.", _pockets),
-    Choice(
-        "lift coefficient",
-        "Saffman's is that of an unbounded shear; measured lifts on a bed scatter by more.",
-        _times("forces.lift_coefficient", 0.5, 1.5),
-    ),
-    Choice("packing", "Of a bed that was not seen neither rows nor gaps are known.", _packings),
-    Choice(
-        "exposure",
-        "The flow meets all grains of a poured bed at one height, or each at its own.",
-        _exposures,
-    ),
-    Choice(
-        "criterion of motion",
-        "What counts as moved is a convention: between a sixth and a half of a diameter.",
-        _values("protocol.displacement_criterion", 0.15, 0.5),
-    ),
-    Choice(
-        "friction angle",
-        "That of a sand is known to a few degrees. A poured bed is poured anew by it.",
-        _beside("grain.friction_angle_deg", -5.0, 5.0),
-        dynamic=True,
-    ),
-    Choice(
-        FROZEN,
-        "The paper, and every level, keeps the flow of the whole pile until the last grain has "
-        "gone. Else the bed line is drawn anew after each tenth.",
-        _values("protocol.update", 0.1),
-        of_solved_flow=True,
-    ),
-)
+def _choices() -> Iterator[Choice]:
+    text = (FOLDER / "choices.toml").read_text(encoding="utf-8")
+    rows: list[dict[str, Any]] = tomllib.loads(text)["choice"]
+    for row in rows:
+        lists: dict[str, Any] = {key: tuple(v) for key, v in row.items() if isinstance(v, list)}
+        yield Choice(**{**row, **lists})
+
+
+CHOICES = tuple(_choices())
 """Every shared choice."""
 
 
@@ -348,6 +272,7 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
     from orchestrator.experiments import budget_figures as figures
 
+    words = experiment.texts("budget")
     moved, shared = tables["changes"], tables["shares"]
     piles = runs.planned.piles
     worn: list[tuple[Pile, Pile]] = [
@@ -356,18 +281,19 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
         if change.choice.name == FROZEN
         and all(piles[key].is_run(runs.done) for key in (change.base, change.other))
     ]
-    sections = [Section("All choices together", TEXT, (), (document.sheet(_all(shared)),), LIMITS)]
+    title, sheets = "All choices together", [document.sheet(_all(shared))]
+    sections = [Section(title, words["together"], (), sheets, [words["limit"]])]
     if worn:
         rows = moved[moved["choice"] == FROZEN]
         table = rows[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
         table = table.assign(**{"θ, %": 100 * rows["shields"], "u*₀, %": 100 * rows["ustar0"]})
         drawn = figures.curves(worn, runs.cases)
-        figure = experiment.figure("wear", "Frozen bed and bed that changes", WEAR, drawn)
+        figure = experiment.figure("wear", "Frozen bed and bed that changes", words["wear"], drawn)
         title = "The bed that changes"
-        sections.append(Section(title, CHANGING, (figure,), (document.sheet(table),)))
+        sections.append(Section(title, words["changing"], (figure,), (document.sheet(table),)))
     for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
         name, drawn = str(scene["scene"].iloc[0]), figures.tornado(scene)
-        figure = experiment.figure(f"tornado-{number}", name, CAPTION, drawn)
+        figure = experiment.figure(f"tornado-{number}", name, words["scene"], drawn)
         sections.append(Section(name, "", (figure,), (document.sheet(_by_fraction(scene)),)))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
@@ -420,30 +346,3 @@ def _by_fraction(rows: pd.DataFrame) -> pd.DataFrame:
     table = rows.assign(share=share, head=heads)
     wide = table.pivot_table("share", "choice", "head", aggfunc="first", sort=False)
     return wide.reset_index()
-
-
-TEXT = (
-    "The fidelity levels are measured against the best one. What all of them share does not show "
-    "there: it is changed here, one choice at a time. Each bar spans the largest change over the "
-    "fractions, downwards and upwards; the top bar is the root of the sum of squares, as if the "
-    "choices had nothing to do with one another."
-)
-CAPTION = (
-    "Quasi-static levels (coarse flow, peeling) except for the friction angle, which DEM alone "
-    "feels. The Shields number is that of the mean stress on the grains that moved; u*₀ is that of "
-    "the flow far from the bed."
-)
-CHANGING = (
-    "The levels keep the flow over the whole pile until the end, as the paper does. Here the bed "
-    "line is drawn anew after each tenth of the counted grains, the flow is solved again, and the "
-    "grains go on by peeling. The table has the threshold on the bed that changes over that on the "
-    "frozen one, less 1."
-)
-WEAR = (
-    "Left: the threshold at each n/N. Right: the bed line at the start and after each tenth, "
-    "darker as it wears; its edges are rounded over 2 d. Grains that come to light are not loaded."
-)
-LIMITS = (
-    "The ranges of the choices are judgements, with the reason beside each; no statistics.",
-    "Alternatives that are refused at a scene, or do not hold at its Re*, are left out.",
-)

@@ -1,7 +1,9 @@
 """An experiment: scenes in, runs, tables, one page of figures."""
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +101,13 @@ def nothing_ran(out: Path, what: str) -> OrchestratorError:
     """The error of an experiment of which no run came to its end."""
     remedy = "`orchestrator status` names the causes; the same command continues"
     return OrchestratorError(what, where=str(out), remedy=remedy)
+
+
+@cache
+def texts(name: str) -> dict[str, str]:
+    """The texts of the page of an experiment, by what they are about."""
+    file = Path(__file__).with_name("texts.toml")
+    return dict(tomllib.loads(file.read_text(encoding="utf-8"))[name])
 
 
 def figure(name: str, title: str, caption: str, canvas: Any) -> Figure:

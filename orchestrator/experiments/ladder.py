@@ -392,81 +392,46 @@ def _sections(tables: Tables) -> list[Section]:
     """The sections of the page, from the tables ``points``, ``levels`` and ``naive``."""
     from orchestrator.experiments import ladder_figures as figures
 
+    words = experiment.texts("ladder")
     by_dem = together(tables["points"][tables["points"]["asked"] == "dem"])
-    heads = {name: f"{name.removeprefix('error_')} %" for name in ERRORS}
-    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
     means = by_dem[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *ERRORS]]
-    means = means.assign(**{name: 100 * by_dem[name] for name in ERRORS}).rename(columns=heads)
+    means = means.assign(**{name: 100 * by_dem[name] for name in ERRORS})
     meanings = pd.DataFrame(
         [(part, one.name, one.meaning) for part, levels in LEVELS.items() for one in levels],
         columns=["part", "level", "what it is"],
     )
-    known = tables["levels"].assign(error=100 * tables["levels"]["error"])
     index = ["part", "scene_class", "level", "scenes", "cost_core_s"]
-    wide = known.set_index([*index, "fraction"])["error"].unstack("fraction")
-    wide = wide.rename(columns=lambda at: f"{at:.0%}").reset_index()
+    known = (100 * tables["levels"].set_index([*index, "fraction"])["error"]).unstack("fraction")
+    known.columns = pd.Index([f"{fraction:.0%}" for fraction in known.columns])
     order = {name: place for place, name in enumerate(meanings["level"])}
-    wide = wide.sort_values(
-        ["part", "scene_class", "level"],
-        key=lambda v: v.map(order).fillna(0) if v.name == "level" else v,
-    )
+    known = known.reset_index().assign(order=lambda rows: rows["level"].map(order))
+    known = known.sort_values(["part", "scene_class", "order"]).drop(columns="order")
+    heads = {name: f"{name.removeprefix('error_')} %" for name in ERRORS}
+    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
+    heads |= {"scene_class": "scene class"}
+    figure = experiment.figure
+    largest, fractions = figures.against_cost(by_dem), figures.by_fraction(by_dem)
+    charts = [
+        figure("speed-against-accuracy", "Cost against error", words["largest"], largest),
+        figure("error-at-fractions", "The error at each fraction", words["fractions"], fractions),
+    ]
     return [
         Section(
             "Speed against accuracy",
-            ACCURACY,
-            (
-                experiment.figure(
-                    "speed-against-accuracy",
-                    "Cost against error",
-                    CAPTION,
-                    figures.against_cost(by_dem),
-                ),
-                experiment.figure(
-                    "error-at-fractions",
-                    "The error at each fraction",
-                    "The same errors at each fraction, and over the whole curve (its mean size at "
-                    "5 to 85 %). The pairs on the step line above are numbered.",
-                    figures.by_fraction(by_dem),
-                ),
-            ),
-            (document.sheet(means.sort_values(["packing", "core-s"])),),
+            words["accuracy"],
+            charts,
+            [document.sheet(means.rename(columns=heads).sort_values(["packing", "core-s"]))],
         ),
         Section(
             "What is gained over the naive route",
-            NAIVE,
-            (experiment.figure("gains", "Factors gained", "", figures.gains(tables["naive"])),),
-            (document.sheet(tables["naive"]),),
+            words["naive"],
+            [figure("gains", "Factors gained", "", figures.gains(tables["naive"]))],
+            [document.sheet(tables["naive"])],
         ),
         Section(
             "The fidelity levels, and what is known of them",
-            "The largest error over the scenes of a class, %, without the uncertainty of the "
-            "reference. From this table `study --tolerance` chooses.",
-            tables=(document.sheet(meanings), document.sheet(wide)),
-            limits=(
-                "An error is known for the classes of scenes that were run, no others. It is that "
-                "of the method, not of the model: first cell, turbulence model and the way to read "
-                "the stress move the answer by more.",
-            ),
+            words["levels"],
+            tables=[document.sheet(meanings), document.sheet(known.rename(columns=heads))],
+            limits=[words["limit"]],
         ),
     ]
-
-
-ACCURACY = (
-    "Every scene is answered on many pairs of levels, one for the flow and one for the grains. The "
-    "error is that of tau_c at 10, 30, 50 and 70 % of the grains, against the best pair with the "
-    "same model choices; the cost is processor time, of the flow's solve and of the grains' run "
-    "together. No pair on the step line is beaten in both by another.\n\n"
-    "The band is how far the reference itself moved when all of its numbers were changed: "
-    "stiffness, time step, number of layers. A point within it is as good as the reference."
-)
-CAPTION = (
-    "A panel for each packing; the largest error over the four fractions and over the scenes. "
-    "Hollow points have another turbulence model, contacts of one stiffness in N/m or a bed in "
-    "space: their distance is that of the models."
-)
-NAIVE = (
-    "One explicit run of the whole pile for each Re*, at K d/W = 1e4 and at the paper's K = 1e6 "
-    "N/m with the time step that it forces. The time of a load step is measured on a small pile; "
-    "the pile of the figure has more grains, in proportion to which it is extrapolated, and needs "
-    "as many runs as the fast level has load steps."
-)

@@ -1,6 +1,6 @@
 """The charts of speed against accuracy, and of what is gained over the naive route."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,19 +22,20 @@ HEADS = {name: f"$n/N$ = {name[-2:]} %" for name in ERRORS[:-1]} | {ERRORS[-1]: 
 FLOOR = 1e-3
 """Errors below it are drawn on it."""
 TOLERANCES = (0.05, 0.2)
-MARKERS = {
-    "^": "threshold too high",
-    "v": "threshold too low",
-    "X": "not all fractions reached",
+MARKERS = {"^": "threshold too high", "v": "threshold too low", "X": "not all fractions reached"}
+BANDS: dict[str, Look] = {
+    "error of the reference itself": {"color": "0.88", "lw": 0, "zorder": 0.1, "gid": "reference"},
+    "the model's own spread: better numerics buy nothing": {
+        "color": "#fdf3dc",
+        "lw": 0,
+        "zorder": 0,
+        "gid": "model",
+    },
 }
-REFERENCE: Look = {"color": "0.88", "lw": 0}
-MODEL: Look = {"color": "#fdf3dc", "lw": 0}
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5, "gid": "front"}
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
 """How the grains were answered; colours that are told apart by all."""
 NOTHING = "no pair of levels has been run"
-MEASURED: Look = {"fc": "#0072b2", "ec": "#0072b2", "lw": 0.8}
-EXTRAPOLATED: Look = {"fc": "white", "ec": "#0072b2", "lw": 0.8, "hatch": "////"}
 
 
 def against_cost(pairs: pd.DataFrame) -> Canvas:
@@ -43,40 +44,14 @@ def against_cost(pairs: pd.DataFrame) -> Canvas:
     Parameters
     ----------
     pairs : DataFrame
-        A row for each pair of levels and packing, as `ladder.together` gives it: packing,
-        flow_level, grain_level; piles, how many it was run on; cost_core_s, s of one core;
-        error_10 … error_70 and error_curve, relative and signed, NaN where a fraction is not
-        reached; reference_error, how well the reference is known; model_floor, half the interval of
-        the model, NaN if not measured; same_model; pareto, whether no pair is cheaper and better.
+        A row for each pair of levels and packing, as `ladder.together` gives it.
     """
-    table = _numbered(pairs)
-    fractions = table[list(ERRORS[:-1])].to_numpy(float)
+    fractions = pairs[list(ERRORS[:-1])].to_numpy(float)
     at = np.nan_to_num(np.abs(fractions)).argmax(axis=1)
-    table = table.assign(
-        error=fractions[np.arange(len(table)), at], complete=np.isfinite(fractions).all(axis=1)
+    table = pairs.assign(
+        largest=fractions[np.arange(len(pairs)), at], complete=np.isfinite(fractions).all(axis=1)
     )
-    parts = [part for _, part in table.groupby("packing", sort=False)]
-    figure = style.canvas(2.6 * len(parts) + 0.06 * table["number"].nunique() + 1.0)
-    axes = figure.subplots(max(len(parts), 1), 1, sharex=True, squeeze=False)[:, 0].tolist()
-    for ax, part in zip(axes, parts, strict=False):
-        shown = _points(ax, part)
-        front = shown[shown["pareto"].astype(bool)].sort_values("x")
-        ax.step(front["x"], front["y"], where="post", **FRONT)
-        packing, piles = part["packing"].iloc[0], part["piles"].max()
-        title = f"{packing} packing; each pair of levels on at most {piles} piles"
-        ax.set_title(title, loc="left")
-        ax.text(1, 1.02, _left_out(part), ha="right", transform=ax.transAxes, **style.NOTE)
-    for ax in axes:
-        ax.set_ylabel("largest error of $τ_c$, %")
-    axes[-1].set_xlabel("cost, s of one core")
-    _scales(axes, axes, parts)
-    line = [Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)]
-    looks = [*_looks(parts), *(line if table["pareto"].any() else [])]
-    style.legends(figure, _methods(table), [*_key(table), *looks])
-    figure.draw_without_rendering()  # labels are placed in a finished layout
-    for ax, part in zip(axes, parts, strict=False):
-        _label(ax, part, 6.0, names=True)
-    return figure
+    return _chart(table, {"largest": ""})
 
 
 def by_fraction(pairs: pd.DataFrame) -> Canvas:
@@ -85,74 +60,81 @@ def by_fraction(pairs: pd.DataFrame) -> Canvas:
     The columns are those of `against_cost`, a row of panels for each packing; the pairs on the
     front are numbered.
     """
-    table = _numbered(pairs)
-    packings = [part for _, part in table.groupby("packing", sort=False)]
-    figure = style.canvas(1.7 * len(packings) + 0.06 * table["number"].nunique() + 1.3)
-    grid = figure.subplots(
-        max(len(packings), 1), len(HEADS), sharex=True, sharey=True, squeeze=False
+    return _chart(pairs.assign(complete=True), HEADS)
+
+
+def _chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
+    """A panel for each packing and column of errors; a single one has the front and all names."""
+    single = len(columns) == 1
+    parts = [name for name in LEVEL_PAIR if pairs[name].nunique() > 1] or LEVEL_PAIR[-1:]
+    table = pairs.assign(
+        number=pairs.groupby(LEVEL_PAIR, sort=False).ngroup() + 1,
+        name=pairs[parts].astype(str).agg(", ".join, axis=1) if len(pairs) else "",
+        colour=pairs["grain_level"].map(METHODS).fillna(METHODS["DEM"]),
+        front=pairs["pareto"].astype(bool),
     )
-    parts = [
-        part.assign(error=part[column], complete=True) for part in packings for column in HEADS
+    packings = [rows for _, rows in table.groupby("packing", sort=False)]
+    height = (2.6 if single else 1.7) * len(packings) + 0.06 * table["number"].nunique() + 1.2
+    figure, shape = style.canvas(height), (max(len(packings), 1), len(columns))
+    grid = figure.subplots(*shape, sharex=True, sharey=not single, squeeze=False)
+    panels = [
+        (ax, head, _placed(rows, column))
+        for row, rows in zip(grid, packings, strict=False)
+        for ax, (column, head) in zip(row, columns.items(), strict=True)
     ]
-    for ax, part in zip(grid.ravel(), parts, strict=False):
-        _points(ax, part)
-    for ax, part in zip(grid[:, 0], packings, strict=False):
-        ax.set_ylabel(f"{part['packing'].iloc[0]}\nerror of $τ_c$, %")
-    for ax, head in zip(grid[0], HEADS.values(), strict=True):
+    for ax, head, rows in panels:
+        _points(ax, rows)
         ax.set_title(head)
-    grid[-1, 2].set_xlabel("cost, s of one core")
-    _scales(list(grid.ravel()), list(grid[:, -1]), parts)
-    key = _key(table[table["pareto"].astype(bool)])
-    style.legends(figure, _methods(table), [*key, *_looks(parts)])
-    figure.draw_without_rendering()
-    for ax, part in zip(grid.ravel(), parts, strict=False):
-        _label(ax, part[part["pareto"].astype(bool)], 5.5, names=False)
+    for ax, rows in zip(grid[:, 0], packings, strict=False):
+        packing = rows["packing"].iloc[0]
+        ax.set_ylabel("largest error of $τ_c$, %" if single else f"{packing}\nerror of $τ_c$, %")
+        if single:
+            piles = rows["piles"].max()
+            title = f"{packing} packing; each pair of levels on at most {piles} piles"
+            ax.set_title(title, loc="left")
+            ax.text(1, 1.02, _left_out(rows), ha="right", transform=ax.transAxes, **style.NOTE)
+    if single:
+        for ax, _, rows in panels:
+            front = rows[rows["front"]].sort_values("x")
+            ax.step(front["x"], front["y"], where="post", **FRONT)
+    grid[-1, shape[1] // 2].set_xlabel("cost, s of one core")
+    drawn = pd.concat([rows for *_, rows in panels]) if panels else pd.DataFrame()
+    for ax in grid.ravel():
+        _scales(ax, drawn, named=ax in grid[:, -1])
+    style.legends(figure, *_entries(table, drawn, single=single))
+    figure.draw_without_rendering()  # labels are placed in a finished layout
+    for ax, _, rows in panels:
+        _label(ax, rows if single else rows[rows["front"]], named=single)
     return figure
 
 
-def _numbered(pairs: pd.DataFrame) -> pd.DataFrame:
-    """With a number and a name for each pair, in the order in which they come, and its method."""
-    parts = [column for column in LEVEL_PAIR if pairs[column].nunique() > 1] or LEVEL_PAIR[-1:]
-    return pairs.assign(
-        number=pairs.groupby(LEVEL_PAIR, sort=False).ngroup() + 1,
-        name=pairs[parts].astype(str).agg(", ".join, axis=1) if len(pairs) else "",
-        method=pairs["grain_level"].where(pairs["grain_level"].isin(list(METHODS)), "DEM"),
-    )
-
-
-def _shown(rows: pd.DataFrame) -> pd.DataFrame:
+def _placed(rows: pd.DataFrame, column: str) -> pd.DataFrame:
     """The rows that have a place in a panel: x, and y on the floor at least."""
-    known = rows[(rows["cost_core_s"] > 0) & rows["error"].notna()]
-    sign = np.where(known["error"] < 0, "v", "^")
-    return known.assign(
-        x=known["cost_core_s"],
-        y=known["error"].abs().clip(lower=FLOOR),
-        marker=np.where(known["complete"], sign, "X"),
+    shown = rows[(rows["cost_core_s"] > 0) & rows[column].notna()]
+    sign = np.where(shown[column] < 0, "v", "^")
+    return shown.assign(
+        x=shown["cost_core_s"],
+        y=shown[column].abs().clip(lower=FLOOR),
+        marker=np.where(shown["complete"], sign, "X"),
     )
 
 
-def _points(ax: Axes, rows: pd.DataFrame) -> pd.DataFrame:
-    """Draw the pairs of a panel, and the bands of what is uncertain; the rows that are drawn."""
-    shown = _shown(rows)
-    for (method, marker, same), alike in shown.groupby(["method", "marker", "same_model"]):
-        look: Look = {"mfc": METHODS[str(method)] if same else "white", "mec": METHODS[str(method)]}
-        place = alike["x"], alike["y"]
-        ax.plot(*place, ls="", ms=5, mew=0.9, zorder=3, gid="point", marker=marker, **look)
-    for column, gid, look, zorder in (
-        ("reference_error", "reference", REFERENCE, 0.1),
-        ("model_floor", "model", MODEL, 0.0),
-    ):
-        end = rows[column].max() if column == "reference_error" else rows[column].min()
+def _points(ax: Axes, rows: pd.DataFrame) -> None:
+    """The pairs of a panel, and the bands of what is uncertain."""
+    for (colour, marker, same), alike in rows.groupby(["colour", "marker", "same_model"]):
+        face: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
+        ax.plot(alike["x"], alike["y"], ls="", ms=5, mew=0.9, zorder=3, gid="point", **face)
+    ends = (rows["reference_error"].max(), rows["model_floor"].min())
+    for end, look in zip(ends, BANDS.values(), strict=True):
         if end > FLOOR:
-            ax.axhspan(0, float(end), zorder=zorder, gid=gid, **look)
-    return shown
+            ax.axhspan(0, float(end), **look)
 
 
 def _left_out(rows: pd.DataFrame) -> str:
     """Which pairs have no place in a panel, and why."""
     reasons = {
         "cost not measured": rows["cost_core_s"].isna(),
-        "no fraction reached": rows["error"].isna(),
+        "no fraction reached": rows["largest"].isna(),
     }
     return "\n".join(
         f"{why}: {'; '.join(dict.fromkeys(rows['name'][which]))}"
@@ -161,89 +143,72 @@ def _left_out(rows: pd.DataFrame) -> str:
     )
 
 
-def _scales(axes: Sequence[Axes], last: Sequence[Axes], parts: Sequence[pd.DataFrame]) -> None:
+def _scales(ax: Axes, drawn: pd.DataFrame, *, named: bool) -> None:
     """Logarithmic axes, and the lines of tolerance, named at the right of some panels."""
-    shown = pd.concat([_shown(part) for part in parts]) if parts else pd.DataFrame()
-    for ax in axes:
-        if shown.empty:
-            place: Look = {"ha": "center", "va": "center", "transform": ax.transAxes}
-            ax.text(0.5, 0.5, NOTHING, **place, **style.NOTE)
-            ax.set(xticks=[], yticks=[])
-            continue
-        x, y = shown["x"], shown["y"]
-        ax.set(xscale="log", yscale="log", xlim=(x.min() / 1.8, x.max() * 1.8))
-        ax.set_ylim(FLOOR / 1.5, max(1.0, 2 * y.max()))
-        ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g}")
-        style.plain_ticks(ax.xaxis)
-        for tolerance in TOLERANCES:
-            ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1, gid="tolerance")
-            if any(ax is other for other in last):
-                place = {"va": "center", "transform": ax.get_yaxis_transform()}
-                ax.text(1, tolerance, f" {tolerance:.0%}", **place, **style.NOTE)
+    if drawn.empty:
+        place: Look = {"ha": "center", "va": "center", "transform": ax.transAxes}
+        ax.text(0.5, 0.5, NOTHING, **place, **style.NOTE)
+        ax.set(xticks=[], yticks=[])
+        return
+    x, y = drawn["x"], drawn["y"]
+    ax.set(xscale="log", yscale="log", xlim=(x.min() / 1.8, x.max() * 1.8))
+    ax.set_ylim(FLOOR / 1.5, max(1.0, 2 * y.max()))
+    ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g}")
+    style.plain_ticks(ax.xaxis)
+    for tolerance in TOLERANCES:
+        ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1, gid="tolerance")
+        if named:
+            place = {"va": "center", "transform": ax.get_yaxis_transform()}
+            ax.text(1, tolerance, f" {tolerance:.0%}", **place, **style.NOTE)
 
 
-def _label(ax: Axes, rows: pd.DataFrame, size: float, *, names: bool) -> None:
+def _label(ax: Axes, rows: pd.DataFrame, *, named: bool) -> None:
     """Number the pairs of a panel; with their names where they are on the front."""
-    shown = _shown(rows)
-    halo = [Stroke(linewidth=1.8, foreground="white"), Normal()]
-    each: Any = shown.itertuples(index=False)
+    look: Look = {"fontsize": 6.0 if named else 5.5, "color": "0.1", "zorder": 5, "gid": "tag"}
+    look["path_effects"] = [Stroke(linewidth=1.8, foreground="white"), Normal()]
+    each: Any = rows.itertuples(index=False)
     texts = [
-        ax.text(
-            row.x,
-            row.y,
-            f"{row.number}: {row.name}" if names and row.pareto else str(row.number),
-            fontsize=size,
-            color="0.1",
-            zorder=5,
-            gid="tag",
-            path_effects=halo,
-        )
+        ax.text(row.x, row.y, f"{row.number}" + f": {row.name}" * (named and row.front), **look)
         for row in each
     ]
     if texts:
-        points = _shown(rows)
         arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
-        adjust_text(
-            texts, points["x"].to_numpy(), points["y"].to_numpy(), ax=ax, arrowprops=arrow,
-            expand=(1.15, 1.4), iter_lim=300,
-        )  # fmt: skip
+        place = rows["x"].to_numpy(float), rows["y"].to_numpy(float)
+        adjust_text(texts, *place, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100)
     for text in texts:
         text.set_in_layout(False)
 
 
-def _methods(table: pd.DataFrame) -> list[Artist]:
-    used = set(table["method"])
-    return [style.entry(name, colour) for name, colour in METHODS.items() if name in used]
-
-
-def _key(table: pd.DataFrame) -> list[Artist]:
-    rows: Any = table.drop_duplicates("number").itertuples(index=False)
-    return [
-        Line2D([], [], ls="", marker=f"${r.number}$", ms=5, label=r.name, color=METHODS[r.method])
+def _entries(
+    table: pd.DataFrame, drawn: pd.DataFrame, *, single: bool
+) -> tuple[list[Artist], list[Artist]]:
+    """Legends: the methods, the numbers of the pairs, the markers and bands that are drawn."""
+    used = set(table["colour"])
+    methods: list[Artist] = [
+        style.entry(name, colour) for name, colour in METHODS.items() if colour in used
+    ]
+    rows: Any = (table if single else table[table["front"]]).drop_duplicates("number").itertuples()
+    looks: list[Artist] = [
+        Line2D([], [], ls="", marker=f"${r.number}$", ms=5, label=r.name, color=r.colour)
         for r in rows
     ]
-
-
-def _looks(parts: Sequence[pd.DataFrame]) -> list[Artist]:
-    """Legend of the markers and bands that are drawn."""
-    if not parts:
-        return []
-    rows = _shown(pd.concat(parts))
+    if drawn.empty:
+        return methods, looks
     shared: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
-    entries: list[Artist] = [
-        Line2D([], [], marker=marker, mfc="0.2", label=label, **shared)
-        for marker, label in MARKERS.items()
-        if (rows["marker"] == marker).any()
-    ]
-    if not rows["same_model"].all():
+    for marker, label in MARKERS.items():
+        if (drawn["marker"] == marker).any():
+            looks.append(Line2D([], [], marker=marker, mfc="0.2", label=label, **shared))
+    if not drawn["same_model"].all():
         label = "hollow: another turbulence model, contact or bed"
-        entries.append(Line2D([], [], marker="^", mfc="white", label=label, **shared))
-    if (rows["reference_error"] > FLOOR).any():
-        entries.append(Patch(label="error of the reference itself", **REFERENCE))
-    if (rows["model_floor"] > FLOOR).any():
-        label = "the model's own spread: better numerics buy nothing"
-        entries.append(Patch(label=label, **MODEL))
-    return entries
+        looks.append(Line2D([], [], marker="^", mfc="white", label=label, **shared))
+    for column, (label, look) in zip(
+        ("reference_error", "model_floor"), BANDS.items(), strict=True
+    ):
+        if (drawn[column] > FLOOR).any():
+            looks.append(Patch(label=label, color=look["color"], lw=0))
+    if single and table["front"].any():
+        looks.append(Line2D([], [], label="no pair of levels is cheaper and better", **FRONT))
+    return methods, looks
 
 
 def gains(routes: pd.DataFrame) -> Canvas:
@@ -258,13 +223,14 @@ def gains(routes: pd.DataFrame) -> Canvas:
     ax = figure.subplots()
     cost = routes["core_s"].to_numpy(float)
     factor = cost[0] / cost
+    look: Look = {"ec": "#0072b2", "lw": 0.8}
     ax.set(xscale="log", xlabel="times cheaper than the naive route")
     for y, (gain, extrapolated) in enumerate(zip(factor, routes["extrapolated"], strict=True)):
         if not np.isfinite(gain):
             ax.text(1, y, " not measured", va="center", **style.NOTE)
             continue
-        look = EXTRAPOLATED if extrapolated else MEASURED
-        ax.barh(y, gain - 1, left=1, height=0.62, gid="gain", **look)
+        face: Look = {"fc": "white", "hatch": "////"} if extrapolated else {"fc": "#0072b2"}
+        ax.barh(y, gain - 1, left=1, height=0.62, gid="gain", **look, **face)
         text = f" {_rounded(gain)} × ({duration(cost[y])})"
         ax.text(max(gain, 1), y, text, va="center", fontsize=7, gid="gain's text")
     ax.axvline(1, color="0.3", lw=0.6)
@@ -275,7 +241,8 @@ def gains(routes: pd.DataFrame) -> Canvas:
     ax.set_xlim(known.min(initial=0.8), known.max(initial=10.0) ** 1.5)
     ax.spines[["top", "right"]].set_visible(False)
     if routes["extrapolated"].any():
-        style.legends(figure, [], [Patch(label="extrapolated, not run", **EXTRAPOLATED)])
+        sample = Patch(label="extrapolated, not run", fc="white", hatch="////", **look)
+        style.legends(figure, [], [sample])
     return figure
 
 

@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import pandas as pd
 
@@ -43,16 +43,14 @@ NOTICED = ("exploded", "noisy", "stalled")
 """How a run says that it failed."""
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """One place on an axis: what it is called, and the fields that it sets."""
 
     label: float | str
     changes: Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """An axis of a map: its label with its unit, its places, whether these are fractions."""
 
     label: str
@@ -60,8 +58,7 @@ class Axis:
     is_fraction: bool = False
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """The scenes of one place of a map, and those that they are compared with."""
 
     x: Place
@@ -98,21 +95,14 @@ class Map:
     @property
     def limits(self) -> tuple[str, ...]:
         """The limits that were read off it, in sentences."""
-        return tuple(limit.says for limit in limits.of_map(self.name))
+        return limits.SAYS.get(self.name, ())
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A map and what its runs came to.
+class Judged(NamedTuple):
+    """A map, and a table with a row for each of its places.
 
-    Attributes
-    ----------
-    map : Map
-        The map.
-    table : DataFrame
-        A row for each place: map, x and y, numbers or texts; verdict, "good", "wrong" or one of
-        `NOTICED`; caught, whether the run itself noticed; error, relative and signed, or NaN; note,
-        the cause.
+    The columns are map; x and y, numbers or texts; verdict, "good", "wrong" or one of `NOTICED`;
+    caught, whether the run itself noticed; error, relative and signed, or NaN; note, the cause.
     """
 
     map: Map
@@ -264,48 +254,31 @@ def _error(one: Map, run: Run, runs: Runs, fraction: float | None) -> float:
     errors = []
     for scene, reference in zip(run.scenes, run.references, strict=True):
         if one.judge == "grain":
-            errors.append(_grain(scene, runs) - 1)
+            cells = next(cells for cells in runs.planned.cells if scene in cells.scenes)
+            found = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
+            errors.append(float(found.value[cells.scenes.index(scene)]) ** 2 - 1)
         elif _failure(reference, runs):
             errors.append(math.nan)
         else:
-            errors += _pile_errors(scene, reference, runs, fraction)
+            fractions = scene.protocol.fractions if fraction is None else (fraction,)
+            piles = (runs.planned.piles[asked.id] for asked in (scene, reference))
+            answers = (pile.thresholds(runs.cases, fractions) for pile in piles)
+            for answer, other in zip(*answers, strict=True):
+                if not (math.isnan(answer.tau) and math.isnan(other.tau)):
+                    error = answer.tau / other.tau - 1
+                    errors.append(math.inf if math.isnan(error) else error)
     return max(errors, key=abs, default=math.nan)
 
 
-def _grain(scene: Scene, runs: Runs) -> float:
-    """Threshold stress of one grain over that of the closed form."""
-    cells = next(cells for cells in runs.planned.cells if scene in cells.scenes)
-    found = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
-    return float(found.value[cells.scenes.index(scene)]) ** 2
-
-
-def _pile_errors(
-    scene: Scene, reference: Scene, runs: Runs, fraction: float | None
-) -> Iterator[float]:
-    fractions = scene.protocol.fractions if fraction is None else (fraction,)
-    piles = (runs.planned.piles[one.id] for one in (scene, reference))
-    answers = (pile.thresholds(runs.cases, fractions) for pile in piles)
-    for answer, other in zip(*answers, strict=True):
-        if not (math.isnan(answer.tau) and math.isnan(other.tau)):
-            error = answer.tau / other.tau - 1
-            yield error if not math.isnan(error) else math.inf
-
-
 TITLE = "Where each method fails"
-TEXT = (
-    f"Each cell is a real run. It is good where tau_c is within {WRONG:.0%} of its reference at"
-    " every fraction; wrong where it is not and nothing said so; noisy, exploded or stalled where"
-    " the run itself said so (a marked corner)."
-)
 
 
 def _sections(judged: Sequence[Judged]) -> list[Section]:
     """The page: the sheet of all maps, then each by itself."""
     from orchestrator.experiments import stability_figures as figures
 
-    sections = [
-        Section("All maps", TEXT, (experiment.figure("maps", TITLE, "", figures.sheet(judged)),))
-    ]
+    sheet = experiment.figure("maps", TITLE, "", figures.sheet(judged))
+    sections = [Section("All maps", experiment.texts("stability")["maps"], (sheet,))]
     for one in judged:
         shown = one.map
         drawn = experiment.figure(f"map-{shown.name}", shown.title, "", figures.draw(one))

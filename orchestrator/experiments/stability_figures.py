@@ -36,7 +36,7 @@ AROUND, LINE = 0.62, 0.115
 
 @dataclass(frozen=True)
 class Size:
-    """How large a map is drawn: height of a cell, inches; letters in a line of text; its font."""
+    """How large a map is drawn: height of a cell, inches; letters in a line; its font."""
 
     cell: float
     letters: int

@@ -5,12 +5,12 @@ of the maps lie in ``calibration/maps.csv``.
 """
 
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.bed.line import of_bed
+from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import model
@@ -34,32 +34,58 @@ WAITING_TIME = 3.0
 COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = 59.0
 """Entrainment angle from which the grains of a row hold each other."""
+SAYS = {
+    "slope": (
+        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope; a "
+        "poured bed is nowhere beyond its friction angle and 35 deg.",
+        "Beyond min(phi, 90 deg - beta) a bed rolls back without any flow: refused.",
+        "Piles of 10 to 35 deg: others are refused.",
+        "Beyond the entrainment angle a single grain may come to rest half-way: a warning.",
+        "The linear theories are of beds that rise by 35 deg at most.",
+        "The theory of a hill is of beds that fall to half of their height before and behind.",
+        "The flow over a flat bed is not solved.",
+    ),
+    "first-cell": (
+        "z_e, half the first cell, is at least z0/2: refused below; from z0 on it is sound.",
+    ),
+    "similarity": (
+        "In the first cell the eddy viscosity is above the molecular one: refused below.",
+    ),
+    "timestep-damping": (
+        "The largest safe time step falls with the damping: "
+        + ", ".join(f"{step:g} up to {damping:g}" for damping, step in TIMESTEPS)
+        + " sqrt(m/K); refused above.",
+        f"Without damping a bed never rests: refused below {LEAST_DAMPING:g}.",
+    ),
+    "entrainment-layers": (f"Piles have rows that touch: refused below {CLOSE_PACKED_DEG:g} deg.",),
+    "quiet-step": (
+        f"A pile's load step waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
+        "A pile's load steps are at most 5 % apart: a warning above.",
+    ),
+    "forced": ("Every exposed grain carries a force: a warning otherwise.",),
+    "mesh-scheme-15": ("linearUpwind alone converges to the answer: a warning otherwise.",),
+}
+"""The limits in sentences, by the map that they were read off."""
 
 
-@dataclass(frozen=True)
-class Limit:
-    """One limit of a method.
+class Fault(NamedTuple):
+    """A limit that a scene is beyond.
 
     Attributes
     ----------
     map : str
-        Name of the map that shows it.
+        The map that shows the limit.
     field : str
         The field of a study file to change.
-    beyond : callable
-        What is wrong with a scene, or None.
-    says : str
-        The limit in a sentence.
-    remedy : str
-        What would do.
+    what, remedy : str
+        What is wrong, and what would do.
     refused : bool
         Whether a study is refused; else it is warned.
     """
 
     map: str
     field: str
-    beyond: Callable[[Scene], str | None]
-    says: str
+    what: str
     remedy: str
     refused: bool = True
 
@@ -81,24 +107,40 @@ def check(scene: Scene, where: str) -> None:
     InputError
         For the first limit that it is beyond: the field, the map and the remedy.
     """
-    for limit in LIMITS:
-        if what := limit.beyond(scene):
-            remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
-            if limit.refused:
-                raise InputError(what, where=f"{where}: {limit.field}", remedy=remedy)
-            warnings.warn(f"{limit.field}: {what} ({remedy})", stacklevel=2)
-    if _pile(scene):
+    for fault in faults(scene):
+        remedy = f"{fault.remedy}; map “{fault.map}” of `orchestrator stability`"
+        if fault.refused:
+            raise InputError(fault.what, where=f"{where}: {fault.field}", remedy=remedy)
+        warnings.warn(f"{fault.field}: {fault.what} ({remedy})", stacklevel=2)
+    if isinstance(scene.bed, PileBed):
         try:
             _ = model(scene).cases  # a mesh that cannot be made is refused before anything runs
         except InputError as error:
-            raise InputError(
-                error.what, where=f"{where}: {error.where}", remedy=error.remedy
-            ) from None
+            place = f"{where}: {error.where}"
+            raise InputError(error.what, where=place, remedy=error.remedy) from None
 
 
-def of_map(name: str) -> Iterator[Limit]:
-    """The limits that were read off a map."""
-    return (limit for limit in LIMITS if limit.map == name)
+def faults(scene: Scene) -> Iterator[Fault]:
+    """The limits that a scene is beyond."""
+    bed = scene.bed
+    if isinstance(bed, PileBed):
+        yield from _bed_line(scene, bed)
+        yield from _pile(scene, bed)
+        yield from _theory(scene, bed)
+        if scene.flow.model == "solve":
+            yield from _solve(scene, bed)
+    else:
+        yield from _slope(scene)
+        if bed.slope_deg > (angle := bed.entrainment_angle_deg):
+            what = (
+                f"{bed.slope_deg:g} deg is beyond the entrainment angle, {angle:g} deg: a grain "
+                "may come to rest half-way over its neighbour, and DEM and the closed form "
+                "differ by up to a third"
+            )
+            remedy = "read it by DEM, or lower the slope"
+            yield Fault("slope", "bed.slope_deg", what, remedy, refused=False)
+    if scene.protocol.method == "dem":
+        yield from _dem(scene)
 
 
 def largest_timestep(damping: float) -> float:
@@ -106,302 +148,138 @@ def largest_timestep(damping: float) -> float:
     return next(step for most, step in TIMESTEPS if damping <= most)
 
 
-def _pile(scene: Scene, *models: str) -> PileBed | None:
-    """The bed of a pile, under one of some flow models if they are given."""
-    is_pile = isinstance(scene.bed, PileBed) and (not models or scene.flow.model in models)
-    return scene.bed if is_pile and isinstance(scene.bed, PileBed) else None
+def _slope(scene: Scene) -> Iterator[Fault]:
+    slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
+    if slope > limit + 1e-9:
+        yield Fault(
+            "slope",
+            "bed.slope_deg",
+            f"{slope:g} deg is beyond min(friction angle, 90 deg - entrainment angle) ="
+            f" {limit:g} deg",
+            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
+        )
 
 
-def _dem_pile(scene: Scene) -> bool:
-    return isinstance(scene.bed, PileBed) and scene.protocol.method == "dem"
-
-
-def _bed_line(scene: Scene) -> str | None:
-    """A fault of the bed line, or a slope down which its grains roll or slide without a flow.
-
-    A bed that is poured slumps wherever it is too steep, counted or not.
-    """
-    bed = _pile(scene)
-    if not bed:
-        return None
-    poured, limit = bed.packing == "poured", scene.limiting_slope_deg
-    if poured:
-        limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
+def _bed_line(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+    """A bed line without a packing, or slopes down which grains roll or slide without a flow."""
+    remedy = "smooth a profile, give forms room, or count another part of the bed"
     try:
         line = of_bed(bed)
-        if poured and bed.obstacles:
-            return "no grains can be poured around obstacles"
         length = line.x[-2] - line.x[1]
-        if length > MOST_GRAINS * scene.grain.diameter:
+        if bed.packing == "poured" and bed.obstacles:
+            yield Fault("slope", "bed", "no grains can be poured around obstacles", remedy)
+        elif length > MOST_GRAINS * scene.grain.diameter:
             count = length / scene.grain.diameter
-            return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
-        if not bed.is_wedge and not poured:
+            what = f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
+            yield Fault("slope", "bed", what, remedy)
+        elif not bed.is_wedge and bed.packing != "poured":
             _ = LoadedBed(scene).packing
     except UnfitError as error:
-        return str(error)
-    if bed.is_wedge and not poured:
-        return None
-    slopes = np.abs(line.slopes_deg)
-    if not poured:
+        yield Fault("slope", "bed", str(error), remedy)
+    else:
+        if what := _too_steep(scene, bed, line):
+            yield Fault("slope", "bed", what, remedy)
+
+
+def _too_steep(scene: Scene, bed: PileBed, line: BedLine) -> str:
+    """The steepest place of a bed that is too steep; a poured one slumps also where none count."""
+    poured, limit, slopes = bed.packing == "poured", scene.limiting_slope_deg, abs(line.slopes_deg)
+    why = "beyond min(friction angle, 90 deg - entrainment angle)"
+    if poured:
+        limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
+        why = "beyond what poured grains hold, min(friction angle, 35 deg)"
+    elif bed.is_wedge:
+        return ""
+    else:
         slopes = np.where(line.counted(bed.counts), slopes, 0.0)
     for start, end in line.bare:
         slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
-    steep = int(np.argmax(slopes))
-    if slopes[steep] <= limit + 1e-6:
-        return None
-    where = f"{slopes[steep]:.3g} deg at x = {line.x[steep]:.4g} ... {line.x[steep + 1]:.4g} m"
-    if poured:
-        return f"{where} is beyond what poured grains hold, min(friction angle, 35 deg) = {limit:g}"
-    return f"{where} is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
+    at = int(np.argmax(slopes))
+    if slopes[at] <= limit + 1e-6:
+        return ""
+    where = f"{slopes[at]:.3g} deg at x = {line.x[at]:.4g} ... {line.x[at + 1]:.4g} m"
+    return f"{where} is {why} = {limit:g} deg"
 
 
-def _slope(scene: Scene) -> str | None:
-    slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
-    bed = _pile(scene)
-    if slope <= limit + 1e-9 or (bed and not bed.is_wedge):
-        return None
-    return (
-        f"{slope:g} deg is beyond min(friction angle, 90 deg - entrainment angle) = {limit:g} deg"
-    )
+def _pile(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+    low, high = PILE_SLOPES_DEG
+    if bed.is_wedge:
+        yield from _slope(scene)
+        if not low <= bed.slope_deg <= high:
+            remedy = (
+                f"choose {low:g} ... {high:g} deg, and no more than"
+                " min(friction angle, 90 deg - entrainment angle)"
+            )
+            yield Fault("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
+    if bed.entrainment_angle_deg < CLOSE_PACKED_DEG:
+        what = (
+            f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those "
+            "under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
+        )
+        remedy = "60 deg; single grains may have less"
+        yield Fault("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
+    if (loaded := scene.forces.loaded_grains) != "exposed":
+        what = f"{loaded}: a grain without its force blocks those behind it"
+        yield Fault("forced", "forces.loaded_grains", what, "exposed", refused=False)
 
 
-def _pile_slope(scene: Scene) -> str | None:
-    bed, (low, high) = _pile(scene), PILE_SLOPES_DEG
-    beyond = bed and bed.is_wedge and not low <= bed.slope_deg <= high
-    return f"a pile of {scene.bed.slope_deg:g} deg" if beyond else None
+def _theory(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+    if scene.flow.model not in ("hill", "waves"):
+        return
+    line = of_bed(bed)
+    seen = seen_by_the_flow(line)
+    at = int(np.argmax(seen.slopes))
+    slope = float(np.degrees(np.arctan(seen.slopes[at])))
+    if slope > PILE_SLOPES_DEG[1] + 1e-6:
+        what = f"a bed that rises by {slope:.3g} deg at x = {seen.x[at]:.4g} m is no low one"
+        yield Fault("slope", "flow.model", what, 'choose "solve"')
+    if scene.flow.model == "hill" and half_length(line) is None:
+        what = "the bed does not fall to half of its height before and behind its top"
+        yield Fault("slope", "flow.model", what, 'choose "waves" or "solve"')
 
 
-def _half_way(scene: Scene) -> str | None:
-    slope, angle = scene.bed.slope_deg, scene.bed.entrainment_angle_deg
-    if _pile(scene) or slope <= angle:
-        return None
-    return (
-        f"{slope:g} deg is beyond the entrainment angle, {angle:g} deg: a grain may come to rest "
-        "half-way over its neighbour, and DEM and the closed form differ by up to a third"
-    )
+def _solve(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+    z0, cell = scene.solve_roughness, scene.first_cell_height
+    if bed.is_level:
+        what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
+        yield Fault("slope", "flow.model", what, 'choose "flat"')
+    if z0 > cell:
+        what = (
+            f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m, the height of the first cell's "
+            "centre"
+        )
+        remedy = "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound"
+        yield Fault("first-cell", "bed.roughness", what, remedy)
+    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0)
+    ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
+    if ratio < 1:
+        what = (
+            "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
+            f"{ratio:.2g} of the molecular one"
+        )
+        remedy = "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
+        yield Fault("similarity", "flow.viscosity", what, remedy)
+    if (scheme := scene.flow.convection_scheme) != "linearUpwind":
+        what = f"{scheme} does not converge to the same answer, or not at all"
+        field = "flow.convection_scheme"
+        yield Fault("mesh-scheme-15", field, what, "linearUpwind", refused=False)
 
 
-def _theory(scene: Scene) -> str | None:
-    bed = _pile(scene, "hill", "waves")
-    if not bed:
-        return None
-    try:
-        seen = seen_by_the_flow(of_bed(bed))
-    except UnfitError:
-        return None  # `_bed_line` refuses it
-    steep = int(np.argmax(seen.slopes))
-    slope = float(np.degrees(np.arctan(seen.slopes[steep])))
-    if slope <= PILE_SLOPES_DEG[1] + 1e-6:
-        return None
-    return f"a bed that rises by {slope:.3g} deg at x = {seen.x[steep]:.4g} m is no low one"
-
-
-def _hill(scene: Scene) -> str | None:
-    bed = _pile(scene, "hill")
-    if not bed or _bed_line(scene) or half_length(of_bed(bed)) is not None:
-        return None
-    return "the bed does not fall to half of its height before and behind its top"
-
-
-def _flat(scene: Scene) -> str | None:
-    bed = _pile(scene, "solve")
-    level = bed and bed.is_level
-    return "over a flat bed there is nothing to solve: u* is u*_0 everywhere" if level else None
-
-
-def _first_cell(scene: Scene) -> str | None:
-    if not _pile(scene, "solve") or scene.solve_roughness <= scene.first_cell_height:
-        return None
-    return (
-        f"z0 = {scene.solve_roughness:g} m is above twice z_e ="
-        f" {scene.first_cell_height / 2:g} m, the height of the first cell's centre"
-    )
-
-
-def _laminar(scene: Scene) -> str | None:
-    bed = _pile(scene, "solve")
-    if not bed:
-        return None
-    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, scene.solve_roughness)
-    ratio = KARMAN * ustar0 * scene.first_cell_height / 2 / scene.solve_viscosity
-    if ratio >= 1:
-        return None
-    return (
-        "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
-        f"{ratio:.2g} of the molecular one"
-    )
-
-
-def _timestep(scene: Scene) -> str | None:
-    step, most = scene.protocol.time_step, largest_timestep(scene.grain.damping)
-    if scene.protocol.method != "dem" or step <= most:
-        return None
-    return f"{step:g} sqrt(m/K) is above {most:g} at a damping of {scene.grain.damping:g}"
-
-
-def _undamped(scene: Scene) -> str | None:
-    if scene.protocol.method != "dem" or scene.grain.damping >= LEAST_DAMPING:
-        return None
-    return f"at a damping of {scene.grain.damping:g} a bed does not come to rest"
-
-
-def _ramp(scene: Scene) -> str | None:
-    waiting = scene.protocol.waiting_time
-    if not _dem_pile(scene) or waiting >= WAITING_TIME:
-        return None
-    waited = f"load steps that wait {waiting:g} sqrt(d/g')"
-    return f"{waited} end before slow grains pass: it is a ramp"
-
-
-def _coarse(scene: Scene) -> str | None:
-    step = scene.protocol.load_increment
-    if not _dem_pile(scene) or step <= COARSE_STEP:
-        return None
-    return f"load steps {step:.0%} apart leave the threshold that wide an interval"
-
-
-def _wedged(scene: Scene) -> str | None:
-    if not _pile(scene) or scene.bed.entrainment_angle_deg >= CLOSE_PACKED_DEG:
-        return None
-    return (
-        f"a pile of {scene.bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, "
-        "those under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
-    )
-
-
-def _forced(scene: Scene) -> str | None:
-    if not _pile(scene) or scene.forces.loaded_grains == "exposed":
-        return None
-    return f"{scene.forces.loaded_grains}: a grain without its force blocks those behind it"
-
-
-def _scheme(scene: Scene) -> str | None:
-    if not _pile(scene, "solve") or scene.flow.convection_scheme == "linearUpwind":
-        return None
-    return f"{scene.flow.convection_scheme} does not converge to the same answer, or not at all"
-
-
-LIMITS = (
-    Limit(
-        "slope",
-        "bed",
-        _bed_line,
-        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope; a "
-        "poured bed is nowhere beyond its friction angle and 35 deg.",
-        "smooth a profile, give forms room, or count another part of the bed; lower a poured bed's "
-        "slopes",
-    ),
-    Limit(
-        "slope",
-        "bed.slope_deg",
-        _slope,
-        "Beyond min(phi, 90 deg - beta) a bed rolls back without any flow: refused.",
-        "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
-    ),
-    Limit(
-        "slope",
-        "bed.slope_deg",
-        _pile_slope,
-        "Piles of 10 to 35 deg: others are refused.",
-        f"choose {PILE_SLOPES_DEG[0]:g} ... {PILE_SLOPES_DEG[1]:g} deg, and no more than"
-        " min(friction angle, 90 deg - entrainment angle)",
-    ),
-    Limit(
-        "slope",
-        "bed.slope_deg",
-        _half_way,
-        "Beyond the entrainment angle a single grain may come to rest half-way: a warning.",
-        "read it by DEM, or lower the slope",
-        refused=False,
-    ),
-    Limit(
-        "slope",
-        "flow.model",
-        _theory,
-        f"The linear theories are of beds that rise by {PILE_SLOPES_DEG[1]:g} deg at most.",
-        'choose "solve"',
-    ),
-    Limit(
-        "slope",
-        "flow.model",
-        _hill,
-        "The theory of a hill is of beds that fall to half of their height before and behind.",
-        'choose "waves" or "solve"',
-    ),
-    Limit(
-        "slope",
-        "flow.model",
-        _flat,
-        "The flow over a flat bed is not solved.",
-        'choose "flat"',
-    ),
-    Limit(
-        "first-cell",
-        "bed.roughness",
-        _first_cell,
-        "z_e, half the first cell, is at least z0/2: refused below; from z0 on it is sound.",
-        "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound",
-    ),
-    Limit(
-        "similarity",
-        "flow.viscosity",
-        _laminar,
-        "In the first cell the eddy viscosity is above the molecular one: refused below.",
-        "take the field of a lower viscosity or a higher speed: u*/U_e is the same",
-    ),
-    Limit(
-        "timestep-damping",
-        "protocol.time_step",
-        _timestep,
-        "The largest safe time step falls with the damping: "
-        + ", ".join(f"{step:g} up to {damping:g}" for damping, step in TIMESTEPS)
-        + " sqrt(m/K); refused above.",
-        "lower it, or the damping",
-    ),
-    Limit(
-        "timestep-damping",
-        "grain.damping",
-        _undamped,
-        f"Without damping a bed never rests: refused below {LEAST_DAMPING:g}.",
-        "0.1 is sound",
-    ),
-    Limit(
-        "entrainment-layers",
-        "bed.entrainment_angle_deg",
-        _wedged,
-        f"Piles have rows that touch: refused below {CLOSE_PACKED_DEG:g} deg.",
-        "60 deg; single grains may have less",
-    ),
-    Limit(
-        "quiet-step",
-        "protocol.waiting_time",
-        _ramp,
-        f"A pile's load step waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
-        "raise it, unless a ramp is what you want",
-        refused=False,
-    ),
-    Limit(
-        "quiet-step",
-        "protocol.load_increment",
-        _coarse,
-        "A pile's load steps are at most 5 % apart: a warning above.",
-        "lower it",
-        refused=False,
-    ),
-    Limit(
-        "forced",
-        "forces.loaded_grains",
-        _forced,
-        "Every exposed grain carries a force: a warning otherwise.",
-        "exposed",
-        refused=False,
-    ),
-    Limit(
-        "mesh-scheme-15",
-        "flow.convection_scheme",
-        _scheme,
-        "linearUpwind alone converges to the answer: a warning otherwise.",
-        "linearUpwind",
-        refused=False,
-    ),
-)
+def _dem(scene: Scene) -> Iterator[Fault]:
+    rules, damping = scene.protocol, scene.grain.damping
+    if rules.time_step > (most := largest_timestep(damping)):
+        what = f"{rules.time_step:g} sqrt(m/K) is above {most:g} at a damping of {damping:g}"
+        yield Fault("timestep-damping", "protocol.time_step", what, "lower it, or the damping")
+    if damping < LEAST_DAMPING:
+        what = f"at a damping of {damping:g} a bed does not come to rest"
+        yield Fault("timestep-damping", "grain.damping", what, "0.1 is sound")
+    if not isinstance(scene.bed, PileBed):
+        return
+    if rules.waiting_time < WAITING_TIME:
+        waited = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
+        what = f"{waited} end before slow grains pass: it is a ramp"
+        remedy = "raise it, unless a ramp is what you want"
+        yield Fault("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
+    if (step := rules.load_increment) > COARSE_STEP:
+        what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
+        yield Fault("quiet-step", "protocol.load_increment", what, "lower it", refused=False)

@@ -57,8 +57,14 @@ def test_every_level_is_run_and_each_pile_beside_its_reference(asked: Study) -> 
 
 
 def test_the_naive_route_is_measured_on_the_lowest_pile_with_every_grain_mobile(
-    asked: Study, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
+    text = """
+        grain = { diameter = 1e-3 }
+        bed = { kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30" }
+        flow = { model = "flat" }
+    """
+    asked = study.parse(text, name="one", where="one")
     small = ladder.small_pile(asked)
     routes = ladder.naive_routes(small)
     dearest, softened = (one.scene for one in routes.values())
@@ -75,6 +81,7 @@ def test_the_naive_route_is_measured_on_the_lowest_pile_with_every_grain_mobile(
     assert ladder.naive_costs(list(routes), fast, runs)["core_s"].isna().all()
     points = ladder.points(pairs, runs)
     assert set(points["grain_level"]) == {"pivot", "peeling"}
+    assert set(points["flow_level"]) <= {"flat", "hill", "waves"}
     assert ladder.errors(points).empty
 
 
