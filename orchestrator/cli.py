@@ -6,7 +6,6 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -15,20 +14,12 @@ from typing import TYPE_CHECKING, Any
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
-from orchestrator.errors import (
-    OrchestratorError,
-    is_of_import,
-    is_of_shortage,
-    of_shortage,
-    of_system,
-)
+from orchestrator.errors import Fault, of_exception
 from orchestrator.runs import terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
 if TYPE_CHECKING:
-    from orchestrator.study.study import Study
-
-INTERRUPTED = 130
+    from orchestrator.pipeline import Finished
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,7 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
     options = _parser().parse_args(arguments)
-    code = _code(options)
+    try:
+        code = int(options.run(options))
+    except (Exception, KeyboardInterrupt) as error:
+        failure = of_exception(error)
+        if isinstance(failure, Fault):
+            raise
+        print(f"orchestrator: {failure}", file=sys.stderr)
+        code = failure.exit_code
     lost = terminal.lost()
     if lost and not code:
         print(f"orchestrator: the answer could not be written: {lost.strerror}", file=sys.stderr)
@@ -50,25 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
-def _code(options: argparse.Namespace) -> int:
-    try:
-        return int(options.run(options))
-    except OrchestratorError as error:
-        print(f"orchestrator: {error}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt as stop:
-        print("orchestrator: stopped; the same command continues", file=sys.stderr)
-        if is_of_import(stop):  # OpenBLAS raises SIGINT where it can start no thread
-            print("orchestrator: or no thread can be started: see ulimit -u", file=sys.stderr)
-        return INTERRUPTED
-    except OSError as error:
-        print(f"orchestrator: {of_system(error)}", file=sys.stderr)
-        return 1
-    except Exception as error:
-        if not is_of_shortage(error) and not is_of_import(error):
-            raise
-        print(f"orchestrator: {of_shortage(error)}", file=sys.stderr)
-        return 1
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"orchestrator: warning: {message}", file=sys.stderr)
 
 
 class Parser(argparse.ArgumentParser):
@@ -80,10 +61,6 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
 
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"orchestrator: warning: {message}", file=sys.stderr)
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="orchestrator",
@@ -91,71 +68,27 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
-    _add_study(commands)
-    calculator.add(commands)
-    _add_directory_commands(commands)
-    _add_experiments(commands)
-    benchmark.add(commands)
-    command = commands.add_parser(
-        "doctor", help="are the solvers here, can it draw; what to install"
-    )
-    command.set_defaults(run=_doctor)
-    return parser
-
-
-def _add_study(commands: Any) -> None:
-    command = commands.add_parser("study", help="run what is missing of a study, and draw it")
-    command.add_argument(
-        "source",
-        nargs="?",
-        default="first-look",
-        metavar="FILE|PRESET",
-        help="default: %(default)s",
-    )
-    _add_run_options(command)
-    command.add_argument(
+    study = commands.add_parser("study", help="run what is missing of a study, and draw it")
+    study.set_defaults(run=_study)
+    _add_source(study, "first-look")
+    _add_run_options(study)
+    study.add_argument(
         "--tolerance",
         type=float,
         metavar="X",
         help="relative error that tau_c may have: the cheapest models known to be within it;"
         " 0: every scene as the file asks",
     )
-    command.add_argument(
+    study.add_argument(
         "--cluster",
         choices=sorted(SYSTEMS),
         metavar="QUEUE",
         help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
     )
-    command.add_argument(
+    study.add_argument(
         "--plan", action="store_true", help="say what would run, how long and how large, and end"
     )
-    command.set_defaults(run=_study)
-
-
-def _add_run_options(command: Any) -> None:
-    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
-    command.add_argument(
-        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
-    )
-
-
-def _add_experiments(commands: Any) -> None:
-    for name, text in (
-        ("ladder", "what each model costs and how far it is off: speed against accuracy"),
-        ("budget", "what the choices are worth that all models share: a tornado for each scene"),
-    ):
-        command = commands.add_parser(name, help=text)
-        command.add_argument(
-            "source", nargs="?", default=name, metavar="FILE|PRESET", help="default: %(default)s"
-        )
-        _add_run_options(command)
-        command.set_defaults(run=partial(_experiment, name))
-    command = commands.add_parser("stability", help="maps of where each method fails")
-    _add_run_options(command)
-    command.set_defaults(run=_stability)
-
-
-def _add_directory_commands(commands: Any) -> None:
+    calculator.add(commands)
     for name, function, text in (
         ("status", _status, "what of a study is done, running, failed and why"),
         ("report", _report, "draw tables, figures and page of a study again"),
@@ -165,6 +98,34 @@ def _add_directory_commands(commands: Any) -> None:
         command = commands.add_parser(name, help=text)
         command.add_argument("directory", type=Path, metavar="DIR")
         command.set_defaults(run=function)
+    for name, text in (
+        ("ladder", "what each model costs and how far it is off: speed against accuracy"),
+        ("budget", "what the choices are worth that all models share: a tornado for each scene"),
+        ("stability", "maps of where each method fails"),
+    ):
+        command = commands.add_parser(name, help=text)
+        if name != "stability":
+            _add_source(command, name)
+        _add_run_options(command)
+        command.set_defaults(run=partial(_experiment, name))
+    benchmark.add(commands)
+    command = commands.add_parser(
+        "doctor", help="are the solvers here, can it draw; what to install"
+    )
+    command.set_defaults(run=_doctor)
+    return parser
+
+
+def _add_source(command: argparse.ArgumentParser, default: str) -> None:
+    text = "default: %(default)s"
+    command.add_argument("source", nargs="?", default=default, metavar="FILE|PRESET", help=text)
+
+
+def _add_run_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
+    command.add_argument(
+        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
+    )
 
 
 def _workers(text: str) -> int:
@@ -175,19 +136,19 @@ def _workers(text: str) -> int:
 
 
 def _study(options: argparse.Namespace) -> int:
-    from orchestrator import paper, pipeline
-    from orchestrator.study import study
+    from orchestrator import face, pipeline, plan
+    from orchestrator.runs.workspace import Workspace
 
-    asked = study.load(options.source, [paper.PRESETS])
-    if options.tolerance is not None:
-        study.check_tolerance(options.tolerance, "--tolerance")
-        asked = replace(asked, tolerance=options.tolerance)
-    out = options.out or Path("results") / asked.name
+    study = face.load(options.source, options.tolerance, "--tolerance")
+    out, workers = options.out or Path("results") / study.name, options.workers
     if options.plan:
-        return _plan(asked, out, options.workers)
-    queue = Queue(options.cluster, asked.cluster) if options.cluster else None
-    guests = (paper.report_card,)
-    finished = pipeline.run(asked, out, workers=options.workers, queue=queue, guests=guests)
+        space = Workspace(out.absolute())
+        planned = plan.settled(study, space.cases)
+        missing = list(pipeline.missing(planned, space).values())
+        print("\n".join(plan.forecast(study, planned, missing, workers)))
+        return 0
+    queue = Queue(options.cluster, study.cluster) if options.cluster else None
+    finished = pipeline.run(study, out, workers=workers, queue=queue, guests=face.GUESTS)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     if finished.left:
@@ -196,54 +157,33 @@ def _study(options: argparse.Namespace) -> int:
             f"`orchestrator status {out}` names them",
             file=sys.stderr,
         )
-    return _end(finished.page, finished.failures, finished.answer)
-
-
-def _plan(asked: "Study", out: Path, workers: int) -> int:
-    from orchestrator import pipeline, plan, preview
-    from orchestrator.runs.workspace import Workspace
-
-    space = Workspace(out.absolute())
-    planned = plan.settled(asked, space.cases)
-    todo = pipeline.missing(planned, space)
-    print(preview.text(asked, planned, list(todo.values()), workers))
-    return 0
+    return _end(finished)
 
 
 def _experiment(name: str, options: argparse.Namespace) -> int:
-    """Run an experiment on the scenes of a study."""
-    from orchestrator import paper
-    from orchestrator.study import study
+    """Run an experiment; all but the maps of stability are on the scenes of a study."""
+    from orchestrator import face
 
     experiment = import_module(f"orchestrator.experiments.{name}")
-    asked = study.load(options.source, [paper.PRESETS])
     out = options.out or Path("results") / name
-    finished = experiment.run(asked, out, workers=options.workers)
-    return _end(finished.page, finished.failures)
-
-
-def _stability(options: argparse.Namespace) -> int:
-    from orchestrator.experiments.stability import run
-
-    out = options.out or Path("results") / "stability"
-    return _end(run(out, workers=options.workers).page, {})
+    studies = [face.load(options.source)] if "source" in options else []
+    return _end(experiment.run(*studies, out, workers=options.workers))
 
 
 def _report(options: argparse.Namespace) -> int:
-    from orchestrator import paper, pipeline
+    from orchestrator import face, pipeline
 
-    finished = pipeline.redraw(options.directory, (paper.report_card,))
-    return _end(finished.page, finished.failures, finished.answer)
+    return _end(pipeline.redraw(options.directory, face.GUESTS))
 
 
-def _end(page: Path, failures: dict[str, OrchestratorError], answer: str = "") -> int:
-    """Print the answer, what failed, and last the page."""
-    if answer:
-        print(answer)
-    for name, error in failures.items():
+def _end(finished: "Finished") -> int:
+    """Print the answer, the failures, and last the page."""
+    if finished.answer:
+        print(finished.answer)
+    for name, error in finished.failures.items():
         print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
-    print(page)
-    return 3 if failures else 0
+    print(finished.page)
+    return 3 if finished.failures else 0
 
 
 def _status(options: argparse.Namespace) -> int:

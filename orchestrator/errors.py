@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-MOST = 400
+LONGEST = 400
 """Characters of a message's place, cause and remedy, each."""
 
 
@@ -41,12 +41,13 @@ class OrchestratorError(Exception):
 
 
 def one_line(text: str) -> str:
-    """A text that is one line of bearable length on any terminal, whatever a user's file holds."""
-    return printable(text if len(text) <= MOST else f"{text[: MOST // 2]} ... {text[-MOST // 2 :]}")
+    """A text as one line of at most `LONGEST` printable characters, the middle left out."""
+    half = LONGEST // 2
+    return printable(text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}")
 
 
 def printable(text: str) -> str:
-    """A text that moves no cursor, and that any file can hold: no control letters, no bytes."""
+    """A text with control characters and bytes that are no text escaped, for any terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
@@ -54,6 +55,10 @@ class InputError(OrchestratorError):
     """The study file, an option or a value given by the user is not usable."""
 
     exit_code = 2
+
+
+class Fault(OrchestratorError):  # noqa: N818 - of the program, not of what the user gave
+    """An exception that nobody foresaw: a fault of this program."""
 
 
 class SolverError(OrchestratorError):
@@ -64,7 +69,7 @@ class SolverError(OrchestratorError):
     """One word for the kind of end."""
 
 
-class Exploded(SolverError):  # noqa: N818 - an end, not an error
+class Exploded(SolverError):  # noqa: N818
     """A run whose numbers grow without bound."""
 
     ended = "exploded"
@@ -82,7 +87,7 @@ class Stalled(SolverError):  # noqa: N818
     ended = "stalled"
 
 
-class Interrupted(OrchestratorError):  # noqa: N818 - an end, not an error
+class Interrupted(OrchestratorError):  # noqa: N818
     """The user stopped the run; the same command continues it."""
 
     exit_code = 130
@@ -102,70 +107,51 @@ _REMEDIES = {
 
 
 def of_system(error: OSError, where: str = "") -> OrchestratorError:
-    """The message of a failure of the file system, at `where` or the file that it tells itself."""
-    # shutil collects what went wrong with each file: the first one tells the story
-    said = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
-    full = error.errno == errno.ENOSPC or "No space left" in (said or "")
-    number = errno.ENOSPC if full else error.errno
+    """The message of a failure of the system, at `where` or the file that the error names."""
+    # shutil collects the failure of each file: the first one is given
+    text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
+    is_full = error.errno == errno.ENOSPC or "No space left" in (text or "")
+    name = error.filename
     return OrchestratorError(
-        "no space is left on the disk" if full else said or str(error),
-        where=where or _path(error.filename),
-        remedy=_REMEDIES.get(number or 0, "see the file system"),
+        "no space is left on the disk" if is_full else text or str(error),
+        where=where or ("" if name is None or isinstance(name, int) else os.fsdecode(name)),
+        remedy=_REMEDIES.get(errno.ENOSPC if is_full else error.errno or 0, "see the file system"),
     )
 
 
-def _path(name: str | bytes | int | None) -> str:
-    """A file's name as a text; of an open file only its number is known."""
-    return "" if name is None or isinstance(name, int) else os.fsdecode(name)
-
-
-def is_of_import(error: BaseException) -> bool:
-    """Whether an exception came from a module that was being imported."""
+def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
+    """The message of any exception: of the system, of a shortage, of a library, or a `Fault`."""
     frames = traceback.extract_tb(error.__traceback__)
-    return isinstance(error, SyntaxError) or any(one.name == "<module>" for one in frames)
-
-
-_NO_THREAD = "can't start new thread"
-
-
-def is_of_shortage(error: Exception) -> bool:
-    """Whether memory or threads are lacking, or a library does not load."""
-    return isinstance(error, MemoryError | ImportError) or _NO_THREAD in str(error)
-
-
-def of_shortage(error: Exception) -> OrchestratorError:
-    """The message of memory or threads that are lacking, or of a library that does not load."""
-    if _NO_THREAD in str(error):
-        return OrchestratorError(
-            "no more threads can be started", remedy="fewer --workers, or a higher limit: ulimit -u"
-        )
-    if not isinstance(error, MemoryError) and "failed to map" not in str(error):
-        return OrchestratorError(
-            f"a library does not load: {error}", remedy="`orchestrator doctor` says what is missing"
-        )
-    return OrchestratorError(
-        "there is not enough memory", remedy="fewer --workers, or a higher limit: ulimit -v"
-    )
-
-
-def of_fault(error: Exception, where: str) -> OrchestratorError:
-    """The message of an exception that nobody foresaw: a fault of this program."""
-    frames = traceback.extract_tb(error.__traceback__)
+    is_at_import = any(frame.name == "<module>" for frame in frames)
+    if isinstance(error, OrchestratorError):
+        return error
+    if isinstance(error, KeyboardInterrupt):
+        # OpenBLAS raises SIGINT where it can start no thread
+        reason = "; or no thread can be started: see ulimit -u" if is_at_import else ""
+        return Interrupted(f"stopped; the same command continues{reason}")
+    if isinstance(error, OSError):
+        return of_system(error, "" if error.filename else where)
+    if "can't start new thread" in str(error):
+        remedy = "fewer --workers, or a higher limit: ulimit -u"
+        return OrchestratorError("no more threads can be started", where, remedy)
+    if isinstance(error, MemoryError) or (is_at_import and "failed to map" in str(error)):
+        remedy = "fewer --workers, or a higher limit: ulimit -v"
+        return OrchestratorError("there is not enough memory", where, remedy)
+    if isinstance(error, ImportError | SyntaxError) or is_at_import:
+        remedy = "`orchestrator doctor` says what is missing"
+        return OrchestratorError(f"a library does not load: {error}", where, remedy)
     at = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
-    return OrchestratorError(
-        f"a fault of this program: {type(error).__name__}: {error}{at}",
-        where=where,
-        remedy="report it, with the study file",
-    )
+    what = f"a fault of this program: {type(error).__name__}: {error}{at}"
+    return Fault(what, where, "report it, with the study file")
 
 
 def unknown_key(
     key: str, known: Sequence[str], where: str, elsewhere: Sequence[tuple[str, str]] = ()
 ) -> InputError:
-    """The message of a key that nothing knows, with the key that was meant as the remedy.
+    """The message of an unknown key, with the key that was probably meant as the remedy.
 
-    Keys of other places come with how they are written there: one of the same name is meant, else
-    the nearest here, else the nearest there.
+    `elsewhere` has keys of other places, each with the way it is written there. A key of the same
+    name is suggested first, then the nearest of `known`, then the nearest of the others.
     """
     close = [written for name, written in elsewhere if name == key]
     close = close or difflib.get_close_matches(key, known, n=1)

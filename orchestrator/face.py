@@ -18,12 +18,15 @@ from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
+from orchestrator.study.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Numbers = ArrayLike
 """A number or an array of them."""
+GUESTS = (paper.report_card,)
+"""Guests that add to the page of a study."""
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -43,24 +46,17 @@ def _public(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def _path(value: Any, name: str) -> Path:
-    """An argument as an absolute path."""
+    """An argument as a path."""
     if not isinstance(value, str | os.PathLike) or "\0" in str(value):
         raise InputError(f"{value!r} is not a path", where=name)
-    try:
-        return Path(value).absolute()
-    except FileNotFoundError as error:
-        raise of_system(error, "the working directory") from error
+    return Path(value)
 
 
 def _array(values: Any, name: str) -> Any:
     """An argument as an array of numbers; a roughness may have texts such as ``d/30``."""
 
     def number(value: Any) -> Any:
-        if isinstance(value, str):
-            if name == "roughness":
-                return value
-            raise TypeError
-        return float(value)
+        return value if isinstance(value, str) and name == "roughness" else float(value)
 
     try:
         return np.vectorize(number, otypes=[object])(np.asarray(values, dtype=object))
@@ -174,22 +170,32 @@ def run(
     SolverError
         If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
     """
-    if not isinstance(source, str | os.PathLike) or "\0" in str(source):
-        raise InputError(f"{source!r} is neither a path nor the name of a preset", where="source")
     if workers is not None and not (isinstance(workers, int) and workers >= 1):
         raise InputError(f"{workers!r} is not a whole number of at least 1", where="workers")
-    asked = study.load(str(source), [paper.PRESETS])
-    if tolerance is not None:
-        study.check_tolerance(tolerance, "tolerance")
-        asked = replace(asked, tolerance=tolerance)
+    asked = load(source, tolerance)
     place = _path(Path("results") / asked.name if out is None else out, "out")
-    count, guests = workers or os.cpu_count() or 1, (paper.report_card,)
-    finished = pipeline.run(asked, place, workers=count, guests=guests)
+    count = workers or os.cpu_count() or 1
+    finished = pipeline.run(asked, place, workers=count, guests=GUESTS)
     if finished.failures:
         name, error = next(iter(finished.failures.items()))
         what = f"{len(finished.failures)} cases failed; {name}: {error}"
         raise SolverError(what, where=str(place))
     return open(place)
+
+
+def load(source: str | Path, tolerance: float | None = None, name: str = "tolerance") -> Study:
+    """Read a study file or a preset, the paper's among them, to be answered with a tolerance.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no study; `name` names the tolerance in messages.
+    """
+    asked = study.load(str(_path(source, "source")), [paper.PRESETS])
+    if tolerance is None:
+        return asked
+    study.check_tolerance(tolerance, name)
+    return replace(asked, tolerance=tolerance)
 
 
 @_public
@@ -203,7 +209,7 @@ def open(directory: str | Path) -> "Opened":
     OrchestratorError
         If it has no tables, or they have changed since they were written.
     """
-    space = Workspace(_path(directory, "directory"))
+    space = Workspace(_path(directory, "directory").absolute())
     asked, planned = pipeline.reopen(space)
     found = tables.read(space.folder, "tables")
     return Opened(Results(asked, planned, found, space.cases))

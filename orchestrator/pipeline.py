@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,13 +29,13 @@ class Finished:
     page : Path
         The page.
     started : int
-        How many cases were run.
+        Number of cases that were run.
     failures : dict of str to OrchestratorError
-        The cases that failed, with why.
+        The cases that failed, with the causes.
     left : tuple of str
         If the study has changed since the last time, the cases that it does not ask for now.
     answer : str
-        What was found, for a terminal.
+        The answer, for a terminal.
     """
 
     page: Path
@@ -66,7 +66,7 @@ def run(
     queue : Queue, optional
         Queue of the cluster that runs them; without it, this machine does.
     guests : sequence of callable
-        Whoever may add to the page.
+        Functions that may add to the page.
 
     Raises
     ------
@@ -84,7 +84,11 @@ def run(
         changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
         failures: dict[str, OrchestratorError] = {}
-        while todo := _without(planned.cases, {*states, *failures}):
+        while todo := {
+            name: case
+            for name, case in planned.cases.items()
+            if name not in states and name not in failures
+        }:
             started += len(todo)
             with report.loading():
                 failures |= complete(
@@ -98,7 +102,7 @@ def run(
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
             _describe(space, study, planned)
-            states |= planned.done(space.cases, _without(planned.cases, states))
+            states |= planned.done(space.cases, set(planned.cases) - set(states))
         failures = {name: error for name, error in failures.items() if name in planned.cases}
         if started or not _is_drawn(study, planned, space):
             print("drawing tables, figures and page", file=sys.stderr)
@@ -133,11 +137,8 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
 
 def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
     """The cases of a plan that are not done yet, by name."""
-    return _without(planned.cases, planned.done(space.cases))
-
-
-def _without(cases: Mapping[str, Case], done: Container[str]) -> dict[str, Case]:
-    return {name: one for name, one in cases.items() if name not in done}
+    done = planned.done(space.cases)
+    return {name: case for name, case in planned.cases.items() if name not in done}
 
 
 def complete(
@@ -149,9 +150,9 @@ def complete(
     queue: Queue | None = None,
     after_s: float = 0.0,
 ) -> dict[str, OrchestratorError]:
-    """Run cases, with a display of how far they are; the failures by the cases' names.
+    """Run cases, with a display of their progress; the failures by the cases' names.
 
-    What comes after the runs, tables and figures, is known to take `after_s`, s.
+    Tables and figures after the runs are expected to take `after_s`, s.
     """
     if not todo:
         return {}
@@ -236,8 +237,10 @@ def draw(
     """
     space.folder.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
-    results = tables.make(study, planned, space.cases, states)
-    times = tables.timings(planned, states)
+    results, times = (
+        tables.make(study, planned, space.cases, states),
+        tables.timings(planned, states),
+    )
     causes = {name: str(error) for name, error in failures.items()}
 
     def write_tables() -> None:
@@ -247,18 +250,17 @@ def draw(
     with space.folder.renewed(but=MARKERS):
         report.write(study, planned, results, times, causes, space.folder, guests, write_tables)
     if not failures:
-        drawn = {"of": _origin(study, planned), "sha256": space.folder.written(MARKERS)}
-        space.folder.put(STATE, text_of(drawn))
+        space.folder.put(STATE, text_of(_state(study, planned, space)))
 
 
-def _origin(study: Study, planned: Plan) -> str:
-    """Digest of all that the tables and figures are made of."""
-    cases = [one.id for one in planned.cases.values()]
-    return digest_text(
-        canonical_json([__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases])
-    )
+def _state(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
+    """Digests of all that the tables and figures are made of, and of them."""
+    cases = [case.id for case in planned.cases.values()]
+    made_of = [__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases]
+    return {"of": digest_text(canonical_json(made_of)), "sha256": space.folder.written(MARKERS)}
 
 
 def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:
-    drawn = {"of": _origin(study, planned), "sha256": space.folder.written(MARKERS)}
-    return read_json(space.drawn) == drawn and space.folder.is_whole(MARKERS)
+    return read_json(space.drawn) == _state(study, planned, space) and space.folder.is_whole(
+        MARKERS
+    )

@@ -1,6 +1,7 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +13,17 @@ from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, by_default
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
+from orchestrator.runs.progress import human
+from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
-from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 2.0, 4e-3, 4e-5
-"""Times of tables and figures on each scene, and on each grain of a bed without a run, s: read
-off `first-look`, `ripples` and `paper --tolerance 0.2` on two cores."""
+"""Times of tables and figures on each scene, and on each grain of a bed without a run, s: measured
+on `first-look`, `ripples` and `paper --tolerance 0.2`, two cores."""
+BYTES = {"flow": 2.9e6, "pile": 1.8e6, "cells": 1.5e6}
+"""Mean size of a case of the preset `paper`, by its kind; of any other, `OTHER_BYTES`."""
+OTHER_BYTES = 2e6
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,7 @@ class Plan:
         By the id of the scene that was asked for: how it is answered, and why.
     piles : dict of str to Pile
         By the same id.
-    cells : tuple of CellsCase
+    cells : tuple of SingleGrainCase
         Each answers all of its scenes.
     checks : dict of str to Pile
         Piles by DEM that check answers without it, by the id of the scene asked for.
@@ -47,17 +52,10 @@ class Plan:
 
     @property
     def drawing_s(self) -> float:
-        """Expected time from the last run to the page, s.
-
-        The tables and the figures of a scene, and the grains that move without a run.
-        """
-        piles = (pile for pile in self.piles.values() if not pile.method.cases)
-        lengths = (float(pile.line.arc_lengths[-2] - pile.line.arc_lengths[1]) for pile in piles)
-        return START_S + SCENE_S * len(self.decisions) + GRAIN_S * sum(lengths)
-
-    def runs(self, asked: str) -> tuple[Case, ...]:
-        """The cases that the answer to a pile is read from; none for a single grain."""
-        return self.piles[asked].runs if asked in self.piles else ()
+        """Expected time of tables, figures and the grains that move without a run, s."""
+        lines = (pile.line.arc_lengths for pile in self.piles.values() if not pile.method.cases)
+        lengths = sum(float(s[-2] - s[1]) for s in lines)
+        return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
     def done(
         self, directory: Path, names: Iterable[str] | None = None
@@ -66,10 +64,10 @@ class Plan:
 
         Only some of the cases are looked at if their names are given.
         """
-        asked = [self.cases[name] for name in (self.cases if names is None else names)]
+        cases = [self.cases[name] for name in (self.cases if names is None else names)]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
-            states = pool.map(lambda one: done_state(one, directory), asked)
-        return {one.name: state for one, state in zip(asked, states, strict=True) if state}
+            states = list(pool.map(lambda case: done_state(case, directory), cases))
+        return {case.name: state for case, state in zip(cases, states, strict=True) if state}
 
 
 def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
@@ -92,16 +90,15 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         the field.
     """
     limits.check_study(study)
-    bounds = above or {}
-    decisions = {
-        scene.id: _decide(scene, study.tolerance, bounds.get(scene.id, NO_BOUND))
-        for scene in study.scenes
-    }
+    decisions = {}
+    for scene in study.scenes:
+        bound = (above or {}).get(scene.id, NO_BOUND)
+        decisions[scene.id] = (
+            by_default(scene, bound)
+            if study.tolerance is None
+            else decide(scene, study.tolerance, bound)
+        )
     return of(decisions, study.name, study.tolerance, cases)
-
-
-def _decide(scene: Scene, tolerance: float | None, above: Bound) -> Decision:
-    return by_default(scene, above) if tolerance is None else decide(scene, tolerance, above)
 
 
 def of(
@@ -115,57 +112,82 @@ def of(
     With a tolerance, answers without DEM are checked by it.
     """
     checked = decision.checks(decisions, tolerance) if tolerance else {}
-    piles, check_piles = _piles(decisions, cases), _piles(checked, cases)
-    grains = (one.scene for one in decisions.values() if not isinstance(one.scene.bed, PileBed))
-    cells = tuple(batches({s.id: s for s in grains if s.protocol.method == "dem"}.values()))
+    piles, checks = (
+        {
+            asked: Pile(answer.scene, cases)
+            for asked, answer in answers.items()
+            if isinstance(answer.scene.bed, PileBed)
+        }
+        for answers in (decisions, checked)
+    )
+    grains = {
+        answer.scene.id: answer.scene
+        for asked, answer in decisions.items()
+        if asked not in piles and answer.scene.protocol.method == "dem"
+    }
+    cells = tuple(batches(grains.values()))
     try:
-        ordered = [run for pile in (*piles.values(), *check_piles.values()) for run in pile.runs]
+        runs = [run for pile in (*piles.values(), *checks.values()) for run in pile.runs]
     except InputError as error:
         place = f"{name}: {error.where}"
         raise InputError(error.what, where=place, remedy=error.remedy) from None
-    return Plan(dict(decisions), piles, cells, check_piles, _in_order([*ordered, *cells]))
-
-
-def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
-    return {
-        asked: Pile(one.scene, cases)
-        for asked, one in decisions.items()
-        if isinstance(one.scene.bed, PileBed)
-    }
+    listed = {case.name: case for case in (*runs, *cells)}
+    first = {name: case for name, case in listed.items() if not case.needs}
+    return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
 
 
 def settled(study: Study, directory: Path) -> Plan:
-    """The plan after what the runs say: dearer levels where one failed or DEM overrules it."""
+    """The plan after the runs that are done: dearer levels where one failed or DEM overrules it."""
     above: dict[str, Bound] = {}
     while True:
-        planned = make(study, above, directory)
-        more = _failed(planned, directory)
+        plan = make(study, above, directory)
+        more = {
+            asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
+            for asked, answer in plan.decisions.items()
+            if answer.levels and not answer.is_as_asked and asked in plan.piles
+            if any(failure(directory / run.name) for run in plan.piles[asked].runs)
+        }
         if study.tolerance:
-            more |= _overruled(planned, study.tolerance, directory)
+            answers = plan.decisions, plan.piles, plan.checks
+            done = plan.done(directory)
+            more |= decision.overruled(*answers, study.tolerance, directory, done)
         if not more:
-            return planned
+            return plan
         above |= more
 
 
-def _failed(planned: Plan, directory: Path) -> dict[str, Bound]:
-    """The piles that are not answered as they were asked and whose runs failed."""
-    return {
-        asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
-        for asked, answer in planned.decisions.items()
-        if answer.levels
-        and not answer.is_as_asked
-        and any(failure(directory / run.name) for run in planned.runs(asked))
-    }
+def forecast(study: Study, plan: Plan, missing: Sequence[Case], workers: int) -> Iterator[str]:
+    """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
+    yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
+    for group in study.groups:
+        regimes = Counter(str(regime_of(scene)) for scene in group.scenes)
+        laws = Counter(scene.forces.law for scene in group.scenes)
+        outside = sum(not law_holds(scene) for scene in group.scenes)
+        yield (
+            f"  {group.name}: {_number(len(group.scenes), 'scene')}; regimes: {_counted(regimes)}; "
+            f"force laws: {_counted(laws)}"
+            + (f"; in {outside} the law does not hold for a single grain" if outside else "")
+        )
+    for why, count in Counter(answer.why for answer in plan.decisions.values()).most_common():
+        yield f"  {count} answered: {why}"
+    todo = Counter(case.kind for case in missing)
+    yield f"{_number(len(plan.cases), 'case')}, {len(missing)} to run"
+    for kind, count in Counter(case.kind for case in plan.cases.values()).items():
+        yield f"  {kind}: {count}, {todo[kind]} to run"
+    # a chain of cases takes at least the sum of its times, however many run beside it
+    walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
+    chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
+    runs = max(sum(case.cost_s for case in missing) / workers, max(chains, default=0.0))
+    size = sum(BYTES.get(case.kind, OTHER_BYTES) for case in missing)
+    yield (
+        f"expected: about {human(runs + plan.drawing_s)} with {_number(workers, 'worker')}, "
+        f"{human(plan.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
+    )
 
 
-def _overruled(planned: Plan, tolerance: float, directory: Path) -> dict[str, Bound]:
-    done = planned.done(directory)
-    found = (planned.decisions, planned.piles, planned.checks)
-    return decision.overruled(*found, tolerance, directory, done)
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def _in_order(cases: Iterable[Case]) -> dict[str, Case]:
-    """Every case once, those that others need first."""
-    listed = {case.name: case for case in cases}
-    first = {name: case for name, case in listed.items() if not case.needs}
-    return {**first, **listed}
+def _counted(counts: Counter[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.most_common())

@@ -13,14 +13,7 @@ from functools import partial
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-from orchestrator.errors import (
-    Interrupted,
-    OrchestratorError,
-    SolverError,
-    of_fault,
-    of_shortage,
-    of_system,
-)
+from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_exception
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process
 from orchestrator.runs.case import Case
@@ -304,16 +297,10 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
         return Outcome(case, future.result())
     except Interrupted:
         raise
-    except OrchestratorError as error:
-        return Outcome(case, error=error)
-    except OSError as error:
-        return Outcome(case, error=of_system(error, "" if error.filename else case.name))
-    except MemoryError as error:
-        return Outcome(case, error=of_shortage(error))
     except pool.lost as error:
         return Outcome(case, error=_loss(error, case.name))
     except Exception as error:  # a fault in the reading of one case costs that case, not the study
-        return Outcome(case, error=of_fault(error, case.name))
+        return Outcome(case, error=of_exception(error, case.name))
 
 
 def _loss(error: Exception, where: str) -> SolverError:
