@@ -161,7 +161,7 @@ class _Answer:
     def _shields(self, load_step, ustar0):
         scene, rows = self.bed.scene, zip(self.bed.grains, self.moved_in, strict=False)
         ratio = [float(row["ustar_over_ustar0"]) for row, level in rows if 0 < level <= load_step]
-        mean = sum(r * abs(r) for r in ratio) / max(len(ratio), 1)
+        mean = sum(r**2 for r in ratio) / max(len(ratio), 1)
         excess = (scene["rho_sol_kg_m3"] - scene["rho_f_kg_m3"]) * scene["g_m_s2"] * scene["d_m"]
         return scene["rho_f_kg_m3"] * ustar0**2 * mean / excess
 

@@ -69,7 +69,7 @@ class Bed:
         x, z = np.array(corners).T
         lines = grid_lines(x, z, scene["h_m"], finer)
         first = scene["first_cell_m"] / math.cos(math.radians(scene["alpha_deg"]))
-        heights = levels(first, scene["h_m"], scene.get("domain_height_m", scene["lid_m"]), finer)
+        heights = levels(first, scene["h_m"], scene["lid_height_m"], finer)
         bed = np.interp(lines, x, z)
         found = solve(
             lines, heights, bed, scene["ustar0_m_s"], scene["z0_m"], scene["solve_nu_m2_s"], _say

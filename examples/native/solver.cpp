@@ -136,7 +136,7 @@ public:
         for (const Row& row : grains) {
             if (row.at("kind") != "counted") continue;
             const double ratio = number(row, "ustar_over_ustar0");
-            stress.push_back(ratio * std::abs(ratio));
+            stress.push_back(ratio * ratio);
             goes_in.push_back(forces.empty() ? on_lattice(row, ratio)
                                              : on_own_pocket(row, ratio, forces[row.at("id")]));
         }

@@ -238,7 +238,7 @@ def pile(scene, case):
     if scene["packing"] != "poured":
         return alone(scene, grains, load_steps)
     steps = zip(poured_pivots(scene, case, counted), grains, strict=True)
-    order = [(float(load_steps[n]["ustar0_m_s"]), r * abs(r)) for n, (r, _) in steps if n]
+    order = [(float(load_steps[n]["ustar0_m_s"]), r**2) for n, (r, _) in steps if n]
     return counts(scene, sorted(order), len(grains), load_steps)
 
 
@@ -294,7 +294,7 @@ def alone(scene, grains, load_steps):
         if slope not in found:
             found[slope] = threshold(scene, slope)
         if ratio:
-            order.append((found[slope] / abs(ratio), ratio * abs(ratio)))
+            order.append((found[slope] / abs(ratio), ratio**2))
     return counts(scene, sorted(order), len(grains), load_steps)
 
 

@@ -1,4 +1,4 @@
-"""The commands of the benchmark: parse, call, print."""
+"""The commands of the benchmark."""
 
 import argparse
 import math
@@ -6,37 +6,49 @@ import sys
 from pathlib import Path
 from typing import Any
 
-LEVELS = (1, 2, 3, 4, 5)
-LIMIT_S = 600.0
-MEMORY_GIB = 4.0
-
 
 def add(commands: Any) -> None:
     """Add ``benchmark`` with its parts to the parser of the program."""
     group = commands.add_parser("benchmark", help="compare another solver with this one")
     parts = group.add_subparsers(required=True, metavar="part")
-    _add_export(parts)
-    _add_run(parts)
-    _add_compare(parts)
+    level = argparse.ArgumentParser(add_help=False)
+    level.add_argument(
+        "--level",
+        action="extend",
+        nargs="+",
+        default=[],
+        type=int,
+        choices=(1, 2, 3, 4, 5),
+        metavar="N",
+        help="only these levels, 1 to 5",
+    )
+    choice = argparse.ArgumentParser(add_help=False, parents=[level])
+    choice.add_argument(
+        "--scene",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="PATTERN",
+        help="only these scenes, such as '2-incline-*'",
+    )
+    pack = argparse.ArgumentParser(add_help=False)
+    pack.add_argument("pack", type=Path, metavar="PACK", help="directory of the pack")
 
-
-def _add_export(parts: Any) -> None:
-    command = parts.add_parser("export", help="write scenes, and what is expected of a solver")
-    command.add_argument("pack", type=Path, metavar="PACK", help="directory to write")
+    command = parts.add_parser(
+        "export", parents=[pack, level], help="write scenes and their expected answers"
+    )
     command.add_argument(
         "--from",
         dest="study",
         type=Path,
         metavar="DIR",
-        help="of a finished study; without one only levels 1 and 2, which are formulas",
+        help="a finished study; without one only levels 1 and 2, which are formulas",
     )
-    _add_level(command)
     command.set_defaults(run=_export)
 
-
-def _add_run(parts: Any) -> None:
-    command = parts.add_parser("run", help="run a solver on each scene, ours in turn, and compare")
-    command.add_argument("pack", type=Path, metavar="PACK")
+    command = parts.add_parser(
+        "run", parents=[pack, choice], help="run a solver on each scene, ours in turn, and compare"
+    )
     command.add_argument(
         "--solver",
         required=True,
@@ -49,26 +61,22 @@ def _add_run(parts: Any) -> None:
     command.add_argument(
         "--limit",
         type=_positive,
-        default=LIMIT_S,
+        default=600.0,
         metavar="S",
         help="wall time for a scene; default %(default)g",
     )
     command.add_argument(
         "--memory",
         type=_positive,
-        default=MEMORY_GIB,
+        default=4.0,
         metavar="GIB",
-        help="for a scene, all processes of the solver together; default %(default)g",
+        help="memory of each process of the solver; default %(default)g",
     )
-    _add_choice(command)
     command.set_defaults(run=_run)
 
-
-def _add_compare(parts: Any) -> None:
     command = parts.add_parser(
-        "compare", help="the same for answers that are there already, of one solver or several"
+        "compare", parents=[pack, choice], help="the same for answers that are there already"
     )
-    command.add_argument("pack", type=Path, metavar="PACK")
     command.add_argument(
         "results",
         type=Path,
@@ -80,33 +88,17 @@ def _add_compare(parts: Any) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="of the page; default: the only RESULTS, if run wrote them, or"
+        help="directory of the page; default: the only RESULTS, if run wrote them, or"
         " results/benchmark-NAME of the pack",
     )
-    _add_choice(command)
     command.set_defaults(run=_compare)
 
 
-def _add_choice(command: Any) -> None:
-    _add_level(command)
-    command.add_argument(
-        "--scene",
-        action="append",
-        default=[],
-        metavar="PATTERN",
-        help="only these, such as '2-incline-*'; may be repeated",
-    )
-
-
-def _add_level(command: Any) -> None:
-    command.add_argument(
-        "--level",
-        action="append",
-        default=[],
-        type=int,
-        choices=LEVELS,
-        help="only this one; may be repeated",
-    )
+def _positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError("more than 0, and finite")
+    return number
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -118,32 +110,24 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from orchestrator.benchmark import runner
-    from orchestrator.runs.confined import GIB, Limits
+    from orchestrator.benchmark import compare
 
-    choice = runner.Choice(options.level, options.scene)
-    limits = Limits(seconds=options.limit, memory=int(options.memory * GIB))
-    return _end(runner.run(options.pack, options.solver, options.out, choice, limits))
+    choice = compare.Choice(options.level, options.scene)
+    limits = compare.Limits(seconds=options.limit, memory=int(options.memory * 2**30))
+    return _end(compare.run(options.pack, options.solver, options.out, choice, limits))
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from orchestrator.benchmark import runner
+    from orchestrator.benchmark import compare
 
-    choice = runner.Choice(options.level, options.scene)
-    return _end(runner.compare(options.pack, options.results, options.out, choice))
-
-
-def _positive(text: str) -> float:
-    number = float(text)
-    if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError("more than 0, and finite")
-    return number
+    choice = compare.Choice(options.level, options.scene)
+    return _end(compare.compare(options.pack, options.results, options.out, choice))
 
 
-def _end(found: Any) -> int:
-    """Name what failed, where the page is, and give the exit code."""
-    for line in found.failures:
+def _end(outcome: Any) -> int:
+    """Print the failures, the summary and the place of the page, and give the exit code."""
+    for line in outcome.failures:
         print(f"orchestrator: {line}", file=sys.stderr)
-    print(found.summary)
-    print(found.page)
-    return 1 if found.failures else 0
+    print(outcome.summary)
+    print(outcome.page)
+    return 1 if outcome.failures else 0

@@ -1,4 +1,4 @@
-"""Levels 1 and 2: scenes whose answers are formulas."""
+"""Levels 1 and 2: scenes whose answers are formulas, and the parameters of all scenes."""
 
 import time
 from collections.abc import Iterator, Mapping
@@ -7,22 +7,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.benchmark.problem import (
-    Problem,
-    Row,
-    exact,
-    expectations,
-    expected,
-    mechanics,
-    parameters,
-    place,
-)
+from orchestrator.benchmark.pack import Problem, expectation, table_of
 from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.study import closed_form as study_form
+from orchestrator.study import fields
 from orchestrator.study.closed_form import forces, law_holds
 from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
+from orchestrator.types import Row
 
 FORMULA, CHECK, PIVOT = 1e-6, 0.01, 0.005
 """Relative tolerances."""
@@ -49,21 +42,22 @@ LEAST_QUIET = 5.0
 def closed_form(scene: Scene) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
     started = time.perf_counter()
-    drag, lift = forces(scene)
-    found = study_form.closed_form(scene)
-    flows = [float(f"{x * float(found.friction_velocity):.4g}") for x in FLOWS]
-    rows: list[Row] = []
-    for quantity, force in (("drag_n", drag), ("lift_n", lift)):
-        rows += [exact(quantity, float(force(u)), FORMULA, place(u)) for u in flows]
+    threshold = study_form.closed_form(scene)
+    flows = [float(f"{x * float(threshold.friction_velocity):.4g}") for x in FLOWS]
+    rows = [
+        expectation(quantity, float(force(u)), FORMULA, u)
+        for quantity, force in zip(("drag_n", "lift_n"), forces(scene), strict=True)
+        for u in flows
+    ]
     thresholds = {
-        "ustar_m_s": found.friction_velocity,
-        "reynolds": found.reynolds,
-        "shields": found.shields,
+        "ustar_m_s": threshold.friction_velocity,
+        "reynolds": threshold.reynolds,
+        "shields": threshold.shields,
     }
-    rows += [exact(name, float(value), FORMULA) for name, value in thresholds.items()]
+    rows += [expectation(name, float(value), FORMULA) for name, value in thresholds.items()]
     seconds = time.perf_counter() - started
-    asked = expectations(rows).assign(ours=lambda table: table["value"])
-    return Problem(1, scene.id, "closed-form", parameters(scene, "closed-form"), {}, asked, seconds)
+    asked = table_of(rows).assign(ours=lambda table: table["value"])
+    return Problem(scene.id, "closed-form", parameters(scene, "closed-form"), {}, asked, seconds)
 
 
 def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
@@ -72,22 +66,26 @@ def pivot(scene: Scene, ours: float = float("nan")) -> Problem:
     # the mean of two load steps is within half a step of what lies between them
     half = float(np.sqrt(1 + scene.protocol.load_increment))
     interval = threshold / half, threshold * half
-    asked = expectations([expected("ustar_m_s", "", threshold, interval, PIVOT, ours)])
-    tables = {"grains": _cell(scene), "load_steps": _load_steps(scene, threshold)}
-    return Problem(2, scene.id, "pivot", parameters(scene, "pivot"), tables, asked)
+    asked = table_of([expectation("ustar_m_s", threshold, PIVOT, interval=interval, ours=ours)])
+    centres, _, sizes = cells.cell(scene)
+    d, rising = scene.grain.diameter, cells.flows(scene)
+    fx, fz = cells.force(scene, rising).T
+    steps = {
+        "load_step": range(len(rising)),
+        "ustar_m_s": rising * threshold,
+        "fx_n": fx,
+        "fz_n": fz,
+    }
+    tables = {"grains": _three(centres * d, sizes * d), "load_steps": pd.DataFrame(steps)}
+    return Problem(scene.id, "pivot", parameters(scene, "pivot"), tables, asked)
 
 
 def has_pivot(scene: Scene) -> bool:
     """Whether the grain's threshold by load steps is the closed form's, and means something."""
-    alone = study_form.closed_form(scene)
+    threshold = study_form.closed_form(scene)
     # else lift bears the weight before drag can push the grain up the slope: it rolls back
-    rolls = bool(alone.lift * np.tan(np.radians(scene.bed.slope_deg)) < alone.drag)
+    rolls = bool(threshold.lift * np.tan(np.radians(scene.bed.slope_deg)) < threshold.drag)
     return law_holds(scene) and rolls and scene.protocol.waiting_time >= LEAST_QUIET
-
-
-def _cell(scene: Scene) -> pd.DataFrame:
-    centres, _, sizes = cells.cell(scene)
-    return _three(centres * scene.grain.diameter, sizes * scene.grain.diameter)
 
 
 def _three(centres: Any, diameter: Any) -> pd.DataFrame:
@@ -95,18 +93,6 @@ def _three(centres: Any, diameter: Any) -> pd.DataFrame:
     x, z = centres.T
     kinds = ["fixed", "fixed", "mobile"]
     return pd.DataFrame({"id": [1, 2, 3], "x_m": x, "z_m": z, "d_m": diameter, "kind": kinds})
-
-
-def _load_steps(scene: Scene, threshold: float) -> pd.DataFrame:
-    rising = cells.flows(scene)
-    fx, fz = cells.force(scene, rising).T
-    load_steps = {
-        "load_step": range(len(rising)),
-        "ustar_m_s": rising * threshold,
-        "fx_n": fx,
-        "fz_n": fz,
-    }
-    return pd.DataFrame(load_steps)
 
 
 def checks() -> Iterator[Problem]:
@@ -121,7 +107,7 @@ def checks() -> Iterator[Problem]:
         yield passing(push)
 
 
-def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> dict[str, Any]:
+def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> Row:
     """The grain of the check decks."""
     grain = Grain(diameter=DIAMETER, density=DENSITY, damping=damping, stiffness=stiffness)
     weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
@@ -137,70 +123,70 @@ def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> dict[str, An
 
 def collision(damping: float) -> Problem:
     """Two grains that meet: how fast they part."""
-    told = _contact(damping)
+    given = _contact(damping)
     root = np.sqrt(1 - damping**2)
     # the contact ends where the force does, not the overlap
     exponent = damping / root * (np.pi - 2 * np.arcsin(damping))
-    asked = expectations([exact("restitution", float(np.exp(-exponent)), CHECK)])
-    told |= {"speed_m_s": MEETING * UNIT, "time_step": 0.01}
-    return Problem(2, f"collision-{damping:g}", "collision", told, {}, asked)
+    asked = table_of([expectation("restitution", float(np.exp(-exponent)), CHECK)])
+    given |= {"speed_m_s": MEETING * UNIT, "time_step": 0.01}
+    return Problem(f"collision-{damping:g}", "collision", given, {}, asked)
 
 
 def incline(incline_deg: float) -> Problem:
     """A grain that is let go on a plane: how it speeds up."""
-    told = _contact()
-    friction = np.tan(np.radians(told["phi_deg"]))
+    given = _contact()
+    friction = np.tan(np.radians(given["phi_deg"]))
     a = np.radians(incline_deg)
     rolls = np.tan(a) < 3.5 * friction
     value = 5 / 7 * np.sin(a) if rolls else np.sin(a) - friction * np.cos(a)
-    asked = expectations([exact("acceleration_over_g", float(value), CHECK)])
-    told |= {"incline_deg": incline_deg, "time_step": 0.2}
-    return Problem(2, f"incline-{incline_deg:g}", "incline", told, {}, asked)
+    asked = table_of([expectation("acceleration_over_g", float(value), CHECK)])
+    given |= {"incline_deg": incline_deg, "time_step": 0.2}
+    return Problem(f"incline-{incline_deg:g}", "incline", given, {}, asked)
 
 
 def sliding(speed: float) -> Problem:
     """A grain that slides until it rolls; `speed` in sqrt(d g')."""
-    told = _contact()
+    given = _contact()
     start = speed * UNIT
-    friction = float(np.tan(np.radians(told["phi_deg"])))
+    friction = float(np.tan(np.radians(given["phi_deg"])))
     rows = [
-        exact("speed_over_start", 6 / 7, CHECK, "0.5"),
-        exact("speed_over_start", 5 / 7, CHECK, "2"),
-        exact("spin_over_start", 5 / 7, CHECK, "2"),
+        expectation("speed_over_start", 6 / 7, CHECK, 0.5),
+        expectation("speed_over_start", 5 / 7, CHECK, 2.0),
+        expectation("spin_over_start", 5 / 7, CHECK, 2.0),
     ]
-    roll_time = 2 * start / (7 * friction * told["reduced_gravity_m_s2"])
-    told |= {"speed_m_s": start, "roll_time_s": roll_time, "time_step": 0.02}
-    return Problem(2, f"sliding-{speed:g}", "sliding", told, {}, expectations(rows))
+    roll_time = 2 * start / (7 * friction * given["reduced_gravity_m_s2"])
+    given |= {"speed_m_s": start, "roll_time_s": roll_time, "time_step": 0.02}
+    return Problem(f"sliding-{speed:g}", "sliding", given, {}, table_of(rows))
 
 
 def passing(push: float) -> Problem:
     """A grain that is pushed over its neighbour; `push` as in `passing_time`."""
-    told = _contact(stiffness=PASSING_STIFFNESS)
+    given = _contact(stiffness=PASSING_STIFFNESS)
     beta = np.radians(PASSING_DEG)
     value = passing_time(push, CRITERION)
-    asked = expectations([exact("passing_time_over_t", value, CHECK)])
-    told |= {
+    asked = table_of([expectation("passing_time_over_t", value, CHECK)])
+    given |= {
         "alpha_deg": 0.0,
         "beta_deg": PASSING_DEG,
         "displacement_criterion": CRITERION,
-        "force_n": push * told["weight_n"] / float(np.tan(beta)),
+        "force_n": push * given["weight_n"] / float(np.tan(beta)),
         "time_step": 0.2,
     }
     x, z = float(np.cos(beta)), -float(np.sin(beta))
     tables = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
-    return Problem(2, f"passing-{push:g}", "passing", told, tables, asked)
+    return Problem(f"passing-{push:g}", "passing", given, tables, asked)
 
 
-def push_of(told: Mapping[str, Any]) -> float:
+def push_of(scene: Mapping[str, Any]) -> float:
     """The push of a passing, from the parameters of its scene."""
-    return float(told["force_n"] * np.tan(np.radians(told["beta_deg"])) / told["weight_n"])
+    return float(scene["force_n"] * np.tan(np.radians(scene["beta_deg"])) / scene["weight_n"])
 
 
-def passing_time(push: float, criterion: float, inertia: float = 0.4) -> float:
+def passing_time(push: float, criterion: float) -> float:
     """Time, sqrt(d/g'), in which a pushed grain rolls over its neighbour as far as the criterion.
 
     It rolls without slip on a circle of radius d, from rest: the work of the force and of the
-    weight is its energy, (1 + inertia) v^2/2.
+    weight is its energy, (1 + 2/5) v^2/2 by its moment of inertia.
 
     Parameters
     ----------
@@ -208,8 +194,6 @@ def passing_time(push: float, criterion: float, inertia: float = 0.4) -> float:
         Force along the level bed over that at which the grain begins to roll.
     criterion : float
         Displacement along the bed, d; the grain is over its neighbour at cos(beta).
-    inertia : float
-        Moment of inertia over m r^2.
     """
     lean = np.pi / 2 - np.radians(PASSING_DEG)
     force = push * np.tan(lean)
@@ -219,5 +203,50 @@ def passing_time(push: float, criterion: float, inertia: float = 0.4) -> float:
     u = end * (nodes + 1) / 2
     angle = lean - u**2
     work = force * (np.sin(lean) - np.sin(angle)) - (np.cos(angle) - np.cos(lean))
-    speed = np.sqrt(2 * work / (1 + inertia))
+    speed = np.sqrt(2 * work / (1 + 2 / 5))
     return float(np.sum(end / 2 * weights * 2 * u / speed))
+
+
+_CONTACT = {"phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step"}
+_PROTOCOL = {"displacement_criterion", "waiting_time", "load_increment"}
+_SOURCE = {"averaging_length", "loaded_grains", "mobile_layers", "turbulence_model"}
+_SOLVED = {"solve_u_e_m_s", "solve_z0_m", "solve_nu_m2_s", "first_cell_m", "cells_per_face"}
+_HIDDEN = {
+    # settings of our meshes and methods; the domain is given by bed line and height
+    *("expansion_ratio", "lid", "upstream", "downstream", "convection_scheme"),
+    *("non_orthogonal_correctors", "method", "z0_over_d", "bed"),
+    # what bed line, grains, stress and forces follow from: a pack has the results
+    *("sizes", "poured_depth", "width", "exposure"),
+    *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
+    *("profile", "smoothing", "obstacles", "counted", "flow_top", "depth_m"),
+}
+WITHOUT_EFFECT: Mapping[str, set[str]] = {
+    "closed-form": _CONTACT | _PROTOCOL,
+    "pivot": set(),
+    "pile": _SOURCE | _SOLVED,
+    "line": {"solve_u_e_m_s"},  # the speed of the approaching flow is in the entries of level 3
+}
+"""Parameters of a scene without effect on the answer to a kind."""
+
+
+def parameters(scene: Scene, kind: str) -> Row:
+    """Parameters of a scene with its force law decided, for a problem of a kind."""
+    grain = scene.grain
+    values = fields.used(scene) | mechanics(
+        grain.diameter, grain.density, scene.reduced_gravity, scene.weight, grain.stiffness
+    )
+    hidden = _HIDDEN | WITHOUT_EFFECT[kind]
+    return {key: value for key, value in values.items() if value is not None and key not in hidden}
+
+
+def mechanics(
+    diameter: float, density: float, gravity: float, weight: float, stiffness: float
+) -> dict[str, float]:
+    """The mechanics of a grain in SI units; gravity is that of the submerged grain."""
+    return {
+        "mass_kg": density * np.pi / 6 * diameter**3,
+        "reduced_gravity_m_s2": gravity,
+        "weight_n": weight,
+        "spring_n_m": stiffness * weight / diameter,
+        "time_unit_s": float(np.sqrt(diameter / gravity)),
+    }

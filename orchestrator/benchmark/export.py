@@ -1,30 +1,61 @@
-"""The scenes of a pack, from a study."""
+"""Scenes of a pack from a study, and our own answer to each scene of a pack, run anew."""
 
+import re
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from orchestrator import pipeline, plan, tables
-from orchestrator.benchmark import exact, measured, ours, pack
-from orchestrator.benchmark.problem import Problem
-from orchestrator.errors import InputError
+from orchestrator.benchmark import exact, measured, pack
+from orchestrator.benchmark.pack import KINDS, STUDY, Pack, Problem
+from orchestrator.errors import InputError, SolverError
 from orchestrator.plan import Plan
-from orchestrator.runs import case
+from orchestrator.runs import case, engine, process
+from orchestrator.runs.case import Case
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
-from orchestrator.study import study
-from orchestrator.study.study import Study
+from orchestrator.study import fields, study
+from orchestrator.study.study import Group, Study
+from orchestrator.tables import Tables
 
 LEVELS = (1, 2, 3, 4, 5)
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
 DEFAULT = "first-look"
-"""The study whose single grains are exported where none is named."""
+"""The study whose single grains are exported if none is named."""
+LIMIT_S = 3600.0
+"""Time limit of our own runs, s."""
+CHECKS = ("collision", "incline", "sliding", "passing")
+"""Kinds that have a deck of their own: they need no scene of the study."""
+PRINTED = {
+    "restitution": ("restitution", ""),
+    "acceleration over g": ("acceleration_over_g", ""),
+    "speed at half the time": ("speed_over_start", "0.5"),
+    "speed when it rolls": ("speed_over_start", "2"),
+    "spin when it rolls": ("spin_over_start", "2"),
+    "time of passing": ("passing_time_over_t", ""),
+}
+"""What the check decks print, and the quantities of a pack."""
+NAMED = {
+    "alpha_deg": ("{:g}deg", 1.0),
+    "beta_deg": ("beta{:g}", 1.0),
+    "h_m": ("h{:g}mm", 1e3),
+    "d_m": ("d{:g}mm", 1e3),
+    "z0_over_d": ("z{:.3g}d", 1.0),
+    "nu_m2_s": ("nu{:g}", 1.0),
+    "packing": ("{}", 1),
+    "force_law": ("{}", 1),
+    "stress": ("{}", 1),
+    "seed": ("seed{:g}", 1),
+}
+"""Columns that name a scene where they differ between the scenes of a study, with a unit."""
 
 
 def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
@@ -33,11 +64,11 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     Parameters
     ----------
     root : Path
-        Where it goes.
+        Its directory.
     source : Path or None
         Directory of a finished study. Without one the answers are formulas: levels 1 and 2.
     levels : sequence of int
-        Which levels; empty for all that can be had.
+        The levels; empty for all that the source has.
 
     Raises
     ------
@@ -46,134 +77,279 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         beds that change or lie in space.
     """
     if source is None:
-        return _formulas(root, levels or FORMULAS)
+        lacking = sorted(set(levels) - set(FORMULAS))
+        if lacking:
+            raise InputError(
+                f"level {lacking[0]} needs the answers of a finished study",
+                where="--level",
+                remedy="name its directory with --from",
+            )
+        asked = study.load(DEFAULT)
+        chosen = levels or FORMULAS
+        programs = {"liggghts": liggghts.version()} if 2 in chosen and _has_decks() else {}
+        kinds = [kind for kind, one in KINDS.items() if one.level in chosen]
+        made = (one for one, _ in problems(asked, plan.make(asked), {}, Path(), kinds))
+        return pack.write(root, made, (asked.name, asked.text), programs)
     space = Workspace(source.absolute())
     asked, planned = pipeline.reopen(space)
-    if not all(one.is_as_asked for one in planned.decisions.values()):
+    _check(asked, planned, source)
+    if not space.drawn.is_file():
+        raise InputError("the study is not finished", where=str(source), remedy="run it to its end")
+    times = tables.read(space.folder, "timings")["timings"].set_index("case")["solver_s"]
+    if set(times.index) != set(planned.cases):
         raise InputError(
-            f"its scenes were answered within a tolerance of {asked.tolerance:g}, not as they ask",
+            "the study was run by another version of the program: its cases are others",
             where=str(source),
-            remedy="run the study without a tolerance into another directory",
+            remedy="run it again",
         )
-    if any(scene.protocol.update for scene in asked.scenes):
-        raise InputError(
-            "a pack holds one flow over each bed, and this bed changes under it",
-            where=f"{source}: protocol.update",
-            remedy="run the study without it into another directory",
-        )
-    if any(pile.bed.width for pile in planned.piles.values()):
-        raise InputError(
-            "a pack holds grains in the plane of the flow, and this bed is a strip in space",
-            where=f"{source}: bed.width",
-            remedy="run the study without it into another directory",
-        )
-    finished = Finished(asked, planned, space)
-    problems = list(finished.problems(levels or LEVELS))
-    return pack.write(
-        root, problems, (asked.name, asked.text), case.programs(space.cases, planned.cases)
-    )
+    kinds = [kind for kind, one in KINDS.items() if one.level in (levels or LEVELS)]
+    results = tables.read(space.folder, "tables")
+    sharing = {one.name: len(one.scenes) for one in planned.cells}
+
+    def timed() -> Iterator[Problem]:
+        for one, runs in problems(asked, planned, results, space.cases, kinds):
+            seconds = sum(times[run] / sharing.get(run, 1) for run in runs)
+            yield replace(one, seconds=seconds if runs else one.seconds)
+
+    programs = case.programs(space.cases, planned.cases)
+    return pack.write(root, timed(), (asked.name, asked.text), programs)
 
 
-def _formulas(root: Path, levels: Sequence[int]) -> int:
-    lacking = sorted(set(levels) - set(FORMULAS))
-    if lacking:
-        raise InputError(
-            f"level {lacking[0]} needs the answers of a finished study",
-            where="--level",
-            remedy="name its directory with --from",
-        )
-    asked = study.load(DEFAULT)
-    programs = {"liggghts": liggghts.version()} if 2 in levels and _has_decks() else {}
-    return pack.write(
-        root, formulas(asked, plan.make(asked), levels, {}), (asked.name, asked.text), programs
-    )
+def _check(asked: Study, planned: Plan, source: Path) -> None:
+    """See that a study is one whose scenes a pack can hold."""
+    tolerance = not all(one.is_as_asked for one in planned.decisions.values())
+    changing = any(scene.protocol.update for scene in asked.scenes)
+    in_space = any(pile.bed.width for pile in planned.piles.values())
+    for is_so, what in (
+        (tolerance, f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"),
+        (changing, "protocol.update: a pack holds one flow over each bed"),
+        (in_space, "bed.width: a pack holds grains in the plane of the flow"),
+    ):
+        if is_so:
+            remedy = "run the study without it into another directory"
+            raise InputError(what, where=str(source), remedy=remedy)
 
 
-def formulas(
-    asked: Study, planned: Plan, levels: Sequence[int], found: Mapping[str, float]
-) -> Iterator[Problem]:
-    """Levels 1 and 2; `found` holds the DEM's thresholds by scene, m/s, as far as there are any."""
+def problems(
+    asked: Study, planned: Plan, results: Tables, cases: Path, kinds: Collection[str]
+) -> Iterator[tuple[Problem, tuple[str, ...]]]:
+    """The scenes of a study as problems of some kinds, each with the runs that answer it.
+
+    Parameters
+    ----------
+    asked : Study
+        The study.
+    planned : Plan
+        Its plan.
+    results : dict of str to DataFrame
+        Its tables; for formulas alone it may be empty.
+    cases : Path
+        Directory of its cases.
+    kinds : collection of str
+        Names of `KINDS`.
+    """
+    names = scene_names(planned, asked)
+    if "collision" in kinds:
+        for one in exact.checks():
+            yield _with_ours(one), ()
+    cell_of = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
     grains = [scene for scene in asked.scenes if scene.id not in planned.piles]
-    if 1 in levels:
-        yield from (exact.closed_form(scene) for scene in grains)
-    if 2 in levels:
-        yield from _answered(exact.checks())
-        for scene in filter(exact.has_pivot, grains):
-            yield exact.pivot(scene, found.get(scene.id, float("nan")))
+    thresholds = results.get("single_grain")
+    ours = {} if thresholds is None else dict(thresholds.set_index("scene_id")["ustar_m_s"])
+
+    def unnamed() -> Iterator[tuple[Problem, tuple[str, ...]]]:
+        for scene in grains:
+            if "closed-form" in kinds:
+                yield exact.closed_form(scene), ()
+            if "pivot" in kinds and exact.has_pivot(scene):
+                runs = (cell_of[scene.id],) if scene.id in ours else ()
+                yield exact.pivot(scene, ours.get(scene.id, np.nan)), runs
+        # neither a theory's stress nor a channel's is a question at levels 3 and 5
+        solved = [p for p in planned.piles.values() if p.model.cases and not p.scene.flow.depth]
+        if "flow" in kinds:
+            for pile in {pile.flow.name: pile for pile in solved}.values():
+                yield measured.flow(pile, results), (pile.flow.name,)
+        if not {"pile", "line"} & {*kinds}:
+            return
+        for bed in measured.beds(planned.piles.values(), results, cases):
+            if "pile" in kinds:
+                yield measured.pile(bed), (bed.pile.case.name,)
+            # grains on other beds are given at level 4 alone, one by one
+            if "line" in kinds and bed.pile in solved and bed.pile.bed.is_triangle:
+                yield measured.line(bed), (bed.pile.flow.name, bed.pile.case.name)
+
+    for one, runs in unnamed():
+        yield replace(one, name=names[one.name]), runs
+
+
+def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
+    """A name for each scene and each flow of a study, by its digest: the numbers that differ."""
+    flows = {run.id[:12]: p.scene for p in planned.piles.values() for run in p.model.cases}
+    grains = {one.id: one for one in asked.scenes if one.id not in planned.piles}
+    piles = {name: pile.scene for name, pile in planned.piles.items()}
+    of_flow = {"alpha_deg", "h_m", "z0_over_d", "nu_m2_s"}
+    names: dict[str, str] = {}
+    for kind, scenes in (("grain", grains), ("pile", piles), ("flow", flows)):
+        values = pd.DataFrame([fields.used(scene) for scene in scenes.values()], index=[*scenes])
+        columns = [name for name in NAMED if name in values and values[name].nunique() > 1]
+        if kind == "flow":
+            columns = [name for name in columns if name in of_flow]
+        counts: Counter[str] = Counter()
+        for digest, row in values.iterrows():
+            words = [
+                NAMED[c][0].format(_scaled(row[c], NAMED[c][1]))
+                for c in columns
+                if pd.notna(row[c])
+            ]
+            name = re.sub("[^a-z0-9.+]+", "-", "-".join([kind, *words]).lower())
+            counts[name] += 1
+            names[str(digest)] = name if counts[name] == 1 else f"{name}-{counts[name]}"
+    return names
+
+
+def _scaled(value: Any, unit: float) -> Any:
+    return value if isinstance(value, str) else unit * value
 
 
 def _has_decks() -> bool:
     return shutil.which(liggghts.PROGRAM) is not None
 
 
-def _answered(checks: Iterator[Problem]) -> Iterator[Problem]:
-    """The checks of the contact law with what our decks give, where LIGGGHTS is installed."""
+def _with_ours(one: Problem) -> Problem:
+    """A check of the contact law with the answer of our deck, if LIGGGHTS is installed."""
     if not _has_decks():
-        yield from checks
-        return
+        return one
     with tempfile.TemporaryDirectory() as folder:
-        for one in checks:
-            given, took = ours.check(one.kind, one.parameters, Path(folder) / one.kind)
-            found = given.set_index(["quantity", "at"])["value"]
-            keys = pd.MultiIndex.from_frame(one.expected[["quantity", "at"]])
-            told = one.expected.assign(ours=found.reindex(keys).to_numpy(float))
-            yield replace(one, expected=told, seconds=took.seconds)
+        answer, took = run_check(one.kind, one.parameters, Path(folder) / "deck")
+    keys = ["quantity", "at"]
+    ours = one.expected[keys].merge(answer, on=keys, how="left")["value"]
+    return replace(one, expected=one.expected.assign(ours=ours), seconds=took.seconds)
 
 
-class Finished:
-    """A study whose cases are done, as scenes of a pack."""
+class Took(NamedTuple):
+    """Wall time and processor time of runs, s; NaN for formulas."""
 
-    def __init__(self, asked: Study, planned: Plan, space: Workspace) -> None:
-        """Read the study's tables.
+    seconds: float = np.nan
+    cpu_s: float = np.nan
+
+
+class Ours:
+    """The solvers of this package on the scenes of a pack.
+
+    Parameters
+    ----------
+    chosen : Pack
+        The pack.
+    root : Path
+        Directory of the cases.
+    """
+
+    def __init__(self, chosen: Pack, root: Path) -> None:
+        text = (chosen.root / STUDY).read_text(encoding="utf-8")
+        self.pack, self.root = chosen, root
+        self.study = study.parse(text, name="benchmark", where=str(chosen.root / STUDY))
+        planned = plan.make(self.study)
+        names = scene_names(planned, self.study)
+        scenes = {names[one.id]: one for one in self.study.scenes}
+        piles = planned.piles.values()
+        flows = {names[run.id[:12]]: p.scene for p in piles for run in p.model.cases}
+        self.scenes = scenes | flows
+        self.times: dict[str, Took] = {}
+
+    def answer(self, name: str) -> tuple[pd.DataFrame, Took]:
+        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its time.
+
+        Raises
+        ------
+        SolverError
+            If a solver failed.
+        """
+        kind = self.pack.scenes[name]["kind"]
+        if kind in CHECKS:
+            return run_check(kind, self.pack.scenes[name], self.root / "checks")
+        group = Group("benchmark", (self.scenes[self._key(name)],), str(self.pack.root / STUDY))
+        asked = replace(self.study, groups=(group,))
+        planned = plan.make(asked, cases=self.root)
+        # several scenes share a flow or a poured bed, which is run once
+        shared = [r for p in planned.piles.values() for r in (*p.model.cases, *p.pouring)]
+        needed = {"closed-form": [], "flow": shared}.get(kind, [*planned.cases.values()])
+        for run in needed:
+            if run not in shared or run.name not in self.times:
+                self._run(run)
+        done = {run.name for run in needed}
+        results = tables.make(asked, planned, self.root, done) if needed else {}
+        ((problem, runs),) = problems(asked, planned, results, self.root, [kind])
+        answer = problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
+        if kind == "pile":
+            steps = pd.read_csv(self.root / runs[0] / "samples.csv")["step"].iloc[-1]
+            row = {"quantity": ["steps"], "at": [""], "value": [float(steps)]}
+            answer = pd.concat([answer, pd.DataFrame(row)], ignore_index=True)
+        took = [self.times[run] for run in runs] or [Took()]
+        return answer, Took(sum(t.seconds for t in took), sum(t.cpu_s for t in took))
+
+    def check(self, name: str) -> None:
+        """See that a scene can be answered.
 
         Raises
         ------
         InputError
-            If they are not there, or of another version.
+            If the pack's study has no such scene: the pack is of another version of the program.
         """
-        self.asked, self.planned, self.cases = asked, planned, space.cases
-        if not space.drawn.is_file():
+        if self.pack.scenes[name]["kind"] not in CHECKS and self._key(name) not in self.scenes:
             raise InputError(
-                "the study is not finished", where=str(space.root), remedy="run it to its end"
-            )
-        self.tables = tables.read(space.folder, "tables")
-        told = self.tables["scenes"]
-        self._check_cases(set(told["case"]) | set(told["flow_case"].dropna()), space.root)
-        times = tables.read(space.folder, "timings")["timings"]
-        self.seconds: dict[str, float] = dict(zip(times["case"], times["solver_s"], strict=True))
-
-    def _check_cases(self, told: set[str], root: Path) -> None:
-        poured = {run.name for pile in self.planned.piles.values() for run in pile.pouring}
-        if told | poured != set(self.planned.cases):
-            raise InputError(
-                "the study was run by another version of the program: its cases are others",
-                where=str(root),
-                remedy="run it again",
+                f"no scene of its study is {name}: it is of another version of the program",
+                where=str(self.pack.root),
+                remedy="export it again",
             )
 
-    def problems(self, levels: Sequence[int]) -> Iterator[Problem]:
-        """The scenes at some levels."""
-        thresholds: Any = self.tables.get("single_grain")
-        found = {} if thresholds is None else thresholds.set_index("scene_id")["ustar_m_s"]
-        yield from map(self._timed, formulas(self.asked, self.planned, levels, dict(found)))
-        piles = measured.answered(self.planned.piles.values(), self.tables, self.cases)
-        # neither a theory's stress nor a channel's is a question at levels 3 and 5
-        solved = [one for one in piles if one.pile.model.cases and not one.pile.scene.flow.depth]
-        if 3 in levels:
-            of_flow = {one.pile.flow.name: one for one in solved}
-            for name, one in of_flow.items():
-                yield replace(measured.flow(one), seconds=self.seconds[name])
-        for one in piles if 4 in levels else ():
-            yield replace(measured.pile(one), seconds=self.seconds[one.pile.case.name])
-        # how grains lie on other beds is told by level 4 alone, grain by grain
-        triangles = [one for one in solved if one.pile.bed.is_triangle]
-        for one in triangles if 5 in levels else ():
-            both = self.seconds[one.pile.case.name] + self.seconds[one.pile.flow.name]
-            yield replace(measured.line(one), seconds=both)
+    def _key(self, name: str) -> str:
+        return name.partition("-")[2]
 
-    def _timed(self, problem: Problem) -> Problem:
-        """Cells share a run: each has its part of the time."""
-        for one in self.planned.cells if problem.kind == "pivot" else ():
-            if any(scene.id == problem.name for scene in one.scenes):
-                return replace(problem, seconds=self.seconds[one.name] / len(one.scenes))
-        return problem
+    def _run(self, run: Case) -> None:
+        engine.execute(run, self.root, LIMIT_S)
+        state = case.done_state(run, self.root) or {}
+        self.times[run.name] = Took(float(state["solver_s"]), float(state["cpu_s"]))
+
+
+def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Took]:
+    """Run one of the decks for the contact law.
+
+    Parameters
+    ----------
+    kind : str
+        One of `CHECKS`.
+    given : mapping
+        The parameters of the scene.
+    folder : Path
+        Where it runs; what is there is removed.
+
+    Raises
+    ------
+    SolverError
+        If it did not come to its end.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(case.templates() / "liggghts", folder)
+    variables = {name: given[name] for name in ("damping", "time_step")}
+    if kind == "incline":
+        variables["incline"] = given["incline_deg"]
+    elif kind == "sliding":
+        unit = float(np.sqrt(given["d_m"] * given["reduced_gravity_m_s2"]))
+        variables["speed"] = given["speed_m_s"] / unit
+    elif kind == "passing":
+        names = ("displacement_criterion", "stiffness")
+        variables |= {"push": exact.push_of(given), **{name: given[name] for name in names}}
+    command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
+    for name, value in variables.items():
+        command += ["-var", name, repr(value)]
+    log = folder / "log.check"
+    ended = process.run(
+        command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
+    )
+    printed = log.read_text(errors="replace")
+    if ended.returncode != 0 or "the check has ended" not in printed:
+        raise SolverError("the check did not come to its end", where=str(log), remedy="see it")
+    numbers = re.findall(r"^([a-z][a-z ]+): (\S+)$", printed, re.MULTILINE)
+    rows = [(*PRINTED[label], float(text)) for label, text in numbers if label in PRINTED]
+    answer = pd.DataFrame(rows, columns=["quantity", "at", "value"])
+    return answer, Took(ended.seconds, ended.cpu_s)

@@ -1,26 +1,236 @@
-"""A pack on disk: written as one step, never used unless its files are those of its manifest."""
+"""A benchmark pack: its scenes and expected answers, and how they are written and read.
 
+docs/benchmark.md is the contract for solvers. A pack may come from anywhere: `read` refuses one
+whose files are not those of its manifest, or whose names, links or numbers no export makes.
+"""
+
+import json
+import math
 import os
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+import re
+import stat
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple, NoReturn
 
+import numpy as np
 import pandas as pd
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import from_json
 
-from orchestrator.benchmark import intake
-from orchestrator.benchmark.intake import SCENES
-from orchestrator.benchmark.problem import ASK, SCENE, SCHEMA, Problem, csv
 from orchestrator.errors import InputError
+from orchestrator.physics.laws import LAWS
 from orchestrator.runs import workspace
 from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
+from orchestrator.types import Row
 
-MANIFEST = "manifest.json"
-EXPECTED = "expected.csv"
-STUDY = "study.toml"
-TIMES = "times.csv"
+SCHEMA = 2
+"""Version of the exchange format. A key or column that is renamed is a new version."""
+MANIFEST, EXPECTED, STUDY, TIMES = "manifest.json", "expected.csv", "study.toml", "times.csv"
+FILES = (EXPECTED, "scenes.csv", TIMES, STUDY, "README.md")
+"""Files of a pack beside its manifest and the directory of its scenes."""
+SCENES, SCENE, ASK = "scenes", "scene.json", "ask.csv"
+COLUMNS = ("quantity", "at", "value", "low", "high", "tolerance", "ours")
+"""Columns of the expected answers beside the scene's name."""
+COUNTS = ("moved", "not_moved", "carried_off")
+"""Quantities that count grains."""
+NUMBER = "%.9g"
+"""Format of the numbers in all tables of a pack."""
+MAX_BYTES, MAX_SCENES, MAX_MEMBERS = 64 * 2**20, 20_000, 20
+"""Size of a file, scenes of a pack, files of a scene."""
+MAX_TOLERANCE, MAX_WIDTH = 0.5, 10.0
+"""Bounds of what is judged: the tolerance, and the width of an interval over its value. A pack with
+wider ones would pass any answer."""
+_NAME, _MEMBER = r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*", r"[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
+_BED = (*COUNTS, "ustar0_m_s", "shields")
+_GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "time_step", "reduced_gravity_m_s2")
+_FLUID = ("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
+_FLOW = (
+    *("alpha_deg", "h_m", "z0_m", "rho_f_kg_m3"),
+    *("u_e_height_m", "u_e_m_s", "ustar0_m_s"),
+)
+
+
+class Kind(NamedTuple):
+    """A kind of scene: its level, its required numbers, and what it asks.
+
+    `single` are quantities that are one number each, `functions` depend on the column ``at``.
+    """
+
+    level: int
+    required: tuple[str, ...]
+    single: tuple[str, ...] = ()
+    functions: tuple[str, ...] = ()
+
+
+KINDS: dict[str, Kind] = {
+    "closed-form": Kind(
+        1,
+        ("d_m", "rho_sol_kg_m3", *_FLUID),
+        ("ustar_m_s", "reynolds", "shields"),
+        ("drag_n", "lift_n"),
+    ),
+    "collision": Kind(2, (*_GRAIN, "speed_m_s"), ("restitution",)),
+    "incline": Kind(2, (*_GRAIN, "incline_deg"), ("acceleration_over_g",)),
+    "sliding": Kind(2, (*_GRAIN, "speed_m_s"), (), ("speed_over_start", "spin_over_start")),
+    "passing": Kind(
+        2,
+        (*_GRAIN, "beta_deg", "displacement_criterion", "force_n", "weight_n", "stiffness"),
+        ("passing_time_over_t",),
+    ),
+    "pivot": Kind(2, (*_GRAIN, *_FLUID), ("ustar_m_s",)),
+    "flow": Kind(3, _FLOW, ("windward_mean",), ("ustar_over_ustar0",)),
+    "pile": Kind(4, (*_GRAIN, *_FLUID, "count"), (), _BED),
+    "line": Kind(5, (*_GRAIN, *_FLUID, *_FLOW), ("count",), _BED),
+}
+
+Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._+-]{0,79}$")]
+Whole = Annotated[int, Field(ge=-(2**53), le=2**53)]
+SceneName = Annotated[str, Field(max_length=120, pattern=f"^{_NAME}$")]
+Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,79}$")]
+
+
+class Manifest(BaseModel):
+    """The manifest of a pack."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+    kind: Literal["benchmark pack"]
+    name: Text
+    format: Annotated[Literal[2], Field(alias="schema")]
+    scenes: Annotated[list[SceneName], Field(min_length=1, max_length=MAX_SCENES)]
+    sha256: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]]
+    programs: dict[Text, Text] = {}
+    machine: dict[Text, Text | Whole | None] = {}
+
+
+_PARAMETERS = TypeAdapter(
+    dict[Key, Whole | float | Word], config=ConfigDict(strict=True, allow_inf_nan=False)
+)
+RANGES: dict[str, tuple[float, float]] = {
+    "alpha_deg": (-90.0, 90.0),
+    **dict.fromkeys(("phi_deg", "incline_deg", "beta_deg"), (0.1, 89.9)),
+    **dict.fromkeys(("damping", "time_step"), (1e-6, 0.999)),
+    **dict.fromkeys(("d_m", "z0_m", "h_m", "u_e_height_m"), (1e-9, 1e4)),
+    **dict.fromkeys(("rho_sol_kg_m3", "rho_f_kg_m3"), (1e-6, 1e6)),
+    **dict.fromkeys(("g_m_s2", "reduced_gravity_m_s2", "nu_m2_s"), (1e-12, 1e6)),
+    **dict.fromkeys(("speed_m_s", "u_e_m_s", "ustar0_m_s"), (1e-9, 1e6)),
+    **dict.fromkeys(("force_n", "weight_n"), (1e-30, 1e9)),
+    "stiffness": (1.0, 1e12),
+    "alpha_s": (0.0, 1e3),
+    "displacement_criterion": (1e-3, 10.0),
+    "count": (1, 1e6),
+}
+"""Ranges of the parameters that the comparison itself reads; SI units, degrees."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene at a level.
+
+    Attributes
+    ----------
+    name : str
+        Name of the scene, unique among those of its level.
+    kind : str
+        One of `KINDS`.
+    parameters : mapping
+        Numbers and words, SI units in their names.
+    tables : mapping of str to DataFrame
+        Tables that lie beside them, by the stem of the file's name.
+    expected : DataFrame
+        Columns `COLUMNS`, a row for each number that is asked; `at` is a text.
+    seconds : float
+        Time of our answer, s; NaN if it is not known.
+    """
+
+    name: str
+    kind: str
+    parameters: Mapping[str, Any]
+    tables: Mapping[str, pd.DataFrame]
+    expected: pd.DataFrame
+    seconds: float = float("nan")
+
+    @property
+    def level(self) -> int:
+        """Its level, 1 to 5."""
+        return KINDS[self.kind].level
+
+    @property
+    def scene(self) -> str:
+        """Name of its directory."""
+        return f"{self.level}-{self.name}"
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether any of its numbers has a tolerance."""
+        return bool(self.expected["tolerance"].notna().any())
+
+    @property
+    def head(self) -> Row:
+        """Its first entries in ``scene.json`` and ``scenes.csv``."""
+        return {"scene": self.scene, "level": self.level, "kind": self.kind}
+
+    def write(self, folder: Path) -> None:
+        """Write the directory that a solver is given."""
+        folder.mkdir(parents=True)
+        text = json.dumps(
+            {"schema": SCHEMA, **self.head, **self.parameters}, indent=1, allow_nan=False
+        )
+        (folder / SCENE).write_text(text + "\n", encoding="utf-8")
+        for stem, table in {**self.tables, "ask": self.expected[["quantity", "at"]]}.items():
+            (folder / f"{stem}.csv").write_text(csv(table), encoding="utf-8")
+
+
+def csv(table: pd.DataFrame) -> str:
+    """The text of a table; a pack has thousands, and pandas takes a millisecond for each."""
+    columns = [
+        [
+            "" if v != v else NUMBER % v if isinstance(v, float) else str(v)
+            for v in table[c].tolist()
+        ]
+        for c in table
+    ]
+    rows = map(",".join, zip(*columns, strict=True))
+    return "\n".join([",".join(map(str, table)), *rows, ""])
+
+
+def expectation(
+    quantity: str,
+    value: float,
+    tolerance: float,
+    at: float | None = None,
+    interval: tuple[float, float] | None = None,
+    ours: float = np.nan,
+) -> Row:
+    """A row of the expected answers.
+
+    Parameters
+    ----------
+    quantity : str
+        The quantity.
+    value : float
+        Its expected value.
+    tolerance : float
+        Relative tolerance; NaN for a number that is shown and not judged.
+    at : float, optional
+        The argument of a quantity that is a function.
+    interval : tuple of float, optional
+        Ends of the interval of the value; by default the value itself.
+    ours : float
+        Our own answer.
+    """
+    low, high = interval or (value, value)
+    place = "" if at is None else NUMBER % at
+    return dict(zip(COLUMNS, (quantity, place, value, low, high, tolerance, ours), strict=True))
+
+
+def table_of(rows: Iterable[Row]) -> pd.DataFrame:
+    """The table of rows that `expectation` gives."""
+    return pd.DataFrame(list(rows), columns=list(COLUMNS))
 
 
 @dataclass(frozen=True)
@@ -34,38 +244,25 @@ class Pack:
     scenes : dict of str to dict
         The parameters of each scene, by its name, as its ``scene.json`` has them.
     expected : DataFrame
-        ``scene``, and the columns of `problem.EXPECTED`; `at` is a text.
-    manifest : mapping
+        ``scene`` and `COLUMNS`; `at` is a text.
+    manifest : Manifest
         Its manifest.
     """
 
     root: Path
-    scenes: dict[str, dict[str, Any]]
+    scenes: dict[str, Row]
     expected: pd.DataFrame
-    manifest: Mapping[str, Any]
+    manifest: Manifest
 
     @property
     def digest(self) -> str:
-        """One digest of what is asked and expected: not of the times that ours took."""
-        sums = {name: sum for name, sum in self.manifest["sha256"].items() if name != TIMES}
+        """One digest of questions and expected answers; the times of our runs do not count."""
+        sums = {name: digest for name, digest in self.manifest.sha256.items() if name != TIMES}
         return digest_text(canonical_json(sums))
 
     def directory(self, scene: str) -> Path:
-        """Parameters that the solver of a scene gets."""
+        """The directory that the solver of a scene gets."""
         return self.root / SCENES / scene
-
-    def about(self, scene: str) -> str:
-        """Name of a bed for a reader: slope, diameter or roughness, packing."""
-        told = self.scenes[scene]
-        size = f"d = {1e3 * told['d_m']:g} mm" if "d_m" in told else f"z₀ = {told['z0_m']:.3g} m"
-        seed = f" {told['seed']}" if "seed" in told else ""
-        packing = f", {told['packing']}{seed}" if "packing" in told else ""
-        lift_off = ", lift-off" if "lift_off" in told else ""
-        return f"{told['alpha_deg']:g}°, {size}{packing}{lift_off}"
-
-    def files(self) -> list[Path]:
-        """Every file of the pack but the manifest."""
-        return list(intake.members(self.root).values())
 
     def verify(self) -> None:
         """See that no file has changed.
@@ -73,27 +270,18 @@ class Pack:
         Raises
         ------
         InputError
-            Naming the first file that is not what the manifest says.
+            Naming the first file that is not as the manifest says.
         """
-        known = self.manifest["sha256"]
-        found = digest_files(self.files(), root=self.root)
-        for name in sorted({*known, *found}):
-            if known.get(name) != found.get(name):
-                how = "is missing" if name not in found else "is not what was exported"
-                raise InputError(
-                    f"the file {name} {how}: the pack is not used",
-                    where=str(self.root),
-                    remedy="export it again",
-                )
+        _verify(self.root, self.manifest)
 
 
 def read(root: Path) -> Pack:
-    """Read a pack and see that it is what was exported.
+    """Read a pack, and see that it is as it was exported.
 
     Raises
     ------
     InputError
-        If it is none, of another schema, changed, or holds what no pack holds.
+        If there is none, or it is of another schema, changed, or holds what no export writes.
     """
     if not os.path.lexists(root / MANIFEST):
         raise InputError(
@@ -101,34 +289,218 @@ def read(root: Path) -> Pack:
             where=str(root),
             remedy="write one with: python -m orchestrator benchmark export",
         )
-    manifest = intake.manifest(root / MANIFEST)
-    pack = Pack(root, {}, pd.DataFrame(), manifest)
-    pack.verify()
-    _check_scenes(root, manifest["scenes"])
-    scenes = {name: intake.scene(pack.directory(name) / SCENE, name) for name in manifest["scenes"]}
-    expected = intake.expected(root / EXPECTED, scenes)
+    manifest = _manifest(root / MANIFEST)
+    _verify(root, manifest)
+    folders = {name.split("/")[1] for name in manifest.sha256 if name.startswith(f"{SCENES}/")}
+    if folders != {*manifest.scenes}:
+        _refuse(f"the manifest does not list the scenes in {SCENES}", root)
+    _check_study(root / STUDY)
+    scenes = {name: _scene(root / SCENES / name / SCENE, name) for name in manifest.scenes}
+    expected = _expected(root / EXPECTED, scenes)
     for name, asked in expected.groupby("scene", sort=False):
-        path = pack.directory(str(name)) / ASK
-        intake.check(path)
+        path = root / SCENES / str(name) / ASK
+        _check_file(path)
         if path.read_bytes() != csv(asked[["quantity", "at"]]).encode():
-            intake.refuse(f"it does not ask what {EXPECTED} answers", path)
+            _refuse(f"it does not ask what {EXPECTED} answers", path)
     return Pack(root, scenes, expected, manifest)
 
 
-def _check_scenes(root: Path, scenes: Sequence[str]) -> None:
-    """See that all say the same of which scenes there are."""
-    strange = {path.name for path in (root / SCENES).iterdir()} ^ set(scenes)
-    if strange:
-        intake.refuse(f"the manifest and {SCENES} differ: {min(strange)}", root)
-    lines = (root / "scenes.csv").read_text("utf-8", errors="replace").splitlines()
-    if [line.partition(",")[0] for line in lines] != ["scene", *scenes]:
-        intake.refuse("its scenes are not those of the manifest", root / "scenes.csv")
+def _refuse(what: str, where: Path) -> NoReturn:
+    raise InputError(what, where=str(where), remedy="the pack is not used: export it again")
+
+
+def _members(root: Path) -> dict[str, Path]:
+    """Every file of a pack but the manifest, by its name; refuses links and strange names."""
+    paths = {name: root / name for name in FILES}
+    for folder in _entries(root / SCENES, _NAME, MAX_SCENES):
+        for path in _entries(folder, _MEMBER, MAX_MEMBERS):
+            paths[path.relative_to(root).as_posix()] = path
+    for path in paths.values():
+        _check_file(path)
+    return paths
+
+
+def _entries(folder: Path, pattern: str, most: int) -> Iterator[Path]:
+    if folder.is_symlink() or not folder.is_dir():
+        _refuse("this is no directory", folder)
+    names = sorted(os.listdir(folder))
+    if len(names) > most:
+        _refuse(f"it holds more than {most} entries", folder)
+    for name in names:
+        if not re.fullmatch(pattern, name):
+            _refuse("no file of a pack has such a name", folder / name)
+        yield folder / name
+
+
+def _check_file(path: Path) -> None:
+    try:
+        state = path.lstat()
+    except OSError as error:
+        _refuse(f"it cannot be read: {error.strerror}", path)
+    if not stat.S_ISREG(state.st_mode):
+        _refuse("this is a link or no file", path)
+    if state.st_size > MAX_BYTES:
+        _refuse(f"it is larger than {MAX_BYTES // 2**20} MiB", path)
+
+
+def _verify(root: Path, manifest: Manifest) -> None:
+    digests = digest_files(_members(root).values(), root=root)
+    for name in sorted({*manifest.sha256, *digests}):
+        if manifest.sha256.get(name) != digests.get(name):
+            how = "is missing" if name not in digests else "is not what was exported"
+            _refuse(f"the file {name} {how}", root)
+
+
+def _json(path: Path) -> Any:
+    _check_file(path)
+    try:
+        return from_json(path.read_bytes(), allow_inf_nan=False)
+    except (ValueError, OSError) as error:
+        _refuse(f"it cannot be read: {error}", path)
+
+
+def _manifest(path: Path) -> Manifest:
+    value = _json(path)
+    schema = value.get("schema") if isinstance(value, dict) else None
+    if isinstance(schema, int) and schema != SCHEMA:
+        refuse_schema(f"its schema is {schema}, and this program reads {SCHEMA}", path)
+    try:
+        manifest = Manifest.model_validate(value)
+    except ValidationError as error:
+        _refuse(_first_fault(error), path)
+    if len(set(manifest.scenes)) < len(manifest.scenes):
+        _refuse("it lists a scene twice", path)
+    return manifest
+
+
+def refuse_schema(what: str, where: Path) -> NoReturn:
+    """Refuse a pack or answers of another schema, and name the table of renamed keys."""
+    raise InputError(
+        what,
+        where=str(where),
+        remedy="export the pack again; 'Old and new names' in docs/benchmark.md lists the keys",
+    )
+
+
+def _first_fault(error: ValidationError) -> str:
+    fault = error.errors()[0]
+    field = ".".join(map(str, fault["loc"][:2]))
+    return f"{field}: {fault['msg']}" if field else str(fault["msg"])
+
+
+def _scene(path: Path, name: str) -> Row:
+    try:
+        parameters = _PARAMETERS.validate_python(_json(path))
+    except ValidationError as error:
+        _refuse(_first_fault(error), path)
+    kind = KINDS.get(str(parameters.get("kind")))
+    head = [parameters.get(key) for key in ("schema", "scene", "level")]
+    if kind is None or head != [SCHEMA, name, kind.level] or name[0] != str(kind.level):
+        _refuse(f"schema, scene, level and kind are not those of {name}", path)
+    for key in {*kind.required, *(RANGES.keys() & parameters)}:
+        (low, high), value = RANGES[key], parameters.get(key)
+        if isinstance(value, str) or value is None or not low <= value <= high:
+            _refuse(f"{key} is no number from {low:g} to {high:g}", path)
+    if "alpha_s" in kind.required and parameters.get("force_law") not in LAWS:
+        _refuse(f"force_law is none of {', '.join(LAWS)}", path)
+    numbers: Mapping[str, Any] = parameters
+    if numbers.get("rho_f_kg_m3", 0.0) >= numbers.get("rho_sol_kg_m3", math.inf):
+        _refuse("the grains are not denser than the fluid", path)
+    return parameters
+
+
+def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
+    try:
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
+        if list(table.columns) != ["scene", *COLUMNS]:
+            _refuse(f"its columns are not scene,{','.join(COLUMNS)}", path)
+        numbers = table[list(COLUMNS[2:])].where(lambda part: part != "").astype(float)
+    except (ValueError, OverflowError) as error:
+        _refuse(f"it cannot be read: {error}", path)
+    table[list(COLUMNS[2:])] = numbers
+    if set(table["scene"]) != set(scenes):
+        _refuse("its scenes are not those of the manifest", path)
+    kind = table["scene"].map(lambda name: scenes[name]["kind"])
+    asked = {
+        (name, quantity, function)
+        for name, one in KINDS.items()
+        for function, quantities in ((False, one.single), (True, one.functions))
+        for quantity in quantities
+    }
+    questions = zip(kind, table["quantity"], table["at"] != "", strict=True)
+    at = pd.to_numeric(table["at"], errors="coerce")
+    value, low, high = table["value"], table["low"], table["high"]
+    judged, counts = table["tolerance"].notna(), table["quantity"].isin(COUNTS)
+    wide = high - low > MAX_WIDTH * value.abs()
+    faults = {
+        "asks what its kind does not": pd.Series([one not in asked for one in questions]),
+        "has an at that is no number": (table["at"] != "") & ~(at.abs() < 1e30),
+        "lacks a finite value": ~(value.abs() < 1e30),
+        "has no interval that holds its value": ~((low <= value) & (value <= high)),
+        "has a tolerance beyond 0 ... 0.5": judged & ~table["tolerance"].between(0, MAX_TOLERANCE),
+        "accepts any answer": judged & wide & ~(counts & (high <= RANGES["count"][1])),
+        "has an infinite number of ours": table["ours"].abs() > 1e30,
+        "has a negative count or Shields number": (low < 0)
+        & (counts | (table["quantity"] == "shields")),
+        "asks the same again": table.duplicated(["scene", "quantity", "at"]),
+    }
+    for what, where in faults.items():
+        if where.any():
+            _refuse(f"line {int(where.to_numpy().argmax()) + 2} {what}", path)
+    unjudged = set(scenes) - set(table["scene"][judged])
+    if unjudged:
+        _refuse(f"no number of {min(unjudged)} is judged", path)
+    return table
+
+
+def _check_study(path: Path) -> None:
+    """See that the study of a pack is whole by itself: it may read no file."""
+    try:
+        study = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        _refuse(f"it cannot be read: {error}", path)
+    texts = study.get("profiles", {})
+    for name in _files_of(study):
+        if not isinstance(texts, dict) or name not in texts:
+            _refuse("its study names a file; a pack has the text of each in [profiles]", path)
+
+
+def _files_of(value: Any, key: str = "") -> Iterator[str]:
+    """The names of files in a study: the texts under ``profile`` and ``sizes``."""
+    if isinstance(value, dict):
+        for name, part in value.items():
+            if name != "profiles":
+                yield from _files_of(part, name.rpartition(".")[2])
+    elif isinstance(value, list):
+        for part in value:
+            yield from _files_of(part, key)
+    elif isinstance(value, str) and key in ("profile", "sizes"):
+        yield value
+
+
+def mobile_grains(pack: Pack, scene: str) -> int:
+    """How many grains of a scene may move.
+
+    Raises
+    ------
+    InputError
+        If its table of grains cannot be read.
+    """
+    path = pack.directory(scene) / "grains.csv"
+    _check_file(path)
+    try:
+        kinds = pd.read_csv(path, usecols=["kind"], dtype=str, encoding="utf-8")["kind"]
+    except (ValueError, OverflowError) as error:
+        _refuse(f"it cannot be read: {error}", path)
+    return int((kinds != "fixed").sum())
 
 
 def write(
     root: Path, problems: Iterable[Problem], study: tuple[str, str], programs: Mapping[str, str]
 ) -> int:
     """Write a pack, in place of one that is there, and return how many scenes it has.
+
+    Scenes of which no number is judged are left out.
 
     Parameters
     ----------
@@ -150,40 +522,40 @@ def write(
     with workspace.claimed(root, workspace.PACK, name) as folder:
         about = {"kind": workspace.PACK.word, "name": name}
         folder.note(MANIFEST, text_of(about))  # it is no pack until all is there
-        listed = list(problems)
-        scenes = folder.clear(SCENES, intake.is_member)
+        listed = [one for one in problems if one.is_judged]
+        scenes = folder.clear(SCENES, lambda path: bool(re.fullmatch(f"{_NAME}/{_MEMBER}", path)))
         for one in listed:
             one.write(scenes / one.scene)
-        tables = {f"{name}.csv": csv(table) for name, table in _tables(listed).items()}
-        for file, content in {STUDY: text, "README.md": _readme(programs), **tables}.items():
-            folder.put(file, content)
+        for file, table in _tables(listed).items():
+            folder.put(file, csv(table))
+        folder.put(STUDY, text)
+        folder.put(
+            "README.md", README + "".join(f"- {n} {v}\n" for n, v in sorted(programs.items()))
+        )
         manifest = {
             **about,
             "schema": SCHEMA,
             "scenes": [one.scene for one in listed],
             "programs": dict(programs),
-            "machine": {"processor": processor(), "cores": os.cpu_count()},
-            "sha256": digest_files(intake.members(root).values(), root=root),
+            "machine": {"processor": _processor(), "cores": os.cpu_count()},
+            "sha256": digest_files(_members(root).values(), root=root),
         }
         folder.note(MANIFEST, text_of(manifest))
     return len(listed)
 
 
-def _tables(problems: list[Problem]) -> dict[str, pd.DataFrame]:
-    heads = ({"scene": p.scene, "level": p.level, "kind": p.kind, **p.parameters} for p in problems)
+def _tables(problems: Sequence[Problem]) -> dict[str, pd.DataFrame]:
+    expected = pd.concat([p.expected.assign(scene=p.scene) for p in problems], ignore_index=True)
     times = [{"scene": p.scene, "seconds": p.seconds} for p in problems if p.seconds == p.seconds]
-    parts = [p.expected.assign(scene=p.scene) for p in problems]
-    expected = pd.concat(parts, ignore_index=True)
-    first = ["scene", *expected.columns.drop("scene")]
     return {
-        "scenes": pd.DataFrame(heads).astype(object),
-        "times": pd.DataFrame(times, columns=["scene", "seconds"]),
-        "expected": expected[first],
+        "scenes.csv": pd.DataFrame({**p.head, **p.parameters} for p in problems).astype(object),
+        TIMES: pd.DataFrame(times, columns=["scene", "seconds"]),
+        EXPECTED: expected[["scene", *COLUMNS]],
     }
 
 
-def processor() -> str:
-    """The machine's processor, as far as it says."""
+def _processor() -> str:
+    """The machine's processor, as far as it is stated."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -192,7 +564,23 @@ def processor() -> str:
     return next(named, platform.machine())
 
 
-def _readme(programs: Mapping[str, str]) -> str:
-    text = resources.files("orchestrator.benchmark").joinpath("README.md.in").read_text("utf-8")
-    listed = "\n".join(f"- {name} {version}" for name, version in sorted(programs.items()))
-    return text.replace("@VERSIONS@", listed or "- none: every answer is a formula")
+README = """# A benchmark pack
+
+Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions and expected answers,
+for a native code of the same model. SI units, angles in degrees. The format, schema 2, is
+docs/benchmark.md of the project.
+
+- `expected.csv`: for each number asked its `value`, interval `low` ... `high`, relative `tolerance`
+  (empty: not judged), and the answer of our run, `ours`
+- `scenes.csv`: the parameters of each scene; an empty field does not apply
+- `study.toml`: the study file that the scenes come from
+- `scenes/`: one directory for each scene, the input of a solver
+- `times.csv`: the time of our run of each scene, on the machine that `manifest.json` names
+- `manifest.json`: schema, scenes, versions, machine, digests
+
+Levels: 1, forces and threshold of one grain; 2, contact law, and one grain on its two neighbours;
+3, stress on the bed; 4, grains of a pile under a given stress; 5, flow and grains.
+
+Programs that gave the answers of our runs:
+
+"""

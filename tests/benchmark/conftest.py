@@ -1,13 +1,11 @@
 """Packs that several tests read: none of them may change one."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from orchestrator import pipeline
 from orchestrator.benchmark.export import export
-from orchestrator.runs import confined
 from orchestrator.study import study
 from tests.conftest import Shared
 
@@ -139,26 +137,3 @@ def level_rows(shared: Shared) -> Path:
     """A pack of one pile of level rows, which empties in chains."""
     with shared("level-rows") as folder:
         return _theory(folder, law="high", diameter=5e-4, bed='packing = "horizontal"')
-
-
-@pytest.fixture
-def without_walls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the system has no namespaces for users."""
-    monkeypatch.setattr(confined, "hides", lambda: False)
-
-
-@pytest.fixture
-def walls() -> None:
-    """Where the system has them."""
-    if not confined.hides():
-        pytest.skip("this system has no namespaces for users")
-
-
-@pytest.fixture
-def nothing_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """All that a run makes for a moment is gone after it."""
-    folder = tmp_path / "tmp"
-    folder.mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(folder))
-    yield
-    assert not [path for path in folder.iterdir() if path.name != "moved"]

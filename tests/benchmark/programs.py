@@ -6,15 +6,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from orchestrator.benchmark import runner
-from orchestrator.benchmark.report import Found
-from orchestrator.benchmark.runner import Choice
-from orchestrator.runs.confined import Limits
+from orchestrator.benchmark import compare
+from orchestrator.benchmark.compare import Choice, Limits, Outcome
 from tests.benchmark.conftest import NATIVE
 
-MIB = 2**20
-SMALL = Limits(seconds=30.0, memory=400 * MIB, disk=32 * MIB, printed=4 * MIB, processes=40)
+SMALL = Limits(seconds=60.0, memory=2**29)
 TWO = Choice(patterns=("2-incline-5", "2-incline-20"))
+RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
+"""Command of the example."""
 HEAD = """
 import math, os, sys, time
 from pathlib import Path
@@ -24,19 +23,21 @@ case, out = map(Path, sys.argv[1:])
 """
 TAIL = "\nsys.exit(solver.main(case, out))\n"
 AFTER = "\ncode = solver.main(case, out)\ntext = out.read_text()\n"
-"""What follows changes the answer of the right solver."""
+"""Beginning of a body that changes the answer of the right solver."""
 
 
 def program(folder: Path, body: str) -> str:
-    """A solver that is the example but for something."""
+    """The command of a solver that is the example but for something."""
     path = folder / "my solver.py"
     path.write_text(HEAD.format(native=str(NATIVE)) + body)
     return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
 
 
-def run(pack: Path, folder: Path, body: str, choice: Choice = TWO, limits: Limits = SMALL) -> Found:
+def run(
+    pack: Path, folder: Path, body: str, choice: Choice = TWO, limits: Limits = SMALL
+) -> Outcome:
     """Run a solver of such a body on a pack, into `results` of a folder."""
-    return runner.run(pack, program(folder, body), folder / "results", choice, limits)
+    return compare.run(pack, program(folder, body), folder / "results", choice, limits)
 
 
 def verdicts_in(folder: Path) -> pd.DataFrame:

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.benchmark import exact, intake, pack, problem
+from orchestrator.benchmark import exact, pack, page
 from orchestrator.benchmark.export import export
-from orchestrator.benchmark.problem import EXPECTED
+from orchestrator.benchmark.pack import COLUMNS
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
 from orchestrator.runs.workspace import STUDY, Workspace
@@ -38,7 +38,7 @@ def test_levels_of_a_study(all_levels: Path) -> None:
     found = pack.read(all_levels)
     levels = [told["level"] for told in found.scenes.values()]
     assert sorted(set(levels)) == [1, 2, 3, 4, 5]
-    assert list(found.expected.columns) == ["scene", *EXPECTED]
+    assert list(found.expected.columns) == ["scene", *COLUMNS]
     assert set(found.expected["scene"]) == set(found.scenes)
     judged = found.expected[found.expected["tolerance"].notna()]
     # our own answer is within what is expected of others
@@ -74,8 +74,8 @@ def _documented() -> set[tuple[str, str]]:
 
 
 def _kinds(said: str) -> set[str]:
-    listed = {kind for kind in intake.KINDS if re.search(rf"\b{kind}\b", said)}
-    return set(intake.KINDS) - listed if said.startswith("all") else listed
+    listed = {kind for kind in pack.KINDS if re.search(rf"\b{kind}\b", said)}
+    return set(pack.KINDS) - listed if said.startswith("all") else listed
 
 
 def test_every_entry_of_a_scene_is_documented_and_the_others_are_absent(
@@ -87,7 +87,7 @@ def test_every_entry_of_a_scene_is_documented_and_the_others_are_absent(
     scene = next(iter(study.parse(DISORDERED, name="d", where="d").scenes))
     for kind in ("pile", "line"):
         # no pack here has these
-        found |= {(name, kind) for name in (*problem.parameters(scene, kind), "lift_off")}
+        found |= {(name, kind) for name in (*exact.parameters(scene, kind), "lift_off")}
     assert found == _documented()
 
 
@@ -165,7 +165,7 @@ def test_a_pile_that_lifts_off_says_so_and_asks_for_it(lift_off: Path, all_level
     found = pack.read(lift_off)
     ((name, told),) = found.scenes.items()
     assert told["lift_off"] > 0.9
-    assert found.about(name).endswith(", lift-off")
+    assert page.about(found, name).endswith(", lift-off")
     rows: Any = found.expected.set_index("quantity")
     last = rows.loc["moved"].iloc[-1]
     assert rows.loc["carried_off", "at"] == last["at"]
@@ -217,18 +217,18 @@ def test_a_pack_that_was_touched_is_refused(formulas: Path, tmp_path: Path, harm
 
 def test_a_pack_of_another_schema_is_refused(formulas: Path, tmp_path: Path) -> None:
     manifest = json.loads((formulas / pack.MANIFEST).read_text())
-    (tmp_path / pack.MANIFEST).write_text(json.dumps({**manifest, "schema": 0}))
-    with pytest.raises(InputError, match="schema"):
+    (tmp_path / pack.MANIFEST).write_text(json.dumps({**manifest, "schema": 1}))
+    with pytest.raises(InputError, match=r"schema is 1.*Old and new names.*docs/benchmark\.md"):
         pack.read(tmp_path)
+    assert "## Old and new names" in (ROOT / "docs" / "benchmark.md").read_text()
 
 
 def test_export_twice_gives_the_same_pack(formulas: Path, tmp_path: Path) -> None:
     export(tmp_path / "again", None, ())
     export(tmp_path / "again", None, ())
-    first, again = (pack.read(root).manifest for root in (formulas, tmp_path / "again"))
-    changed = {name for name, found in first["sha256"].items() if again["sha256"][name] != found}
-    assert changed <= {"times.csv"}
-    assert {**first, "sha256": 0} == {**again, "sha256": 0}
+    first, again = (pack.read(root) for root in (formulas, tmp_path / "again"))
+    assert first.digest == again.digest
+    assert list(first.scenes) == list(again.scenes)
 
 
 def test_our_time_and_answer_for_each_scene(all_levels: Path) -> None:
@@ -246,7 +246,7 @@ def test_a_pack_of_formulas_without_liggghts(
     monkeypatch.setenv("PATH", str(tmp_path))
     export(tmp_path / "pack", None, (2,))
     found = pack.read(tmp_path / "pack")
-    assert found.manifest["programs"] == {}
+    assert found.manifest.programs == {}
     assert found.expected["ours"].isna().all()
     assert pd.read_csv(tmp_path / "pack" / "times.csv").empty
 
@@ -261,7 +261,7 @@ def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
         (("new", "--level", "3"), ("--level", "--from")),
         (("mine",), ("thesis.tex", "not a benchmark pack")),
         (("new", "--from", "mine"), ("no study",)),
-        (("new", "--from", "tolerant"), ("tolerance of 0.1", "without a tolerance")),
+        (("new", "--from", "tolerant"), ("tolerance of 0.1", "without it")),
     ):
         ended = orchestrator("benchmark", "export", *arguments)
         assert ended.returncode == 2

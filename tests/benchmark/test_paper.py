@@ -9,11 +9,12 @@ import pytest
 
 from orchestrator import plan, tables
 from orchestrator.benchmark import measured
+from orchestrator.benchmark.compare import place_of
+from orchestrator.benchmark.export import scene_names
 from orchestrator.paper import PRESETS
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Group, Study
 from tests.benchmark.conftest import ROOT
 from tests.conftest import Command
@@ -23,7 +24,7 @@ FOLDER = ROOT / "benchmark" / "paper"
 
 @pytest.fixture(scope="module")
 def expected() -> pd.DataFrame:
-    return pd.read_csv(FOLDER / "expected.csv", dtype={"at": str})
+    return pd.read_csv(FOLDER / "expected.csv", dtype={"at": str}).fillna({"at": ""})
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +34,17 @@ def paper() -> Study:
 
 def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None:
     assert (FOLDER / "study.toml").read_text() == paper.text
-    beds = {scene.id: scene.bed for scene in paper.scenes}
-    piles = {name for name, bed in beds.items() if isinstance(bed, PileBed) and not bed.is_replica}
-    grains = {name for name, bed in beds.items() if bed.kind == "grain"}
-    level = expected["scene"].str[0]
-    name = expected["scene"].str[2:]
-    for number, wanted in (("1", grains), ("4", piles), ("5", piles)):
+    planned = plan.make(paper)
+    names = scene_names(planned, paper)
+    piles = {names[one] for one, pile in planned.piles.items() if not pile.bed.is_replica}
+    flows = {names[pile.flow.id[:12]] for pile in planned.piles.values()}
+    grains = {names[one.id] for one in paper.scenes if one.id not in planned.piles}
+    level, name = expected["scene"].str[0], expected["scene"].str[2:]
+    for number, wanted in (("1", grains), ("3", flows), ("4", piles), ("5", piles)):
         assert set(name[level == number]) == wanted
-    assert set(name[level == "3"]) == {
-        pile.flow.id[:12] for pile in plan.make(paper).piles.values()
-    }
     scenes = pd.read_csv(FOLDER / "scenes.csv")
     assert set(scenes["scene"]) == set(expected["scene"])
+    assert {"u_e_height_m", "lid_height_m"} <= set(scenes)
 
 
 def test_numbers_are_within_their_own_intervals(expected: pd.DataFrame) -> None:
@@ -67,18 +67,22 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
     for one in planned.cases.values():
         engine.execute(one, tmp_path, 300.0, threading.Event())
         assert case.is_done(one, tmp_path)
-    found = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
-    piles = measured.answered(planned.piles.values(), found, tmp_path)
-    assert len(piles) >= 2
-    for answered in piles:
-        for problem in (measured.flow(answered), measured.pile(answered)):
-            stated = expected[expected["scene"] == problem.scene]
-            keys = stated["quantity"] + stated["at"].fillna("")
-            low, high = (dict(zip(keys, stated[end], strict=True)) for end in ("low", "high"))
-            for _, row in problem.expected.iterrows():
-                key = row["quantity"] + row["at"]
-                margin = 1e-4 * abs(row["value"])
-                assert low[key] - margin <= row["ours"] <= high[key] + margin, (problem.scene, key)
+    results = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
+    names = scene_names(plan.make(paper), paper)
+    beds = measured.beds(planned.piles.values(), results, tmp_path)
+    assert len(beds) >= 2
+    for bed in beds:
+        for problem in (measured.flow(bed.pile, results), measured.pile(bed)):
+            scene = f"{problem.level}-{names[problem.name]}"
+            stated, fresh = (
+                table.assign(place=table["at"].map(place_of))
+                for table in (expected[expected["scene"] == scene], problem.expected)
+            )
+            fresh = fresh.merge(stated, on=["quantity", "place"])
+            assert len(fresh) == len(problem.expected)
+            margin = 1e-4 * fresh["value_x"].abs()
+            assert (fresh["ours_x"] >= fresh["low_y"] - margin).all(), scene
+            assert (fresh["ours_x"] <= fresh["high_y"] + margin).all(), scene
 
 
 def test_the_folder_is_no_pack_until_it_is_exported(orchestrator: Command) -> None:

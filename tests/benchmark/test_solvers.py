@@ -1,336 +1,153 @@
-"""Solvers as real processes: a right one passes, each wrong one is caught and told by name."""
+"""Solvers as real processes: a right one passes, each fault is named, and the run goes on."""
 
 import json
+import os
 import re
-import shlex
-import shutil
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from orchestrator.benchmark import pack, runner
-from orchestrator.benchmark.report import Found
-from orchestrator.benchmark.runner import Choice
+from orchestrator import cli
+from orchestrator.benchmark import compare, pack
+from orchestrator.benchmark.compare import Choice, Limits, split
 from orchestrator.errors import InputError
-from orchestrator.runs.confined import Limits
-from tests.benchmark.conftest import NATIVE
-from tests.benchmark.programs import AFTER, TAIL, program, run
+from tests.benchmark.conftest import ROOT
+from tests.benchmark.programs import AFTER, RIGHT, SMALL, TAIL, TWO, program, run, verdicts_in
 from tests.conftest import Command
 
-FORMULA, SLOPED = "one of level 1", "one of level 1 on a slope"
-"""Scenes that differ from mistake to mistake: their names are digests."""
-
-
-def _run(root: Path, folder: Path, body: str, *scenes: str, limit_s: float = 60.0) -> Found:
-    return run(root, folder, body, Choice(patterns=scenes), Limits(seconds=limit_s))
-
-
-def _level_1(root: Path) -> tuple[list[str], list[str]]:
-    """Scenes of level 1: those on level ground, and those on a slope."""
-    scenes = pd.read_csv(root / "scenes.csv").query("level == 1").sort_values("scene")
-    sloped = scenes["alpha_deg"] > 0
-    return list(scenes.loc[~sloped, "scene"]), list(scenes.loc[sloped, "scene"])
-
-
-CONTACT = """
-init = solver.Contact.__init__
-def contact(self, scene, mass):
-    init(self, scene, mass)
-    {}
-solver.Contact.__init__ = contact
-"""
-OTHER_SCENE = """
-right = solver.closed_form
-solver.KINDS["closed-form"] = lambda scene, case: right({{**scene, {}}}, case)
-"""
-PASSING = """
-right = solver.passing
-solver.KINDS["passing"] = lambda scene, case: right({{**scene, {}}}, case)
-"""
-WRONG = {
-    "the radius": (
-        OTHER_SCENE.format("'d_m': scene['d_m'] / 2, 'weight_n': scene['weight_n'] / 8") + TAIL,
-        FORMULA,
-        "the radius is taken for the diameter",
+SCENE = Choice(patterns=("2-incline-5",))
+FAULTS = {
+    # limits
+    "sleeps": ("time.sleep(1000)", "it did not end within 3 s and was killed"),
+    "ignores the end": (
+        "import signal; signal.signal(15, signal.SIG_IGN); time.sleep(99)",
+        "it did not end within 3 s",
     ),
-    "an angle from the other side": (
-        OTHER_SCENE.format("'beta_deg': 90 - scene['beta_deg']") + TAIL,
-        SLOPED,
-        "the entrainment angle is counted from the other side",
-    ),
-    "a slope in radians": (
-        OTHER_SCENE.format("'alpha_deg': math.radians(scene['alpha_deg'])") + TAIL,
-        SLOPED,
-        "the slope is converted to radians twice",
-    ),
-    "a lift for the radius": (
-        OTHER_SCENE.format("'alpha_s': 4 * scene['alpha_s']") + TAIL,
-        FORMULA,
-        "the lift coefficient is that for the radius",
-    ),
-    "a Reynolds number of the radius": (
-        AFTER + "lines = [n.split(',') for n in text.splitlines()]\n"
-        "out.write_text(''.join(f'{q},{at},{float(v) / 2 if q == \"reynolds\" else v}\\n'"
-        " for q, at, v in lines))\nsys.exit(code)\n",
-        FORMULA,
-        "reynolds is .*: it is that of the radius",
-    ),
-    "a criterion of 0.5 d": (
-        PASSING.format("'displacement_criterion': 0.5") + TAIL,
-        "2-passing-2",
-        "passing_time_over_t .*: a grain counts as moved at 0.5 d, not at 0.3 d",
-    ),
-    "a criterion of 0.1 d": (
-        PASSING.format("'displacement_criterion': 0.1") + TAIL,
-        "2-passing-1.5",
-        "a grain counts as moved at 0.1 d, not at 0.3 d",
-    ),
-    "a hollow sphere that passes": (
-        "solver.INERTIA = 2 / 3" + TAIL,
-        "2-passing-3",
-        "the inertia of a hollow sphere",
-    ),
-    "no lift": (
-        "forces = solver.forces\n"
-        "solver.forces = lambda scene, u: (forces(scene, u)[0], 0.0)" + TAIL,
-        FORMULA,
-        "lift_n .* is 0, not .*: there is no lift",
-    ),
-    "lift left out of the threshold": (
-        "forces, threshold = solver.forces, solver.threshold\n"
-        "def alone(scene):\n"
-        "    solver.forces = lambda scene, u: (forces(scene, u)[0], 0.0)\n"
-        "    found = threshold(scene)\n"
-        "    solver.forces = forces\n"
-        "    return found\n"
-        "solver.threshold = alone" + TAIL,
-        FORMULA,
-        "shields .*: there is no lift",
-    ),
-    "the other force law": (
-        OTHER_SCENE.format("'force_law': {'low': 'high', 'high': 'low'}[scene['force_law']]")
-        + TAIL,
-        FORMULA,
-        r"the forces are those of Eq\. [24] \(.*\), not of Eq\. [24] \(",
-    ),
-    "down the slope": (
-        OTHER_SCENE.format("'alpha_deg': -scene['alpha_deg']") + TAIL,
-        SLOPED,
-        "the sign of the slope is turned",
-    ),
-    "a level bed": (
-        OTHER_SCENE.format("'alpha_deg': 0.0") + TAIL,
-        SLOPED,
-        "the slope is left out",
-    ),
-    "dry weight": (
-        OTHER_SCENE.format("'weight_n': scene['mass_kg'] * scene['g_m_s2']") + TAIL,
-        FORMULA,
-        "the weight is that of the dry grain, not of the submerged one",
-    ),
-    "another g": (
-        OTHER_SCENE.format("'g_m_s2': 9.8, 'weight_n': scene['weight_n'] * 9.8 / scene['g_m_s2']")
-        + TAIL,
-        FORMULA,
-        "g is 9.8, not 9.81 m/s2",
-    ),
-    "drag 5 % high": (
-        "forces = solver.forces\n"
-        "solver.forces = lambda scene, u: (1.05 * forces(scene, u)[0], forces(scene, u)[1])" + TAIL,
-        FORMULA,
-        "drag_n .* 3 more are off: [+]5 % at each of 4 places: one factor is wrong|"
-        "drag_n .* are off: [+]5 % at each of 4 places: one factor is wrong",
-    ),
-    "wrong units": (
-        "forces = solver.forces\n"
-        "solver.forces = lambda scene, u: tuple(1e3 * f for f in forces(scene, u))" + TAIL,
-        FORMULA,
-        r"10\^3 times too large: another unit",
-    ),
-    "friction left out": (
-        CONTACT.format("self.friction = 0.0") + TAIL,
-        "2-incline-20",
-        "there is no friction",
-    ),
-    "a disc": ("solver.INERTIA = 0.5" + TAIL, "2-incline-45", "the inertia of a disc"),
-    "a disc that slides": (
-        "solver.INERTIA = 0.5" + TAIL,
-        "2-sliding-2",
-        "speed_over_start|spin_over_start .* the inertia of a disc",
-    ),
-    "no damping": (CONTACT.format("self.gamma = 0.0") + TAIL, "2-collision-0.1", "no damping"),
+    "prints": ("while True: print('y' * 4096)", "it printed more than 1 MiB"),
+    "a large file": ("Path('f').write_bytes(bytes(10**7))", "File too large"),
+    "memory": ("b = bytes([1]) * 10**9", "it ended with 1: MemoryError"),
+    # ends
+    "exit 1": ("sys.exit('the mesh is inverted')", "it ended with 1: the mesh is inverted"),
+    "a core": ("os.abort()", "it ended with 134"),
+    "a right answer, but": (AFTER + "sys.exit(3)", "it ended with 3"),
+    # files in place of an answer
+    "nothing": ("sys.exit(0)", "it wrote no answer.csv"),
+    "its directory gone": ("import shutil; shutil.rmtree(out.parent)", "it wrote no answer.csv"),
+    "its directory renamed": ("out.parent.rename(out.parent.with_name('x'))", "no answer.csv"),
+    "a huge answer": ("out.open('wb').truncate(8 * 2**20)", "more than 4 MiB"),
+    "a link": ("out.symlink_to('/etc/passwd')", "is a link or no file"),
+    "a pipe": ("os.mkfifo(out)", "is a link or no file"),
+    "a directory": ("out.mkdir()", "is a link or no file"),
+    # answers that are not whole
+    "no text": ("out.write_bytes(b'\\xff\\xfe')", "answer.csv is no table"),
+    "zeros": ("out.write_bytes(b'quantity,at,value\\n' + bytes(99))", "line 2: 1 fields|no table"),
+    "no head": (AFTER + "out.write_text(text[18:])", "does not begin with quantity,at,value"),
+    "a line cut short": (AFTER + "out.write_text(text[:text.rindex(',')])", "line 2: 2 fields"),
+    "a file cut short": (AFTER + "out.write_text(text[:-3])", "its last line has no end"),
+    "a decimal comma": (AFTER + "out.write_text(text.replace('0.0', '0,0'))", "4 fields"),
+    "not a number": (AFTER + "out.write_text(text.replace('0.0', 'nan#'))", "no finite number"),
     "NaN": (
-        "solver.threshold = lambda scene: math.nan" + TAIL,
-        FORMULA,
-        "answer.csv, line 10: ustar_m_s is nan, not finite",
+        "out.write_text('quantity,at,value\\nacceleration_over_g,,nan\\n')",
+        "no finite number",
     ),
-    "a line cut short": (
-        AFTER + "out.write_text(text[: text.rindex(',')])",
-        FORMULA,
-        "cut short: line 12 has 2 of 3 fields",
-    ),
-    "a file cut short": (AFTER + "out.write_text(text[:-3])", FORMULA, "line 12 has no end"),
-    "half a file": (
-        AFTER + "out.write_text(text[: text.index('lift_n')])",
-        FORMULA,
-        "lacks lift_n at .* and 6 more",
-    ),
+    "infinite": ("out.write_text('quantity,at,value\\na,,-inf\\n')", "no finite number"),
+    "an underscore": (AFTER + "out.write_text(text.replace('0.0', '0.0_'))", "no finite number"),
+    "other digits": (AFTER + "out.write_text(text.replace('2', '\u0662'))", "no finite number"),
+    "twice": (AFTER + "out.write_text(text + text[18:])", "answers acceleration_over_g twice"),
     "another name": (
-        AFTER + "out.write_text(text.replace('ustar_m_s', 'ustar_cm_s'))",
-        FORMULA,
-        "lacks ustar_m_s; is ustar_cm_s meant[?]",
+        AFTER + "out.write_text(text.replace('_g', '_a'))",
+        "lacks acceleration_over_g",
     ),
-    "no head": (AFTER + "out.write_text(text[text.index('drag_n') :])", FORMULA, "begins with"),
-    "no answer": ("sys.exit(0)", FORMULA, "it wrote no answer.csv"),
-    "exit 1": ("sys.exit('the mesh is inverted')", FORMULA, "ended with 1: the mesh is inverted"),
-    "changes its case": (
-        "(case / 'scene.json').open('a').write(' ')" + TAIL,
-        FORMULA,
-        "changed the files of its case",
+    # wrong numbers
+    "30 % high": (
+        AFTER + "out.write_text('quantity,at,value\\nacceleration_over_g,,0.0809\\n')",
+        "acceleration_over_g is 0.0809, not 0.06225",
     ),
 }
+"""Bodies of solvers, and what is said of each."""
 
 
-@pytest.fixture(scope="module")
-def mistaken(formulas: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What is said of each wrong solver; one run has all, each at a scene of its own."""
-    folder = tmp_path_factory.mktemp("wrong")
-    level, sloped = map(iter, _level_1(formulas))
-    places = {FORMULA: level, SLOPED: sloped}
-    scenes = {name: next(places.get(at, iter([at]))) for name, (_, at, _) in WRONG.items()}
-    bodies = {scenes[name]: body for name, (body, *_) in WRONG.items()}
-    read = "solver.json.loads((case / 'scene.json').read_text())['scene']"
-    found = _run(formulas, folder, f"exec({bodies!r}[{read}])", *bodies)
-    verdicts = pd.read_csv(folder / "results" / "verdicts.csv").set_index("scene")
-    assert set(verdicts.index) == {*bodies}
-    assert not verdicts["passed"].any()
-    assert all(line.split(": ")[0] in found.page.read_text() for line in found.failures[:-1])
-    assert found.failures[-1].startswith("and ")
-    return {name: str(verdicts.loc[scene, "message"]) for name, scene in scenes.items()}
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_caught_and_named(
+    formulas: Path, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compare, "LOG_BYTES", 2**20)
+    monkeypatch.setattr(compare, "FILE_BYTES", 8 * 2**20)
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    body, words = FAULTS[name]
+    limits = Limits(3.0, SMALL.memory) if "3 s" in words else SMALL
+    outcome = run(formulas, tmp_path, body, SCENE, limits)
+    (line,) = outcome.failures
+    assert re.search(words, line), line
+    assert not verdicts_in(tmp_path)["passed"].any()
+    assert not list(folder.iterdir())  # its private directory is removed
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_solver_is_caught_and_named(mistaken: dict[str, str], name: str) -> None:
-    assert re.search(WRONG[name][-1], mistaken[name]), mistaken[name]
+def test_a_run_goes_on_after_a_fault_and_the_page_is_clean(formulas: Path, tmp_path: Path) -> None:
+    bodies = {
+        "2-incline-5": "print(chr(27) + '[2J'); sys.exit(1)",
+        "2-incline-45": "import shutil; shutil.rmtree(out.parent)",
+        "2-incline-75": "out.write_bytes(bytes(99))",
+    }
+    body = f"body = {bodies!r}.get(solver.json.loads((case / 'scene.json').read_text())['scene'])"
+    body += "\nif body:\n    exec(body)\nelse:\n    solver.main(case, out)\n"
+    outcome = run(formulas, tmp_path, body, Choice(patterns=("2-incline-*",)))
+    passed = verdicts_in(tmp_path)["passed"]
+    assert set(passed[~passed].index) == set(bodies)
+    assert "\x1b" not in "".join(outcome.failures) + outcome.page.read_text()
 
 
-def test_a_solver_that_hangs_is_caught_and_named(formulas: Path, tmp_path: Path) -> None:
-    (line,) = _run(formulas, tmp_path, "time.sleep(1000)", "2-incline-5", limit_s=2.0).failures
-    assert line == "2-incline-5: it did not end within 2 s and was killed"
-
-
-def test_one_mistake_in_many_scenes_is_one_line(formulas: Path, tmp_path: Path) -> None:
-    body = OTHER_SCENE.format("'g_m_s2': 10.0, 'weight_n': scene['weight_n'] * 10 / 9.81") + TAIL
-    found = _run(formulas, tmp_path, body, "1-[01]*")
-    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
-    (line,) = found.failures
-    first, others = verdicts["scene"].iloc[0], len(verdicts) - 1
-    assert others >= 2
-    assert line.startswith(f"{first} and {others} more of kind closed-form: ")
-    assert line.endswith("g is 10, not 9.81 m/s2")
-    assert verdicts["cause"].nunique() == 1
-    assert line.split(": ")[0] in found.page.read_text()
-
-
-def test_declined_scenes_are_one_line_and_have_no_time(formulas: Path, tmp_path: Path) -> None:
-    found = _run(formulas, tmp_path, "sys.exit(2)", "2-incline-*")
-    (line,) = found.failures
-    assert line == "2-incline-5 and 5 more of kind incline: it ended with 2"
-    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+def test_each_program_and_cause_is_listed_once(formulas: Path, tmp_path: Path) -> None:
+    outcome = run(formulas, tmp_path, "sys.exit(2)", Choice(patterns=("2-incline-*",)))
+    assert outcome.failures == ["2-incline-5 and 5 more of kind incline: it ended with 2"]
+    verdicts = verdicts_in(tmp_path)
     assert not verdicts["answered"].any()
-    assert (verdicts["ours_seconds"] > 0).all()
     assert verdicts[["ratio", "cpu_ratio"]].isna().all(axis=None)
+    assert (verdicts["ours_seconds"] > 0).all()
+    assert outcome.page.read_text().count("<td>liggghts</td>") == 1
 
 
-def test_each_program_is_listed_once(formulas: Path, tmp_path: Path) -> None:
+def test_a_solver_gets_its_scene_and_no_expected_answer(formulas: Path, tmp_path: Path) -> None:
+    body = (
+        "import json; print(json.dumps([sys.argv[1:], os.getcwd(),"
+        " sorted(p.name for p in case.iterdir()), sorted(p.name for p in Path('..').iterdir()),"
+        " [v for v in os.environ.values() if 'formulas' in v]]))" + TAIL
+    )
+    assert not run(formulas, tmp_path, body, SCENE).failures
+    log = (tmp_path / "results" / "2-incline-5" / "log.txt").read_text()
+    words, cwd, files, beside, variables = json.loads(log.splitlines()[0])
+    assert words == [f"{cwd}/case", f"{cwd}/answer.csv"]
+    assert files == ["ask.csv", "scene.json"]
+    assert beside == ["log.txt", "work"]
+    assert variables == []
+
+
+def test_times_and_memory_are_those_of_the_solver(formulas: Path, tmp_path: Path) -> None:
+    body = "b = bytes([1]) * 10**8\nstart = time.process_time()\n"
+    body += "while time.process_time() < start + 0.5: pass" + TAIL
+    run(formulas, tmp_path, body, SCENE)
+    used = verdicts_in(tmp_path).loc["2-incline-5"]
+    assert 100 < used["peak_mib"] < 160
+    assert used["seconds"] > 0.5
+    assert used["cpu_s"] > 0.5
+    assert used["ratio"] == pytest.approx(used["seconds"] / used["ours_seconds"], rel=1e-4)
+
+
+def test_a_changed_pack_is_not_used_further(formulas: Path, tmp_path: Path) -> None:
     root = tmp_path / "pack"
-    shutil.copytree(formulas, root)
-    manifest = json.loads((root / "manifest.json").read_text())
-    manifest["programs"] = {"gmsh": "4.0.0", "liggghts": "3.8.0"}
-    (root / "manifest.json").write_text(json.dumps(manifest))
-    found = _run(root, tmp_path, TAIL, "2-collision-0.1")
-    assert found.page.read_text().count("<td>gmsh</td>") == 1
-    assert "<td>4.0.0</td>" in found.page.read_text()
-
-
-def test_a_lost_grain_is_caught(all_levels: Path, tmp_path: Path) -> None:
-    body = "pile = solver.pile\n" + (
-        "solver.KINDS['pile'] = lambda scene, case: (lambda ask: lambda quantity, at:"
-        " ask(quantity, at) - (quantity == 'not_moved'))(pile(scene, case))" + TAIL
-    )
-    found = _run(all_levels, tmp_path, body, "4-*")
-    assert len(found.failures) == 1
-    assert "grains are lost" in found.failures[0]
-
-
-REPLAY = """
-class Replay:
-    def __init__(self, change):
-        self.numbers = change({expected!r})
-    def __call__(self, scene, case):
-        return lambda quantity, at: self.numbers[quantity, at]
-def never_carried(numbers):
-    none = {{key: 0.0 for key in numbers if key[0] in ("moved", "carried_off")}}
-    (rest,) = (key for key in numbers if key[0] == "not_moved")
-    return numbers | none | {{rest: {count}}}
-def forgets(numbers):
-    moved = [key for key in numbers if key[0] == "moved"]
-    return numbers | {{moved[-2]: numbers[moved[-1]] + 1}}
-def all_gone(numbers):
-    (carried,) = (key for key in numbers if key[0] == "carried_off")
-    return numbers | {{carried: {count} + 1}}
-"""
-"""A solver that knows the answers to a pile, and may count by another rule."""
-COUNTED = {
-    "dict": "",
-    "never_carried": "grains that were carried off are not counted as moved",
-    "forgets": r"moved falls from \d+ to \d+ at load step \d+: a grain that has moved has moved",
-    "all_gone": r"\d+ grains are carried off at load step \d+, of \d+ that moved",
-}
-
-
-@pytest.mark.parametrize("rule", COUNTED)
-def test_another_counting_rule_is_named(lift_off: Path, tmp_path: Path, rule: str) -> None:
-    rows = pack.read(lift_off).expected
-    expected = rows.set_index(["quantity", "at"])["value"].to_dict()
-    count = sum(rows.groupby("quantity")["value"].last()[["moved", "not_moved"]])
-    replay = REPLAY.format(expected=expected, count=count)
-    body = f"{replay}\nsolver.KINDS['pile'] = Replay({rule})" + TAIL
-    found = _run(lift_off, tmp_path, body, "4-*")
-    assert bool(found.failures) == bool(COUNTED[rule])
-    assert re.search(COUNTED[rule], "\n".join(found.failures))
-
-
-def test_ours_answers_a_poured_bed_as_exported(poured: Path, tmp_path: Path) -> None:
-    _run(poured, tmp_path, "sys.exit(2)", "4-*")
-    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
-    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
-
-
-def test_ours_answers_as_exported(all_levels: Path, tmp_path: Path) -> None:
-    # a solver that knows no kind: only our own runs answer
-    _run(all_levels, tmp_path, "sys.exit(2)", "[345]-*")
-    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
-    assert set(numbers["scene"].str[0]) == {"3", "4", "5"}
-    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
-
-
-def test_compare_gives_the_same_verdicts(formulas: Path, orchestrator: Command) -> None:
-    command = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
-    arguments = (str(formulas), "--scene", "2-incline-[27]0", "--solver", command, "--out", "r")
-    ran = orchestrator("benchmark", "run", *arguments)
-    assert ran.returncode == 0, ran.stderr
-    compared = orchestrator(
-        "benchmark", "compare", str(formulas), "r", "--scene", "2-incline-[27]0"
-    )
-    assert compared.returncode == 0
-    # the last line is the page's path
-    assert compared.stdout.splitlines()[:-1] == ran.stdout.splitlines()[:-1]
-    more = orchestrator("benchmark", "compare", str(formulas), "r", "--scene", "2-incline-*")
-    assert more.returncode == 1
-    assert "2-incline-5 and 3 more of kind incline: it wrote no answer.csv" in more.stderr
+    subprocess.run(["cp", "-r", formulas, root], check=True)
+    body = f"Path({str(root / 'expected.csv')!r}).open('a').write('x')" + TAIL
+    with pytest.raises(InputError, match=r"expected\.csv is not what was exported"):
+        run(root, tmp_path, body)
+    with pytest.raises(InputError, match=r"expected\.csv is not what was exported"):
+        compare.compare(root, [tmp_path / "results"], None, Choice())
 
 
 @pytest.mark.parametrize(
@@ -339,24 +156,125 @@ def test_compare_gives_the_same_verdicts(formulas: Path, orchestrator: Command) 
         ("true {case}", "no {out}"),
         ("no-such-solver {case} {out}", "no program no-such-solver"),
         ("'open {case} {out}", "cannot be read"),
+        ("true {case} {out} >log.txt", "no shell reads the command: >log.txt"),
+        ("true {case} {out} | tee log", "no shell"),
+        ("true {case} {out} && true", "sh -c"),
+        ("true {case} {out}; true", "no shell"),
     ],
 )
-def test_a_command_that_cannot_work(
-    formulas: Path, tmp_path: Path, command: str, words: str
-) -> None:
-    with pytest.raises(InputError, match=words):
-        runner.run(formulas, command, tmp_path / "results", Choice(), Limits(seconds=60.0))
+def test_a_command_that_cannot_work(command: str, words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        split(command)
 
 
 def test_no_shell_reads_the_command(formulas: Path, tmp_path: Path) -> None:
-    command = program(tmp_path, TAIL)
-    with pytest.raises(InputError, match="no shell reads the command"):
-        runner.run(formulas, command + "; touch shell", tmp_path / "results", Choice(), Limits())
-    runner.run(
-        formulas,
-        command + " $HOME `touch shell` $(touch shell)",
-        tmp_path / "results",
-        Choice(patterns=("2-incline-5",)),
-        Limits(seconds=60.0),
-    )
+    command = program(tmp_path, TAIL) + " $HOME `touch shell` $(touch shell)"
+    compare.run(formulas, command, tmp_path / "results", SCENE, SMALL)
     assert not list(tmp_path.rglob("shell"))
+
+
+@pytest.mark.parametrize("words", [["--limit", "nan"], ["--memory", "0"], ["--level", "6"]])
+def test_options_that_are_refused(
+    formulas: Path, capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["benchmark", "run", str(formulas), "--solver", RIGHT, *words])
+    assert ended.value.code == 2
+    assert words[0] in capsys.readouterr().err
+
+
+def test_levels_and_patterns_in_one_list(
+    formulas: Path, tmp_path: Path, orchestrator: Command
+) -> None:
+    command = ("benchmark", "run", str(formulas), "--solver", RIGHT, "--out", "results")
+    scenes = pd.read_csv(formulas / "scenes.csv")["scene"]
+    first = scenes[scenes.str.startswith("1-")].iloc[0]
+    ended = orchestrator(*command, "--level", "1", "2", "--scene", first, "2-incline-[27]0")
+    assert ended.returncode == 0, ended.stderr
+    table = pd.read_csv(tmp_path / "results" / "verdicts.csv")
+    assert set(table["scene"]) == {first, "2-incline-20", "2-incline-70"}
+    again = orchestrator(
+        *("benchmark", "compare", str(formulas), "results", "--level", "2"),
+        *("--scene", "2-incline-[27]0", "2-incline-5"),
+    )
+    assert again.returncode == 1
+    assert "2-incline-5: it wrote no answer.csv" in again.stderr
+    ended = orchestrator("benchmark", "export", "pack", "--level", "1", "2")
+    assert ended.returncode == 0, ended.stderr
+    assert {name[0] for name in pack.read(tmp_path / "pack").scenes} == {"1", "2"}
+
+
+def _running(text: str) -> bool:
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if text in (folder / "cmdline").read_text(errors="replace"):
+                return True
+        except OSError:
+            continue
+    return False
+
+
+def test_a_killed_run_leaves_nothing_at_work(formulas: Path, tmp_path: Path) -> None:
+
+    command = program(tmp_path, "time.sleep(100)")
+    words = [sys.executable, "-m", "orchestrator", "benchmark", "run", str(formulas)]
+    driver = subprocess.Popen(
+        [*words, "--solver", command, "--scene", "2-incline-5"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.DEVNULL,
+    )
+    path, end = f"{tmp_path / 'my solver.py'}\0/", time.monotonic() + 120
+    while not _running(path) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert _running(path)
+    driver.send_signal(signal.SIGKILL)
+    driver.wait()
+    while _running(path) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not _running(path)
+
+
+def test_what_a_solver_leaves_at_work_ends_with_it(formulas: Path, tmp_path: Path) -> None:
+    body = (
+        "import subprocess; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)',"
+    )
+    body += f" {str(tmp_path / 'left')!r}])" + TAIL
+    assert not run(formulas, tmp_path, body, TWO).failures
+    end = time.monotonic() + 60
+    while _running(str(tmp_path / "left")) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not _running(str(tmp_path / "left"))
+
+
+def test_a_lost_grain_is_caught(all_levels: Path, tmp_path: Path) -> None:
+    body = AFTER + (
+        "lines = [line.split(',') for line in text.splitlines()]\n"
+        "out.write_text(''.join(f\"{q},{at},{float(v) - 1 if q == 'not_moved' else v}\\n\""
+        " for q, at, v in lines))\n"
+    )
+    (line,) = run(all_levels, tmp_path, body, Choice(patterns=("4-*",))).failures
+    assert "the counts do not make N" in line
+
+
+@pytest.mark.parametrize("count", ["0.5", "-1"])
+def test_counts_are_whole(all_levels: Path, tmp_path: Path, count: str) -> None:
+    body = AFTER + (
+        "head, first, *lines = text.splitlines()\n"
+        f"first = first.rpartition(',')[0] + ',{count}'\n"
+        "out.write_text('\\n'.join([head, first, *lines, '']))\n"
+    )
+    (line,) = run(all_levels, tmp_path, body, Choice(patterns=("4-*",))).failures
+    assert f"moved at 1 is {count}: it counts grains" in line
+
+
+@pytest.mark.parametrize("packed", ["all_levels", "poured"])
+def test_ours_answers_as_exported(
+    packed: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    """A solver that knows no kind: only our own runs answer."""
+    root = request.getfixturevalue(packed)
+    run(root, tmp_path, "sys.exit(2)", Choice(levels=(3, 4, 5)))
+    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
+    assert set(numbers["scene"].str[0]) == set("345" if packed == "all_levels" else "4")
+    pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)

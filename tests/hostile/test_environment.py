@@ -85,7 +85,7 @@ def test_no_matplotlibrc_of_the_working_directory_does(
 SEALED = """
 import sys
 from pathlib import Path
-import orchestrator.benchmark.runner, orchestrator.pipeline
+import orchestrator.benchmark.compare, orchestrator.pipeline
 import orchestrator.experiments.ladder.run, orchestrator.experiments.stability.run
 assert "matplotlib" not in sys.modules
 from orchestrator.report import settings
