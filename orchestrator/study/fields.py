@@ -1,6 +1,6 @@
-"""The fields of a scene, listed from where they are declared, with what follows from them."""
+"""The registry of the fields of a scene: what follows from where each is declared."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -8,8 +8,8 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.part import Info, Scope
-from orchestrator.study.parts import Flow, Fluid, Forces, Grain, Part, PileBed, Protocol
+from orchestrator.study.part import Info, Part, Scope
+from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal
@@ -30,18 +30,18 @@ ANSWERED = "answered_"
 
 @dataclass(frozen=True)
 class Quantity:
-    """A field of a study file, or what follows from some.
+    """A field of a study file, or a quantity that follows from fields.
 
     Attributes
     ----------
     name : str
-        As a study file writes it, such as ``bed.slope_deg``; empty for what follows from fields.
+        As a study file writes it, such as ``bed.slope_deg``; empty for one that follows.
     column : str
-        What tables call it.
+        Its column in tables.
     info : Info
         Its words.
     meaning : str
-        A phrase that says what it is.
+        A phrase.
     read : callable
         Its value in a scene, None where that leaves it open.
     """
@@ -64,82 +64,61 @@ class Quantity:
 
     @property
     def phrase(self) -> str:
-        """Its meaning with its unit, its scope and what its words stand for."""
+        """Its meaning with its unit, its scope and the meaning of its words."""
         unit = f", {self.info.unit}" if self.info.unit else ""
         scope = "" if self.info.scope == "every scene" else f" ({self.info.scope})"
-        words = "; ".join(f"{word}: {said}" for word, said in self.info.choices.items())
+        words = "; ".join(f"{word}: {meaning}" for word, meaning in self.info.choices.items())
         return f"{self.meaning}{unit}{scope}" + (f"; {words}" if words else "")
 
 
 def plain(value: Any) -> Any:
-    """A value as a cell of a table: what is not a word or a number becomes a text."""
+    """A value as a cell of a table: words and numbers stay, all else becomes a text."""
     if isinstance(value, tuple):
-        return "; ".join(map(_text, value)) or None
+        classes = (
+            # a class of a sieve table: diameter and part of the mass
+            f"{1e3 * entry[0]:g} mm {100 * entry[1]:g} %" if isinstance(entry, tuple) else entry
+            for entry in value
+        )
+        return "; ".join(map(str, classes)) or None
     return str(value) if isinstance(value, Profile | LogNormal) else value
 
 
-def _text(one: Any) -> str:
-    """An entry of a list; of a sieve table a class, its diameter and part of the mass."""
-    if isinstance(one, tuple):
-        diameter, fraction = one
-        return f"{1e3 * diameter:g} mm {100 * fraction:g} %"
-    return str(one)
-
-
-def _is_solved(scene: Scene) -> bool:
-    return isinstance(scene.bed, PileBed) and scene.flow.model == "solve"
-
-
-def _is_disordered(scene: Scene) -> bool:
-    return isinstance(scene.bed, PileBed) and scene.bed.packing == "disordered"
+def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], bool]:
+    return lambda scene: isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
 
 
 APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
-    "piles": lambda scene: isinstance(scene.bed, PileBed),
-    "dunes": lambda scene: isinstance(scene.bed, PileBed) and "windward" in scene.bed.form.fields,
-    "beds with level parts": lambda scene: (
-        isinstance(scene.bed, PileBed) and "length" in scene.bed.form.fields
-    ),
-    "profiles": lambda scene: isinstance(scene.bed, PileBed) and bool(scene.bed.profile),
-    "disordered piles": _is_disordered,
+    "piles": _of_piles(lambda scene, bed: True),
+    "dunes": _of_piles(lambda scene, bed: "windward" in bed.form.fields),
+    "beds with level parts": _of_piles(lambda scene, bed: "length" in bed.form.fields),
+    "profiles": _of_piles(lambda scene, bed: bed.profile),
+    "disordered piles": _of_piles(lambda scene, bed: bed.packing == "disordered"),
     "poured beds": lambda scene: scene.is_poured,
-    "random beds and replicas": lambda scene: (
-        isinstance(scene.bed, PileBed)
-        and (_is_disordered(scene) or scene.is_poured or scene.bed.is_replica)
+    "random beds and replicas": _of_piles(
+        lambda scene, bed: bed.packing in ("disordered", "poured") or bed.is_replica
     ),
-    "solved flows": _is_solved,
+    "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
     "DEM": lambda scene: scene.protocol.method == "dem",
-    "DEM of piles": lambda scene: isinstance(scene.bed, PileBed) and scene.protocol.method == "dem",
+    "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method == "dem"),
     "DEM and peeling": lambda scene: scene.protocol.method != "pivot",
-    "DEM and peeling of piles": lambda scene: (
-        isinstance(scene.bed, PileBed) and scene.protocol.method != "pivot"
-    ),
+    "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method != "pivot"),
 }
 
 
-def info(declared: FieldInfo) -> Info:
-    """The words that a field is declared with."""
-    return next(one for one in declared.metadata if isinstance(one, Info))
+def _quantity(part: str, name: str, field: FieldInfo) -> Quantity:
+    words = next(each for each in field.metadata if isinstance(each, Info))
+    meaning = " ".join((field.description or "").split())
+    read = attrgetter(f"{part}.{name}")
+    return Quantity(f"{part}.{name}", words.column or name, words, meaning, read)
 
 
-def declared(one: Quantity) -> FieldInfo:
-    """The declaration of a field: its range and its default."""
-    part, _, name = one.name.partition(".")
-    return PARTS[part].model_fields[name]
-
-
-def _fields() -> Iterator[Quantity]:
-    for part, model in PARTS.items():
-        for name, declared in model.model_fields.items():
-            words = info(declared)
-            meaning = " ".join((declared.description or "").split())
-            read = attrgetter(f"{part}.{name}")
-            yield Quantity(f"{part}.{name}", words.column or name, words, meaning, read)
-
-
-FIELDS: tuple[Quantity, ...] = tuple(_fields())
+FIELDS: tuple[Quantity, ...] = tuple(
+    _quantity(part, name, field)
+    for part, model in PARTS.items()
+    for name, field in model.model_fields.items()
+)
 """Every field of a study file, in the order of the file."""
 DERIVED: tuple[Quantity, ...] = (
     Quantity(
@@ -159,34 +138,40 @@ DERIVED: tuple[Quantity, ...] = (
     ),
 )
 COLUMNS: Mapping[str, Quantity] = {
-    one.column: one for one in (*FIELDS, *DERIVED) if one.column != NO_COLUMN
+    each.column: each for each in (*FIELDS, *DERIVED) if each.column != NO_COLUMN
 }
 """By the columns of a table: what a scene asks for."""
 ANSWERS: Mapping[str, Quantity] = {
-    f"{ANSWERED}{column}": one for column, one in COLUMNS.items() if one.info.about == "answer"
+    f"{ANSWERED}{column}": each for column, each in COLUMNS.items() if each.info.about == "answer"
 }
 """By the columns of a table: how a scene was answered."""
-FOLLOW = ("z0_m", "regime", *(column for column, one in ANSWERS.items() if one.info.read))
-"""Columns that follow from others: of the two roughness lengths, the one over the diameter tells
+FOLLOW = ("z0_m", "regime", *(column for column, each in ANSWERS.items() if each.info.read))
+"""Columns that follow from others: of the two roughness lengths, the ratio to the diameter tells
 beds apart that are alike but for the size of their grains."""
+
+
+def declared(quantity: Quantity) -> FieldInfo:
+    """The declaration of a field: its range and its default."""
+    part, _, name = quantity.name.partition(".")
+    return PARTS[part].model_fields[name]
 
 
 def asked(scene: Scene) -> dict[str, Any]:
     """Values that a scene asks for, by column."""
-    return {column: one.asked(scene) for column, one in COLUMNS.items()}
+    return {column: each.asked(scene) for column, each in COLUMNS.items()}
 
 
 def answered(scene: Scene) -> dict[str, Any]:
     """How the scene that was run answers, by column."""
-    return {column: one.used(scene) for column, one in ANSWERS.items()}
+    return {column: each.used(scene) for column, each in ANSWERS.items()}
 
 
 def used(scene: Scene) -> dict[str, Any]:
-    """All that a scene is, by column; what it leaves open is worked out."""
-    return {column: one.used(scene) for column, one in COLUMNS.items()}
+    """All quantities of a scene, by column; what it leaves open is worked out."""
+    return {column: each.used(scene) for column, each in COLUMNS.items()}
 
 
 def others(columns: Iterable[Hashable], *but: str) -> list[str]:
-    """The columns in which rows agree that are equal in all else than some."""
-    there = set(columns) - {*but, *FOLLOW}
-    return [column for column in (*COLUMNS, *ANSWERS) if column in there]
+    """The columns of fields among some, but for a few and for those that follow from others."""
+    rest = set(columns) - {*but, *FOLLOW}
+    return [column for column in (*COLUMNS, *ANSWERS) if column in rest]

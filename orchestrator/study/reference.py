@@ -4,10 +4,11 @@
 """
 
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import get_args
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
 from orchestrator.study import fields
 from orchestrator.study.fields import Quantity
@@ -47,8 +48,8 @@ tables is empty. A field *about* the answer says how a scene is answered, not wh
 tolerance it may be changed. The column `answered_…` of the table of scenes has the value that was
 run, also of what a study file leaves open.
 """
-BEDS = "One grain on two others, or a pile of grains."
-RANGES = ((Gt, "gt", "> {:g}"), (Ge, "ge", "≥ {:g}"), (Lt, "lt", "< {:g}"), (Le, "le", "≤ {:g}"))
+SIGNS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
+COLUMNS = "| field | symbol | unit | range | default | meaning | scope | about | column |"
 
 
 def text() -> str:
@@ -57,64 +58,51 @@ def text() -> str:
 
 
 def _part(part: str) -> Iterator[str]:
-    about = BEDS if part == "bed" else (fields.PARTS[part].__doc__ or "").partition("\n")[0]
-    yield f"## `[{part}]`\n\n{about}\n"
-    yield "| field | symbol | unit | range | default | meaning | scope | about | column |"
-    yield "|---|---|---|---|---|---|---|---|---|"
+    about = (fields.PARTS[part].__doc__ or "").partition("\n")[0]
+    if part == "bed":
+        about = "One grain on two others, or a pile of grains."
+    yield f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 9}|"
     for one in fields.FIELDS:
         if one.name.startswith(f"{part}."):
             yield f"| {' | '.join(_row(one))} |".replace("*", r"\*")
     yield ""
 
 
-def _row(one: Quantity) -> Iterator[str]:
-    declared = fields.declared(one)
-    info = one.info
-    yield f"`{one.name.partition('.')[2]}`"
-    yield info.symbol
-    yield info.unit
-    yield _range(declared)
-    yield _default(one.name, declared)
-    yield "<br>".join([one.meaning, *_words(one)])
-    yield "" if info.scope == "every scene" else info.scope
-    yield "" if info.about == "question" else info.about
-    yield f"`{one.column}`" if one.column in fields.COLUMNS else ""
-
-
-def _words(one: Quantity) -> Iterator[str]:
-    """The words that a field may be, with what they stand for."""
-    listed = one.info.choices or get_args(fields.declared(one).annotation)
-    for word in (word for word in listed if isinstance(word, str)):
-        said = one.info.choices.get(word, word)
-        yield f'`"{word}"`' + (f": {said}" if said.lower() != word else "")
-
-
-def _range(declared: FieldInfo) -> str:
-    bounds = [
-        written.format(getattr(rule, name))
-        for rule in _rules(declared)
-        for kind, name, written in RANGES
-        if isinstance(rule, kind)
+def _row(one: Quantity) -> list[str]:
+    field, info = fields.declared(one), one.info
+    words = info.choices or {w: w for w in get_args(field.annotation) if isinstance(w, str)}
+    listed = [f'`"{w}"`' + (f": {m}" if m.lower() != w else "") for w, m in words.items()]
+    name = one.name.partition(".")[2]
+    value = BED.get(name, field.default) if one.name.startswith("bed.") else field.default
+    default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace("'", '"')
+    if value is PydanticUndefined:
+        default = "none: required"
+    elif value is None:
+        default = "worked out"
+    return [
+        f"`{name}`",
+        info.symbol,
+        info.unit,
+        ", ".join(bounds(field)),
+        default,
+        "<br>".join([one.meaning, *listed]),
+        "" if info.scope == "every scene" else info.scope,
+        "" if info.about == "question" else info.about,
+        f"`{one.column}`" if one.column in fields.COLUMNS else "",
     ]
-    return ", ".join(bounds)
 
 
-def _rules(declared: FieldInfo) -> Iterator[Any]:
-    """Conditions on the values; for an optional field or a list, those on each of them."""
-    yield from declared.metadata
-    for inner in get_args(declared.annotation):
-        for found in getattr(inner, "__metadata__", ()):
-            yield from getattr(found, "metadata", [found])
-
-
-def _default(name: str, declared: FieldInfo) -> str:
-    part, _, field = name.partition(".")
-    value = BED[field] if part == "bed" and field in BED else declared.default
-    if declared.is_required() and value is declared.default:
-        return "none: required"
-    if value is None:
-        return "worked out"
-    return f"`{list(value) if isinstance(value, tuple) else value!r}`".replace("'", '"')
+def bounds(field: FieldInfo) -> list[str]:
+    """The range of a field's values; of an optional field or a list, the range of each of them."""
+    rules = list(field.metadata)
+    for inner in get_args(field.annotation):
+        for rule in getattr(inner, "__metadata__", ()):
+            rules += getattr(rule, "metadata", [rule])
+    return [
+        f"{SIGNS[type(rule)][1]} {getattr(rule, SIGNS[type(rule)][0]):g}"
+        for rule in rules
+        if type(rule) in SIGNS
+    ]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The registry: every field has its words, and tells scenes apart."""
+"""The registry: every field has its words and its range, tells scenes apart, is documented."""
 
 from pathlib import Path
 from typing import Any, get_args
@@ -6,6 +6,7 @@ from typing import Any, get_args
 import pytest
 
 from orchestrator import plan
+from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import LEVELS, Level, changed
 from orchestrator.study import fields, reference, study
 from orchestrator.study.fields import Quantity
@@ -14,18 +15,17 @@ from orchestrator.study.sizes import LogNormal
 from orchestrator.tables import COLUMNS, scenes
 
 PILE = """
-[grain]
-diameter = 1e-3
-[bed]
-kind = "pile"
-slope_deg = 15.0
-packing = "disordered"
-[flow]
-[forces]
-law = "high"
+grain = { diameter = 1e-3 }
+bed = { kind = "pile", slope_deg = 15.0, packing = "disordered" }
+forces = { law = "high" }
 """
 UNCHANGEABLE = ("bed.kind", "protocol.fractions", "bed.profile", "bed.smoothing", "bed.obstacles")
 CHANGEABLE = [one for one in fields.FIELDS if one.name not in UNCHANGEABLE]
+NUMERIC = [
+    one
+    for one in fields.FIELDS
+    if {float, int}.intersection((kind := fields.declared(one).annotation, *get_args(kind)))
+]
 NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},
     "bed.brink_radius": {"bed.shape": "dune"},
@@ -37,7 +37,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
 }
-"""What a scene must have for a field to say something."""
+"""Other fields that a scene must have for a field to have an effect."""
 
 
 @pytest.fixture(scope="module")
@@ -57,19 +57,41 @@ def other_value(one: Quantity, scene: Scene) -> Any:
 
 
 @pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)
-def test_each_field_has_its_words(one: Quantity) -> None:
+def test_each_field_has_its_words_and_its_row_in_the_reference(one: Quantity) -> None:
     assert one.info.label
     assert one.meaning
     assert not one.meaning.endswith(".")
     words = [word for word in get_args(fields.declared(one).annotation) if isinstance(word, str)]
     if one.name != "bed.kind" and words and one.info.choices:
         assert list(one.info.choices) == words
+    part, _, name = one.name.partition(".")
+    section = reference.text().split(f"## `[{part}]`")[1].split("\n## ")[0]
+    (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
+    assert one.meaning.replace("*", r"\*") in row
+    assert row.count(" | ") == 8
 
 
 def test_columns_are_distinct_and_explained() -> None:
     columns = [one.column for one in (*fields.FIELDS, *fields.DERIVED)]
     assert len(set(columns)) == len(columns)
     assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
+
+
+@pytest.mark.parametrize("one", NUMERIC, ids=lambda one: one.name)
+def test_every_number_has_two_ends(one: Quantity) -> None:
+    low, high = reference.bounds(fields.declared(one))
+    assert (low[0], high[0]) in {(">", "<"), (">", "≤"), ("≥", "<"), ("≥", "≤")}
+    part, _, name = one.name.partition(".")
+    tables = {"grain": {"diameter": "1e-3"}, "bed": {"kind": "'pile'", "slope_deg": "20.0"}}
+    integer = fields.declared(one).annotation is int
+    for value in ("-1", str(10**18)) if integer else ("-1e-320", "1e30", "1e308", "-1e308"):
+        parts = {**tables, part: {**tables.get(part, {}), name: value}}
+        text = "\n".join(
+            f"{table} = {{ {', '.join(f'{key} = {entry}' for key, entry in entries.items())} }}"
+            for table, entries in parts.items()
+        )
+        with pytest.raises(InputError, match=rf"test: {one.name}: .* is not accepted"):
+            study.parse(text, name="test", where="test")
 
 
 @pytest.mark.parametrize("one", CHANGEABLE, ids=lambda one: one.name)
@@ -104,63 +126,32 @@ def test_a_level_changes_fields_of_the_answer_alone(one: Level, scene: Scene) ->
     assert {about[name] for name in one.fields(scene)} == {"answer"}
 
 
-def test_what_has_no_effect_is_empty(scene: Scene) -> None:
-    flat = changed(scene, {"flow.model": "flat", "protocol.method": "pivot"})
-    row = fields.asked(flat)
-    empty = (
-        "turbulence_model",
-        "cells_per_face",
-        "solve_u_e_m_s",
-        "stiffness",
-        "waiting_time",
-        "displacement_criterion",
-    )
-    assert [row[column] for column in empty] == [None] * len(empty)
+def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(scene: Scene) -> None:
+    row = fields.asked(changed(scene, {"flow.model": "flat", "protocol.method": "pivot"}))
+    for column in ("turbulence_model", "cells_per_face", "stiffness", "waiting_time"):
+        assert row[column] is None
     assert (row["h_m"], row["flow_model"]) == (0.02, "flat")
+    assert fields.asked(scene)["first_cell_m"] is None
+    assert fields.answered(scene)["answered_first_cell_m"] == scene.first_cell_height
+    assert fields.plain(((5e-4, 0.15), (1e-3, 0.85))) == "0.5 mm 15 %; 1 mm 85 %"
 
 
-def test_a_row_says_what_was_asked_and_what_answered_it() -> None:
+def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> None:
     asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
-    (row,) = scenes.rows(asked, planned)
-    (one,) = asked.scenes
+    (row,), (one,) = scenes.rows(asked, planned), asked.scenes
     assert row["scene_id"] == one.id
     assert fields.asked(one).items() <= row.items()
     assert fields.answered(planned.decisions[one.id].scene).items() <= row.items()
     assert row["method"] == "dem"
     assert row["answered_method"] != "dem"
-    assert row["load_increment"] == 0.02
-    assert row["answered_load_increment"] is None
 
 
-def test_what_is_left_open_is_worked_out_in_the_answer(scene: Scene) -> None:
-    assert fields.asked(scene)["first_cell_m"] is None
-    assert fields.answered(scene)["answered_first_cell_m"] == scene.first_cell_height
-    assert fields.used(scene)["solve_z0_m"] == scene.bed.roughness
-
-
-DOCS = Path(__file__).parents[2] / "docs"
-
-
-def test_reference_of_study_files_is_written_from_the_registry() -> None:
-    assert (DOCS / "study-file.md").read_text(encoding="utf-8") == reference.text()
-
-
-@pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)
-def test_reference_has_every_field(one: Quantity) -> None:
-    part, _, name = one.name.partition(".")
-    section = reference.text().split(f"## `[{part}]`")[1].split("\n## ")[0]
-    (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
-    assert one.meaning.replace("*", r"\*") in row
-    assert row.count(" | ") == 8
-
-
-def test_reference_says_ranges_and_defaults() -> None:
+def test_the_reference_of_study_files_is_written_from_the_registry() -> None:
+    page = Path(__file__).parents[2] / "docs" / "study-file.md"
+    assert page.read_text(encoding="utf-8") == reference.text()
     rows = {line.split(" | ")[0]: line for line in reference.text().splitlines()}
     assert "| ≥ 0, < 90 | `0.0` |" in rows["| `slope_deg`"]
     assert "| ≥ 1e-12, ≤ 10000 | worked out |" in rows["| `first_cell_height`"]
     assert "| ≥ 1e-07, ≤ 10 | none: required |" in rows["| `diameter`"]
     assert "| ≥ 1e-06, ≤ 1 | `[0.1, 0.3, 0.5, 0.7]` |" in rows["| `fractions`"]
-    assert '| `"d/30"` | roughness length of the bed' in reference.text()
-    assert '<br>`"RNGkEpsilon"`: RNG k-ε<br>' in rows["| `turbulence_model`"]
-    assert '<br>`"upwind"`<br>' in rows["| `convection_scheme`"]
