@@ -193,7 +193,7 @@ def _point(decision: Decision, pile: Pile, runs: Runs) -> Row:
         "scene_id": scene.id,
         "scene": experiment.label(scene),
         **point(scene),
-        "packing": packing(scene.bed) + (", level bed" if scene.bed.is_level else ""),
+        "packing": packing(scene) + (", level bed" if scene.bed.is_level else ""),
         "asked": scene.protocol.method,
         **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
         "count": motion.count,

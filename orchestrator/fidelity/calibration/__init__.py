@@ -108,7 +108,7 @@ def scene_class(part: str, scene: Scene) -> str:
     assert isinstance(bed, PileBed)
     if part == "flow" and bed.is_level:
         return LEVEL_BED
-    name = packing(bed)
+    name = packing(scene)
     if part == "flow":
         name = scene.forces.stress + ("" if scene.flow.top == "boundary layer" else ", channel")
     elif name == "disordered":
