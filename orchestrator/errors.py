@@ -153,13 +153,10 @@ def unknown_key(
     `elsewhere` has keys of other places, each with the way it is written there. A key of the same
     name is suggested first, then the nearest of `known`, then the nearest of the others.
     """
-    close = [written for name, written in elsewhere if name == key]
-    close = close or difflib.get_close_matches(key, known, n=1)
-    near = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
-    close = close or [written for name, written in elsewhere if name in near]
-    hint = (
-        f"did you mean {' or '.join(close)}?"
-        if close
-        else f"known keys: {', '.join(sorted(known))}"
-    )
+    same = [written for name, written in elsewhere if name == key]
+    there = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
+    near = [written for name, written in elsewhere if name in there]
+    close = same or difflib.get_close_matches(key, known, n=1) or near
+    meant, listed = f"did you mean {' or '.join(close)}?", f"known keys: {', '.join(sorted(known))}"
+    hint = meant if close else listed
     return InputError("unknown key", where=where, remedy=hint)

@@ -2,8 +2,8 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, wraps
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -23,8 +23,6 @@ from orchestrator.study.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Numbers = ArrayLike
-"""A number or an array of them."""
 GUESTS = (paper.report_card,)
 """Guests that add to the page of a study."""
 P = ParamSpec("P")
@@ -67,17 +65,17 @@ def _array(values: Any, name: str) -> Any:
 
 @_public
 def threshold(
-    diameter: Numbers,
+    diameter: ArrayLike,
     *,
-    density: Numbers = 2500.0,
-    fluid_density: Numbers = 1.0,
-    viscosity: Numbers = 1e-5,
-    slope_deg: Numbers = 0.0,
-    entrainment_angle_deg: Numbers = 60.0,
-    roughness: Numbers | str = "d/30",
-    lift_coefficient: Numbers = LIFT_COEFFICIENT,
-    gravity: Numbers = GRAVITY,
-    depth: Numbers | None = None,
+    density: ArrayLike = 2500.0,
+    fluid_density: ArrayLike = 1.0,
+    viscosity: ArrayLike = 1e-5,
+    slope_deg: ArrayLike = 0.0,
+    entrainment_angle_deg: ArrayLike = 60.0,
+    roughness: ArrayLike = "d/30",
+    lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
+    gravity: ArrayLike = GRAVITY,
+    depth: ArrayLike | None = None,
     law: str | None = "bridged",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
@@ -92,7 +90,7 @@ def threshold(
         Kinematic, m2/s.
     slope_deg, entrainment_angle_deg : array_like
         Slope that the flow goes up, and the angle of the contact that a grain rolls over, degrees.
-    roughness : array_like or str
+    roughness : array_like
         Roughness length z0, m, or a part of the diameter such as ``d/10``.
     lift_coefficient : array_like
         Coefficient of Saffman's lift.
@@ -114,7 +112,7 @@ def threshold(
     InputError
         For a point that is no scene, a law that is none, or if no law holds at any point.
     """
-    given: dict[str, Numbers] = {
+    given: dict[str, Any] = {
         "diameter": diameter,
         "density": density,
         "fluid_density": fluid_density,
@@ -184,12 +182,12 @@ def run(
 
 
 def load(source: str | Path, tolerance: float | None = None, name: str = "tolerance") -> Study:
-    """Read a study file or a preset, the paper's among them, to be answered with a tolerance.
+    """Read a study file or a preset, to be answered with a tolerance that messages call `name`.
 
     Raises
     ------
     InputError
-        If it cannot be read, or is no study; `name` names the tolerance in messages.
+        If it is no study, or the tolerance is no relative error.
     """
     asked = study.load(str(_path(source, "source")), [paper.PRESETS])
     if tolerance is None:
@@ -204,42 +202,36 @@ def open(directory: str | Path) -> "Opened":
 
     Raises
     ------
-    InputError
-        If it holds no study.
     OrchestratorError
-        If it has no tables, or they have changed since they were written.
+        If it holds no study or no tables, or these have changed since they were written.
     """
     space = Workspace(_path(directory, "directory").absolute())
     asked, planned = pipeline.reopen(space)
-    found = tables.read(space.folder, "tables")
-    return Opened(Results(asked, planned, found, space.cases))
+    return Opened(Results(asked, planned, tables.read(space.folder, "tables"), space.cases))
 
 
-@dataclass(frozen=True, eq=False)
 class Opened:
-    """A study that was run, as `run` and `open` give it."""
+    """A study that was run, as `run` and `open` give it.
 
-    _results: Results
+    Attributes
+    ----------
+    directory, page : Path
+        Its directory and its page.
+    title : str
+        Title in its study file.
+    tables : dict of str to DataFrame
+        Every table by its name, SI units in the columns' names.
+    plot : Plots
+        Its figures.
+    """
 
-    @property
-    def directory(self) -> Path:
-        """Its directory."""
-        return self._results.cases.parent
-
-    @property
-    def title(self) -> str:
-        """Title in its study file."""
-        return self._results.study.title
-
-    @property
-    def page(self) -> Path:
-        """Its page."""
-        return self.directory / report.PAGE
-
-    @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Every table by its name, SI units in the columns' names."""
-        return dict(self._results.tables)
+    def __init__(self, results: Results) -> None:
+        self._results = results
+        self.directory = results.cases.parent
+        self.page = self.directory / report.PAGE
+        self.title = results.study.title
+        self.tables = dict(results.tables)
+        self.plot = Plots(results)
 
     @property
     def thresholds(self) -> pd.DataFrame:
@@ -253,18 +245,13 @@ class Opened:
     @property
     def answer(self) -> str:
         """The answer, in words and a short table."""
-        found = self._results
-        return report.said(found.study, found.plan, found.tables, found.cases)
+        results = self._results
+        return report.said(results.study, results.plan, results.tables, results.cases)
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """The answer, in words alone."""
         return tuple(self.answer.split("\n\n")[-1].splitlines())
-
-    @cached_property
-    def plot(self) -> "Plots":
-        """Its figures."""
-        return Plots(self._results)
 
     def case(self, name: str) -> Path:
         """The directory of a case, by its name or the beginning of it.
@@ -274,18 +261,18 @@ class Opened:
         InputError
             If no case begins so, or several do.
         """
-        found = [one for one in self._results.plan.cases if one.startswith(name)]
-        if len(found) != 1:
-            what = f"{len(found)} cases begin with {name!r}"
+        names = [case for case in self._results.plan.cases if case.startswith(name)]
+        if len(names) != 1:
+            what = f"{len(names)} cases begin with {name!r}"
             raise InputError(what, where=str(self.directory), remedy="see the column case")
-        return self._results.cases / found[0]
+        return self._results.cases / names[0]
 
 
-@dataclass(frozen=True, eq=False)
 class Plots:
     """Figures of a study."""
 
-    _results: Results
+    def __init__(self, results: Results) -> None:
+        self._results = results
 
     def shields(self) -> "Figure":
         """The extended Shields diagram of the page.

@@ -53,20 +53,9 @@ def run(
     queue: Queue | None = None,
     guests: Sequence[Guest] = (),
 ) -> Finished:
-    """Run a study, or what is missing of it.
+    """Run a study, or what is missing of it, in a directory; `workers` cases at a time.
 
-    Parameters
-    ----------
-    study : Study
-        What to run.
-    out : Path
-        Its directory; a study that is there already is continued.
-    workers : int
-        Cases at a time.
-    queue : Queue, optional
-        Queue of the cluster that runs them; without it, this machine does.
-    guests : sequence of callable
-        Functions that may add to the page.
+    A queue of a cluster runs the cases in place of this machine; guests may add to the page.
 
     Raises
     ------
@@ -84,31 +73,29 @@ def run(
         changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
         failures: dict[str, OrchestratorError] = {}
-        while todo := {
-            name: case
-            for name, case in planned.cases.items()
-            if name not in states and name not in failures
-        }:
-            started += len(todo)
-            with report.loading():
-                failures |= complete(
-                    todo,
-                    space,
-                    workers=workers,
-                    limit_s=study.time_limit_s,
-                    queue=queue,
-                    after_s=planned.drawing_s,
-                )
+        while names := [name for name in planned.cases if name not in {**states, **failures}]:
+            started += len(names)
+            todo = {name: planned.cases[name] for name in names}
+            failures |= complete(
+                todo,
+                space,
+                workers=workers,
+                limit_s=study.time_limit_s,
+                queue=queue,
+                after_s=planned.drawing_s,
+            )
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
             _describe(space, study, planned)
-            states |= planned.done(space.cases, set(planned.cases) - set(states))
+            states |= planned.done(space.cases, planned.cases.keys() - states)
         failures = {name: error for name, error in failures.items() if name in planned.cases}
-        if started or not _is_drawn(study, planned, space):
+        whole = read_json(space.drawn) == _state(study, planned, space)
+        if started or not whole or not space.folder.is_whole(MARKERS):
             print("drawing tables, figures and page", file=sys.stderr)
             draw(study, planned, space, states, failures, guests)
+        answer = report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
         left = space.left(planned.cases) if changed else ()
-        return Finished(space.page, started, failures, left, _answer(study, planned, space))
+        return Finished(space.page, started, failures, left, answer)
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -126,11 +113,8 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     file = os.path.relpath(study.file, space.root) if study.file else ""
     other = str(before.get("file", ""))
     if changed and other not in ("", file) and (space.root / other).is_file():
-        raise InputError(
-            f"the directory holds the study of another file, {other}",
-            where=str(space.root),
-            remedy="choose another with --out",
-        )
+        what = f"the directory holds the study of another file, {other}"
+        raise InputError(what, where=str(space.root), remedy="choose another with --out")
     space.describe(STUDY, study.name, list(planned.cases), **about, file=file)
     return changed
 
@@ -150,9 +134,9 @@ def complete(
     queue: Queue | None = None,
     after_s: float = 0.0,
 ) -> dict[str, OrchestratorError]:
-    """Run cases, with a display of their progress; the failures by the cases' names.
+    """Run cases and show their progress; the failures by the cases' names.
 
-    Tables and figures after the runs are expected to take `after_s`, s.
+    A case may take `limit_s`, s; tables and figures after the runs are expected to take `after_s`.
     """
     if not todo:
         return {}
@@ -177,22 +161,17 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         draw(study, planned, space, states, failures, guests)
-        return Finished(space.page, 0, failures, (), _answer(study, planned, space))
-
-
-def _answer(study: Study, planned: Plan, space: Workspace) -> str:
-    return report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
+        answer = report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
+        return Finished(space.page, 0, failures, (), answer)
 
 
 def prune(directory: Path) -> str:
-    """Drop the bulky files of a study's finished cases, but for those that its page shows.
+    """Drop the large files of a study's finished cases that no picture of its page is drawn from.
 
     Raises
     ------
-    InputError
-        If the directory holds no study.
     OrchestratorError
-        If it is being run.
+        If the directory holds no study, or it is being run.
     """
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
@@ -213,11 +192,9 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     """
     about = space.description()
     if "study" not in about:
-        raise InputError(
-            f"this is no study but an experiment, {about['name']}",
-            where=str(space.root),
-            remedy=f"`orchestrator {about['name']} --out {space.root}` draws it again",
-        )
+        what = f"this is no study but an experiment, {about['name']}"
+        remedy = f"`orchestrator {about['name']} --out {space.root}` draws it again"
+        raise InputError(what, where=str(space.root), remedy=remedy)
     study = parse(about["study"], name=about["name"], where=str(space.root))
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.settled(study, space.cases)
@@ -231,24 +208,19 @@ def draw(
     failures: dict[str, OrchestratorError],
     guests: Sequence[Guest] = (),
 ) -> None:
-    """Write tables, figures and page, and last the marker that says of which cases.
+    """Write tables, figures and page, and last the marker of the cases that they are made of.
 
     The states are those of the cases that are done, by name, as `Plan.done` gives them.
     """
     space.folder.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
-    results, times = (
-        tables.make(study, planned, space.cases, states),
-        tables.timings(planned, states),
-    )
+    results = tables.make(study, planned, space.cases, states)
+    times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-
-    def write_tables() -> None:
+    with space.folder.renewed(but=MARKERS):
         tables.write(results, space.folder, "tables")
         tables.write({"timings": times}, space.folder, "timings")
-
-    with space.folder.renewed(but=MARKERS):
-        report.write(study, planned, results, times, causes, space.folder, guests, write_tables)
+        report.write(study, planned, results, times, causes, space.folder, guests)
     if not failures:
         space.folder.put(STATE, text_of(_state(study, planned, space)))
 
@@ -258,9 +230,3 @@ def _state(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
     cases = [case.id for case in planned.cases.values()]
     made_of = [__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases]
     return {"of": digest_text(canonical_json(made_of)), "sha256": space.folder.written(MARKERS)}
-
-
-def _is_drawn(study: Study, planned: Plan, space: Workspace) -> bool:
-    return read_json(space.drawn) == _state(study, planned, space) and space.folder.is_whole(
-        MARKERS
-    )
