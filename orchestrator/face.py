@@ -282,10 +282,10 @@ class Plots:
         OrchestratorError
             If the study has nothing for it yet.
         """
-        from orchestrator.report import overview, settings
+        from orchestrator.report import settings, shields
 
         with settings.own():
-            for figure in overview.draw(self._results):
+            for figure in shields.draw(self._results):
                 if figure.canvas:
                     return figure.canvas
         raise OrchestratorError("there is nothing to draw", where=str(self._results.cases.parent))

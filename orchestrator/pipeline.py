@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
-from orchestrator.report.guest import Guest
+from orchestrator.report import Guest
 from orchestrator.runs import case, cluster, engine, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue

@@ -18,7 +18,7 @@ from orchestrator.errors import printable
 from orchestrator.physics import curves
 from orchestrator.report import document, settings
 from orchestrator.report.document import Section
-from orchestrator.report.figure import Figure
+from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
 
 PANELS = 6

@@ -15,7 +15,7 @@ from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import document, settings
 from orchestrator.report.document import Section
-from orchestrator.report.figure import Figure
+from orchestrator.report.style import Figure
 from orchestrator.runs.case import programs
 from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace
 from orchestrator.study.parts import PileBed

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestrator.report.guest import Addition
+from orchestrator.report import Addition
 
 if TYPE_CHECKING:
     from orchestrator.study.study import Study

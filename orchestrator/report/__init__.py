@@ -1,20 +1,20 @@
 """Figures and page of a study."""
 
-import contextlib
 import sys
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.report import settings
-from orchestrator.report.guest import Guest
 
 if TYPE_CHECKING:
     import pandas as pd
+    from markupsafe import Markup
 
     from orchestrator.plan import Plan
+    from orchestrator.report.results import Results
+    from orchestrator.report.style import Figure
     from orchestrator.runs.case import Case
     from orchestrator.runs.files import Folder
     from orchestrator.study.study import Study
@@ -22,29 +22,26 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 FIGURES = "figures"
-LOADED_AFTER_S = 1.0
-"""Time that the first runs have for themselves before the drawing libraries are loaded, s."""
 
 
-@contextlib.contextmanager
-def loading() -> Iterator[None]:
-    """Load what draws beside the runs of a block: after the last of them nobody waits for it."""
-    with settings.own():
-        pass  # matplotlib is imported here: that changes what other threads see of the environment
-    timer = threading.Timer(LOADED_AFTER_S, _load)
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()
+@dataclass(frozen=True)
+class Addition:
+    """The part of a study's page that a guest adds.
+
+    Attributes
+    ----------
+    section : Markup
+        A section of the page, before its figures.
+    files : mapping of str to str
+        Texts beside the page, by the names of their files.
+    """
+
+    section: "Markup"
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
-def _load() -> None:
-    with contextlib.suppress(Exception), settings.own():  # who draws says what does not load
-        from orchestrator.report import drawing
-
-        drawing.warm()
+Guest = Callable[["Study", "Tables", Sequence[str]], Addition | None]
+"""Given a study, its tables and the names of its figures in their order: its addition, if any."""
 
 
 def write(
@@ -55,7 +52,6 @@ def write(
     failures: Mapping[str, str],
     folder: "Folder",
     guests: Sequence[Guest] = (),
-    beside: Callable[[], None] = lambda: None,
 ) -> None:
     """Draw the figures of a study and write its page.
 
@@ -70,57 +66,73 @@ def write(
     folder : Folder
         The study's directory: it holds ``cases`` and gets ``figures`` and the page.
     guests : sequence of callable
-        Whoever may add to the page.
-    beside : callable
-        Called once, while other processes draw.
+        Guests that may add to the page.
     """
-    said: dict[str, Any] = {}
+    from orchestrator.report import page, settings, words
+    from orchestrator.report.results import Results
 
-    def meanwhile() -> None:
-        beside()
-        said.update(page.said(results, timings, failures))
-
+    results = Results(study, plan, tables, folder.root / "cases")
+    faults: list[str] = []
     with settings.own():
-        # the drawing libraries take half a second to import: only who draws waits for them
-        from orchestrator.report import drawing, page
-        from orchestrator.report.results import Results
-
-        results = Results(study, plan, tables, folder.root / "cases")
-        folder.make(FIGURES)
-        drawn = drawing.draw(results, folder, meanwhile)
-    figures = [figure for figure in drawn if not figure.fault]
-    said["undrawn"] = [figure.fault for figure in drawn if figure.fault]
-    for fault in said["undrawn"]:
+        figures = list(_drawn(results, folder, faults))
+    for fault in faults:
         print(f"a figure could not be drawn: {fault}", file=sys.stderr)
+    figures.sort(key=lambda figure: (not figure.first, not figure.leads))
     names = [figure.name for figure in figures]
-    added = [one for one in (guest(study, tables, names) for guest in guests) if one]
-    for name, text in (item for one in added for item in one.files.items()):
+    added = [part for part in (guest(study, tables, names) for guest in guests) if part]
+    for name, text in (item for part in added for item in part.files.items()):
         folder.put(name, text)
-    sections = [one.section for one in added]
-    folder.put(PAGE, page.render(said, figures, sections))
+    parts = {**words.contents(results, timings, failures), "faults": faults}
+    folder.put(PAGE, page.render(parts, figures, [part.section for part in added]))
+
+
+def _drawn(results: "Results", folder: "Folder", faults: list[str]) -> "Iterator[Figure]":
+    """The figures of a study with their images, in the order of the page; their files are put.
+
+    The answer does not depend on the figures: one that fails, for any cause such as too little
+    memory, costs a line in `faults`.
+    """
+    from orchestrator.report import bed, flows, grains, piles, shields, style
+
+    for draw in (
+        *(bed.draw, shields.draw, grains.draw, piles.extended, piles.fractions, piles.wear),
+        *(grains.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
+        *(flows.where, flows.hills),
+    ):
+        try:
+            for figure in draw(results):
+                image = style.svg(figure.canvas) if figure.canvas else figure.image
+                folder.put(f"{FIGURES}/{figure.name}.svg", image)
+                yield replace(figure, canvas=None, image=image)
+        except Exception as error:
+            faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
 
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
     """The cases whose bulky files the page's pictures are drawn from."""
-    with settings.own():
-        from orchestrator.report.pictures import bed, flow
-        from orchestrator.report.results import Results
+    from orchestrator.report import bed, flows
+    from orchestrator.report.results import Results
 
     results = Results(study, plan, tables, cases)
     if "pile_threshold" not in tables:
         return []
-    shown = [one for _, pile in bed.chosen(results) for one in pile.runs]
-    return [*shown, *(pile.flow for pile in flow.chosen(results))]
+    shown = [run for _, pile in bed.chosen(results) for run in pile.runs]
+    return [*shown, *(pile.flow for pile in flows.drawn(results))]
 
 
 def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
-    """The answer of a study for a terminal: thresholds with their intervals, and sentences."""
-    with settings.own():
-        from orchestrator.report import answer as found
-        from orchestrator.report.results import Results
+    """The answer of a study for a terminal: thresholds with their intervals, and sentences.
+
+    Raises
+    ------
+    OrchestratorError
+        If the tables lack columns, as those of another version do.
+    """
+    from orchestrator.report import words
+    from orchestrator.report.results import Results
 
     try:
-        return found.text(Results(study, plan, tables, cases))
+        return words.text(Results(study, plan, tables, cases))
     except KeyError as error:
         raise OrchestratorError(
             f"its tables lack {error}: another version of this program wrote them",

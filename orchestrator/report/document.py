@@ -6,13 +6,12 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.report import facts, page, style
-from orchestrator.report.facts import Sheet
-from orchestrator.report.figure import Figure
+from orchestrator.report import page, style, words
+from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
 
 LONG = 60
-"""Rows of a table that is folded away."""
+"""Rows of a table beyond which it is folded away."""
 
 
 @dataclass(frozen=True)
@@ -22,10 +21,10 @@ class Section:
     Attributes
     ----------
     title, text : str
-        Its heading and what it says; an empty line parts paragraphs.
+        Its heading and its text; an empty line parts paragraphs.
     figures : sequence of Figure
         With canvases that were made under `settings.own`.
-    tables : sequence of Sheet
+    tables : sequence of DataFrame
         As `sheet` makes them.
     limits : sequence of str
         What a reader must not conclude.
@@ -34,14 +33,14 @@ class Section:
     title: str
     text: str = ""
     figures: Sequence[Figure] = field(default_factory=tuple)
-    tables: Sequence[Sheet] = field(default_factory=tuple)
+    tables: Sequence[pd.DataFrame] = field(default_factory=tuple)
     limits: Sequence[str] = field(default_factory=tuple)
 
 
 def write(
     title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
 ) -> None:
-    """Put the page of an experiment into a directory, and its figures.
+    """Put the page of an experiment into a directory, and its figures as PNG and SVG.
 
     Parameters
     ----------
@@ -56,40 +55,30 @@ def write(
     solvers : mapping of str to str
         The programs that ran, with their versions.
     """
+    parts: list[dict[str, Any]] = []
+    for section in sections:
+        figures = []
+        for figure in section.figures:
+            assert figure.canvas is not None
+            image = style.save(figure.canvas, folder, figure.name)
+            figures.append(page.entry(replace(figure, canvas=None, image=image)))
+        parts.append({**vars(section), "figures": figures})
+    programs = words.versions(solvers)
     html = page.fill(
-        "document.html.j2",
-        title=title,
-        sections=[_drawn(section, folder) for section in sections],
-        long=LONG,
-        programs=facts.versions(solvers),
-        links={},
+        "document.html.j2", title=title, sections=parts, long=LONG, programs=programs, links={}
     )
     folder.put(name, html)
 
 
-def _drawn(section: Section, folder: Folder) -> dict[str, Any]:
-    """A section as the template needs it, its figures as entries with images."""
-    drawn = (_saved(figure, folder) for figure in section.figures)
-    names = ("title", "text", "tables", "limits")
-    parts = {name: getattr(section, name) for name in names}
-    return {**parts, "figures": [page.entry(figure) for figure in drawn]}
+def sheet(table: pd.DataFrame) -> pd.DataFrame:
+    """A table for the page: numbers to four digits, a dash for a missing value."""
 
+    def cell(value: Any) -> str:
+        if pd.isna(value):
+            return "—"
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
 
-def _saved(figure: Figure, folder: Folder) -> Figure:
-    """As a study's, with a PNG beside the SVG, for documents elsewhere."""
-    image = style.save(figure.canvas, folder, figure.name) if figure.canvas else figure.image
-    return replace(figure, canvas=None, image=image)
-
-
-def sheet(table: pd.DataFrame) -> Sheet:
-    """A table for the page: numbers to four digits, a dash where nothing is known."""
-    rows = (tuple(_cell(value) for value in row) for row in table.itertuples(index=False))
-    return Sheet(tuple(str(column) for column in table), tuple(rows))
-
-
-def _cell(value: Any) -> str:
-    if pd.isna(value):
-        return "—"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    rows = [[cell(value) for value in row] for row in table.itertuples(index=False)]
+    return pd.DataFrame(rows, columns=[str(name) for name in table])

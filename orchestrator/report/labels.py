@@ -1,4 +1,4 @@
-"""How values are written in figures and on the page."""
+"""How values are written in figures and on the page, and which of them tell rows apart."""
 
 import math
 import re
@@ -19,6 +19,8 @@ LISTS = ("obstacles",)
 """Columns of fields that are lists: an empty cell is an empty list."""
 FRACTION = Info("fraction", "n/N", "%")
 """The fraction of grains at which a threshold is read; no field of its own."""
+OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
+"""Scopes of fields that have no effect by other methods."""
 
 
 def words(column: str) -> Info:
@@ -27,18 +29,18 @@ def words(column: str) -> Info:
 
 
 def written(column: str, value: Any) -> str:
-    """A value with its symbol, as panels and legends say it."""
-    info = words(column)
-    return _said(info, value, f"${math_of(info.symbol)}$" if info.symbol else "", power_of_ten)
+    """A value with its symbol in mathematics, for panels and legends."""
+    symbol = re.sub(r"_(\w+)", r"_{\1}", words(column).symbol)
+    return _with_symbol(column, value, f"${symbol}$" if symbol else "", power_of_ten)
 
 
 def plain(column: str, value: Any) -> str:
-    """A value with its symbol where there is no mathematics."""
+    """A value with its symbol, without mathematics."""
+    return _with_symbol(column, value, words(column).symbol.replace("_0", "₀"), "{:g}".format)
+
+
+def _with_symbol(column: str, value: Any, symbol: str, number: Callable[[float], str]) -> str:
     info = words(column)
-    return _said(info, value, text_of(info.symbol), "{:g}".format)
-
-
-def _said(info: Info, value: Any, symbol: str, number: Callable[[float], str]) -> str:
     if isinstance(value, str):
         return info.choices.get(value, f"{info.label} {value}")
     if pd.isna(value):
@@ -47,7 +49,7 @@ def _said(info: Info, value: Any, symbol: str, number: Callable[[float], str]) -
 
 
 def value(column: str, value: Any) -> str:
-    """A value alone."""
+    """A value without its symbol."""
     info = words(column)
     if isinstance(value, str):
         return info.choices.get(value, value)
@@ -55,23 +57,20 @@ def value(column: str, value: Any) -> str:
 
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
-    """The values that a row has to tell, with their symbols, where there is no mathematics."""
+    """The values of a row with their symbols, without those that the row does not have."""
     return [plain(column, row[column]) for column in columns if is_told(column, row[column])]
 
 
 def is_told(column: str, value: Any) -> bool:
-    """Whether a row has a value to tell: one without obstacles has none of them."""
+    """Whether a row has a value; an empty list is one."""
     return bool(pd.notna(value)) or column in LISTS
 
 
-def text_of(symbol: str) -> str:
-    """A symbol where there is no mathematics."""
-    return symbol.replace("_0", "₀")
-
-
-def math_of(symbol: str) -> str:
-    """A symbol for mathematics: its index in braces."""
-    return re.sub(r"_(\w+)", r"_{\1}", symbol)
+def panel(row: pd.Series, columns: Sequence[str]) -> str:
+    """The values of a row as a title, broken into lines that fit beside another panel."""
+    shared = (column for column in columns if is_told(column, row[column]))
+    text = ", ".join(written(column, row[column]) for column in shared)
+    return textwrap.fill(text, WIDTH, break_long_words=False)
 
 
 def amount(value: float, unit: str, number: Callable[[float], str] = "{:g}".format) -> str:
@@ -110,16 +109,31 @@ def power_of_ten(value: float) -> str:
 
 
 def methods(rows: pd.DataFrame) -> str:
-    """The methods that answered some rows."""
-    known = fields.ANSWERS["answered_method"].info.choices
-    return ", ".join(name for key, name in known.items() if (rows["answered_method"] == key).any())
+    """The methods that answered rows of a table."""
+    names = fields.ANSWERS["answered_method"].info.choices
+    return ", ".join(name for key, name in names.items() if (rows["answered_method"] == key).any())
 
 
-def panel(row: pd.Series, columns: Sequence[str]) -> str:
-    """Values that all rows of a panel or a marker share; fields without effect are left out.
+def varying(table: pd.DataFrame, *shown: str) -> list[str]:
+    """The fields in which rows differ that agree in all columns that are shown.
 
-    It is broken into lines that fit beside another panel.
+    One of several fields that vary together is enough: questions come first, then the method, then
+    fields that only some methods have. The seed of one packing among many does not count.
     """
-    shared = (column for column in columns if is_told(column, row[column]))
-    said = ", ".join(written(column, row[column]) for column in shared)
-    return textwrap.fill(said, WIDTH, break_long_words=False)
+
+    def rank(column: str) -> int:
+        if column == "method" or column not in fields.COLUMNS:
+            return 1
+        info = fields.COLUMNS[column].info
+        return 3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
+
+    listed: list[str] = []
+    groups = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
+    for column in sorted(fields.others(table, *shown), key=rank):
+        if column in fields.COLUMNS and fields.COLUMNS[column].info.about != "replica":
+            codes, values = pd.factorize(table[column], use_na_sentinel=False)
+            finer, names = pd.factorize(groups * len(values) + codes)
+            if len(names) > groups.max(initial=-1) + 1:
+                listed.append(column)
+                groups = finer
+    return listed

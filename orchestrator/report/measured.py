@@ -1,24 +1,37 @@
-"""The page's section on force laws against measured thresholds."""
+"""Force laws against measured thresholds of single grains on a flat bed.
+
+A law's threshold depends on Re*, beta and z0/d alone, so each combination of them is judged on its
+own line, over the Re* that a study has grains of.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
-from orchestrator.report import labels, reference
-from orchestrator.report.facts import Sheet
-from orchestrator.report.fits import (
-    BINS,
-    DECADES,
-    FACTORS_FROM,
-    MEDIANS,
-    MIDDLES,
-    Fit,
-    FloatArray,
-    Range,
-    runs,
-)
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
+from orchestrator.report import labels, theory
+from orchestrator.report.page import caption
+from orchestrator.report.results import Results, split
+from orchestrator.report.theory import Bed
+from orchestrator.types import BoolArray, FloatArray
 
+BINS = BUFFINGTON_MONTGOMERY
+MIDDLES = np.array([one.middle for one in BINS])
+MEDIANS = np.array([one.median for one in BINS])
+FACTORS_FROM = 0.3
+"""Re* from which factors are taken: below it are a dozen measurements."""
+EDGES = np.geomspace(BINS[0].low, BINS[-1].high, 2001)
+GRID = np.sqrt(EDGES[1:] * EDGES[:-1])
+"""Re* at which lines are compared with the measured ranges."""
+_AT = np.searchsorted([one.high for one in BINS], GRID, side="right")
+TENTHS = np.array([one.tenth for one in BINS])[_AT]
+NINETIETHS = np.array([one.ninetieth for one in BINS])[_AT]
+DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
+"""Decades of Re* in which there are measurements."""
 HEAD = (
     "force law",
     "β",
@@ -30,22 +43,106 @@ HEAD = (
 )
 
 
-def sheet(found: Iterable[Fit]) -> Sheet:
-    """A row for each combination of law, entrainment angle and z0/d."""
-    return Sheet(HEAD, tuple(map(_row, found)))
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One force law on one bed, and how it compares with the measurements.
+
+    Attributes
+    ----------
+    law : str
+        Name of the force law.
+    bed : Bed
+        The bed.
+    first, last : float
+        Re* between which the study has grains.
+    """
+
+    law: str
+    bed: Bed
+    first: float
+    last: float
+
+    @property
+    def name(self) -> str:
+        """The combination in words."""
+        beta, ratio = self.bed.entrainment_angle_deg, self.bed.roughness_ratio
+        law = labels.value("force_law", self.law)
+        return f"{law}, β = {beta:g}°, z₀ = {labels.ratio_of(ratio, 'd')}"
+
+    def law_line(self, reynolds: FloatArray) -> FloatArray:
+        """Tau at some Re*; NaN where the law does not hold."""
+        holds = theory.law_holds(self.law, reynolds, self.bed)
+        return np.where(holds, theory.shields(self.law, reynolds, self.bed), np.nan)
+
+    def line(self, reynolds: FloatArray) -> FloatArray:
+        """The same, NaN also where the study has no grains."""
+        answers = (reynolds >= self.first) & (reynolds <= self.last)
+        return np.where(answers, self.law_line(reynolds), np.nan)
+
+    @cached_property
+    def answered(self) -> BoolArray:
+        """Where on the grid it has an answer."""
+        return np.isfinite(self.line(GRID))
+
+    @cached_property
+    def met(self) -> BoolArray:
+        """Where on the grid it is from the tenth to the ninetieth percentile."""
+        tau = self.line(GRID)
+        return (tau >= TENTHS) & (tau <= NINETIETHS)
+
+    @property
+    def decades(self) -> float:
+        """Decades of Re* over which it is within the measured range."""
+        return DECADES * float(self.met.mean())
+
+    @cached_property
+    def factors(self) -> FloatArray:
+        """Factor from the median of each range of Re*, above or below; NaN without an answer."""
+        ratio = self.line(MIDDLES) / MEDIANS
+        return np.where(MIDDLES >= FACTORS_FROM, np.maximum(ratio, 1 / ratio), np.nan)
+
+    @property
+    def median_factor(self) -> float:
+        """Median of the factors; infinite if there are none."""
+        finite = self.factors[np.isfinite(self.factors)]
+        return float(np.median(finite)) if len(finite) else np.inf
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """The largest factor and its Re*; infinite if there are none."""
+        if not np.isfinite(self.factors).any():
+            return np.inf, np.nan
+        at = int(np.nanargmax(self.factors))
+        return float(self.factors[at]), float(MIDDLES[at])
 
 
-def _row(fit: Fit) -> tuple[str, ...]:
-    worst, at = fit.worst
-    return (
-        labels.value("force_law", fit.law),
-        f"{fit.bed.entrainment_angle_deg:g}°",
-        labels.ratio_of(fit.bed.roughness_ratio, "d"),
-        written(runs(fit.met)) or "nowhere",
-        f"{fit.decades:.1f}",
-        f"{fit.median_factor:.2f}" if np.isfinite(worst) else "—",
-        f"{worst:.2f} at Re* = {number(at)}" if np.isfinite(worst) else "—",
-    )
+def fits(results: Results) -> list[Fit]:
+    """The combinations of a study's single grains on a flat bed: the widest first, then nearest.
+
+    Unverified force laws take no part.
+    """
+    grains = results.beds("grain")
+    grains = grains[~grains["force_law"].isin([n for n, law in LAWS.items() if law.unverified])]
+    flat = grains[grains["alpha_deg"] == 0]
+    combinations = [
+        Fit(str(law), theory.bed_of(own), *theory.span(own))
+        for (law, *_), own in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
+    ]
+    return sorted(combinations, key=lambda fit: (-round(fit.decades, 2), fit.median_factor))
+
+
+def best(ranked: Sequence[Fit]) -> list[Fit]:
+    """The first of each law."""
+    firsts: dict[str, Fit] = {}
+    for fit in ranked:
+        firsts.setdefault(fit.law, fit)
+    return list(firsts.values())
+
+
+def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
+    """The ranges of the grid that are chosen."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    return [(float(EDGES[a]), float(EDGES[b])) for a, b in edges.reshape(-1, 2)]
 
 
 def number(reynolds: float) -> str:
@@ -53,102 +150,104 @@ def number(reynolds: float) -> str:
     return f"{reynolds:.0f}" if reynolds >= 9.95 else f"{reynolds:.2g}"
 
 
-def written(ranges: Iterable[Range]) -> str:
-    """Ranges of Re* for a reader."""
-    return ", ".join(f"{number(low)} … {number(high)}" for low, high in ranges)
+def _ranges(chosen: BoolArray) -> str:
+    return ", ".join(f"{number(low)} … {number(high)}" for low, high in ranges(chosen))
 
 
-def sentences(grains: pd.DataFrame, found: Sequence[Fit]) -> list[str]:
+def sheet(listed: Iterable[Fit]) -> pd.DataFrame:
+    """A row for each combination of law, entrainment angle and z0/d."""
+    rows = []
+    for fit in listed:
+        worst, at = fit.worst
+        judged = np.isfinite(worst)
+        rows.append(
+            (
+                labels.value("force_law", fit.law),
+                f"{fit.bed.entrainment_angle_deg:g}°",
+                labels.ratio_of(fit.bed.roughness_ratio, "d"),
+                _ranges(fit.met) or "nowhere",
+                f"{fit.decades:.1f}",
+                f"{fit.median_factor:.2f}" if judged else "—",
+                f"{worst:.2f} at Re* = {number(at)}" if judged else "—",
+            )
+        )
+    return pd.DataFrame(rows, columns=list(HEAD))
+
+
+def sentences(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     """Conclusions from the numbers: the best law, ranges that none meets, small Re*, air."""
-    return [*_best(found), *_unmet(found), *_small(found), *_air(grains, found)]
-
-
-def _best(found: Sequence[Fit]) -> Iterator[str]:
-    widest = found[0]
-    worst, at = widest.worst
-    if np.isfinite(worst) and widest.decades:
-        yield (
-            f"Of {len(found)} combinations of force law, β and z₀ the one within the measured 10 "
-            f"to 90 % over the widest range of Re* is {widest.name}: over {widest.decades:.1f} of "
-            f"{DECADES:.1f} decades. From Re* = {FACTORS_FROM:g} on it is off the medians by a "
-            f"factor of {widest.median_factor:.2f} in the median and of {worst:.2f} at worst, at "
-            f"Re* = {number(at)}."
+    first = ranked[0]
+    worst, at = first.worst
+    if np.isfinite(worst) and first.decades:
+        yield caption(
+            "best_law",
+            count=len(ranked),
+            name=first.name,
+            decades=f"{first.decades:.1f} of {DECADES:.1f}",
+            start=f"{FACTORS_FROM:g}",
+            median=f"{first.median_factor:.2f}",
+            worst=f"{worst:.2f}",
+            at=number(at),
         )
+    unmet = np.any([fit.answered for fit in ranked], axis=0)
+    unmet &= ~np.any([fit.met for fit in ranked], axis=0)
+    if unmet.any():
+        yield caption("unmet", ranges=_ranges(unmet))
+    yield from _small(ranked)
+    yield from _air(grains, ranked)
 
 
-def _unmet(found: Sequence[Fit]) -> Iterator[str]:
-    """Where there are measurements that no combination meets."""
-    asked = np.any([fit.asked for fit in found], axis=0)
-    met = np.any([fit.met for fit in found], axis=0)
-    if (asked & ~met).any():
-        yield (
-            "Where this study has answers, none is within the measured 10 to 90 % at Re* = "
-            f"{written(runs(asked & ~met))}."
-        )
-
-
-def _small(found: Sequence[Fit]) -> Iterator[str]:
+def _small(ranked: Sequence[Fit]) -> Iterator[str]:
     """Up to which Re* the published curves for water lie above every law."""
-    grid = np.geomspace(min(fit.first for fit in found), BINS[-1].high, 1000)
-    band, lines = reference.water_band(grid), np.array([fit.law_line(grid) for fit in found])
+    grid = np.geomspace(min(fit.first for fit in ranked), BINS[-1].high, 1000)
+    low, _ = theory.water_band(grid)
+    lines = np.array([fit.law_line(grid) for fit in ranked])
     highest = np.where(np.isfinite(lines), lines, -np.inf).max(axis=0)
-    above = np.isfinite(highest) & (band.low > highest)
+    above = np.isfinite(highest) & (low > highest)
     if above[grid < 1].any():
         first = int(above.argmax())
         last = first + int((~np.append(above[first:], False)).argmax()) - 1
-        yield (
-            f"Up to Re* = {number(grid[last])} no law gives as much as the published curves for "
-            f"water: at Re* = {number(grid[first])} the lowest curve is "
-            f"{band.low[first] / highest[first]:.1f} times the highest law; from there on it falls "
-            f"by {1 - band.low[last] / band.low[first]:.0%}, the highest law by "
-            f"{1 - highest[last] / highest[first]:.0%}. The measurements begin at Re* = "
-            f"{BINS[0].low:g}."
+        yield caption(
+            "small_reynolds",
+            last=number(grid[last]),
+            first=number(grid[first]),
+            ratio=f"{low[first] / highest[first]:.1f}",
+            curve=f"{1 - low[last] / low[first]:.0%}",
+            law=f"{1 - highest[last] / highest[first]:.0%}",
+            begin=f"{BINS[0].low:g}",
         )
 
 
-def _air(grains: pd.DataFrame, found: Sequence[Fit]) -> Iterator[str]:
+def _air(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     """Published curves for air against the medians for water at the same Re*."""
-    curves = [_read(*line) for line in reference.air_lines(grains).values()]
-    known = np.isfinite(curves).any(axis=0) if curves else np.array([False])
-    if not known.any():
+    read = []
+    for x, y in theory.air_lines(grains).values():
+        order = np.argsort(x, kind="stable")
+        logs = np.log(x[order]), np.log(y[order])
+        read.append(np.exp(np.interp(np.log(MIDDLES), *logs, left=np.nan, right=np.nan)))
+    there = np.isfinite(read).any(axis=0) if read else np.array([False])
+    if not there.any():
         return
-    at, water = MIDDLES[known], MEDIANS[known]
-    air = np.exp(np.nanmean(np.log(np.array(curves)[:, known]), axis=0))
-    said = "; ".join(_from_air(found, at, air, water))
-    yield (
-        f"At the same Re* the published curves for air lie at {np.median(air / water):.2f} of the "
-        f"medians for water ({(air / water).min():.2f} … {(air / water).max():.2f}, Re* = "
-        f"{number(at[0])} … {number(at[-1])}; mean of their logarithms). The fluid enters every "
-        f"law here by Re* alone, so one line has to serve both{f': {said}' if said else ''}."
+    at, water = MIDDLES[there], MEDIANS[there]
+    air = np.exp(np.nanmean(np.log(np.array(read)[:, there]), axis=0))
+
+    def off(fit: Fit, other: FloatArray) -> float:
+        """Median factor from a curve; infinite if the fit has less than half of the places."""
+        ratio = (fit.line(at) / other)[np.isfinite(fit.line(at))]
+        if 2 * len(ratio) < len(at):
+            return np.inf
+        return float(np.median(np.maximum(ratio, 1 / ratio)))
+
+    distances = [off(fit, air) for fit in ranked]
+    nearest = int(np.argmin(distances))
+    fit = ranked[nearest]
+    yield caption(
+        "air",
+        median=f"{np.median(air / water):.2f}",
+        ends=f"{(air / water).min():.2f} … {(air / water).max():.2f}",
+        span=f"{number(at[0])} … {number(at[-1])}",
+        widest=f"{distances[0]:.2f}" if np.isfinite(distances[0]) else "",
+        nearest=f"{distances[nearest]:.2f}" if np.isfinite(distances[nearest]) else "",
+        name=fit.name,
+        from_water=f"{off(fit, water):.2f}",
     )
-
-
-def _from_air(
-    found: Sequence[Fit], at: FloatArray, air: FloatArray, water: FloatArray
-) -> Iterator[str]:
-    """How far the best line for water and the best for air are from the curves for air."""
-    off = [_off(fit.line(at), air) for fit in found]
-    if np.isfinite(off[0]):
-        yield f"the one widest in water is off the curves for air by a factor of {off[0]:.2f}"
-    nearest = int(np.argmin(off))
-    if np.isfinite(off[nearest]):
-        fit = found[nearest]
-        yield (
-            f"nearest to them is {fit.name}, off by {off[nearest]:.2f}, and off the medians for "
-            f"water by {_off(fit.line(at), water):.2f} (medians of these factors)"
-        )
-
-
-def _off(tau: FloatArray, other: FloatArray) -> float:
-    """Median factor between two lines, above or below; infinite if the first has less than half."""
-    ratio = (tau / other)[np.isfinite(tau)]
-    if 2 * len(ratio) < len(tau):
-        return np.inf
-    return float(np.median(np.maximum(ratio, 1 / ratio)))
-
-
-def _read(reynolds: FloatArray, shields: FloatArray) -> FloatArray:
-    """A published line at the middles of the measured ranges; NaN beyond its ends."""
-    order = np.argsort(reynolds, kind="stable")
-    x, y = np.log(reynolds[order]), np.log(shields[order])
-    return np.asarray(np.exp(np.interp(np.log(MIDDLES), x, y, left=np.nan, right=np.nan)))

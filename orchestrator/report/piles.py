@@ -1,29 +1,55 @@
-"""Figures of piles: the fraction of grains that moved, and the extended Shields diagram."""
+"""Figures of piles: fractions that moved, extended Shields diagram, changing and poured beds."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import EllipseCollection
+from matplotlib.colors import LogNorm
+from matplotlib.lines import Line2D
 
-from orchestrator.report import captions, labels, laws, reference, shields, style, theory
-from orchestrator.report.apart import SHAPE, parted
-from orchestrator.report.figure import Figure
-from orchestrator.report.results import Results, drawable, split
+from orchestrator.grains.pile import Pile
+from orchestrator.physics import measured
+from orchestrator.report import labels, shields, style, theory
+from orchestrator.report.page import caption
+from orchestrator.report.results import Results, case_names, drawable, split
+from orchestrator.report.shields import SHAPE, parted
+from orchestrator.report.style import Figure
 
 TAU = ("reynolds", "shields", "shields_low", "shields_high")
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
-DRAWN = (*SHOWN, *TAU, "fraction", "scene_id", "regime", "usable", "answered_method", SHAPE)
-"""Columns that the extended diagram is drawn from: each point as a row of a hundred is dear."""
-
-MOST = 6
-"""Panels of a figure."""
 SHOWN_UP_TO = 0.9
 """n/N up to which the axis of the stress holds every curve."""
 MARKERS = 30
-"""Most of a curve: peeling gives one for each grain."""
+"""Largest number of markers of a curve: peeling gives one for each grain."""
+WEAR = ("alpha_deg", "packing", "method")
+"""Columns that part the panels of beds that change."""
+LONGEST = 45.0
+"""Longest part of a poured bed that is drawn, d: of a longer one its middle."""
+LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
+HIDING = (
+    ("Wilcock and Crowe", lambda size: measured.wilcock_crowe_hiding(size) / size, "-"),
+    ("Egiazaroff", measured.egiazaroff_hiding, "--"),
+    ("one stress moves all sizes", lambda size: 1 / size, ":"),
+)
+
+
+def _sixes(rows: pd.DataFrame, keys: list[str]) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
+    """Panels of at most six figures, those of the most piles first, in each by rising keys.
+
+    Yields what follows the name and the title of each figure, and its panels.
+    """
+    panels = [part for _, part in split(rows, *keys)]
+    order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
+    for number, start in enumerate(range(0, len(panels), style.PANELS)):
+        chosen = [panels[i] for i in sorted(order[start : start + style.PANELS])]
+        name, title = (f"-{number + 1}", f", more panels ({number})") if number else ("", "")
+        yield name, title, chosen
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -38,90 +64,39 @@ def fractions(results: Results) -> Iterator[Figure]:
     for (alpha,), rows in split(scenes, "alpha_deg"):
         choices, rows, variants = parted(rows, *SHOWN)
         keys = ["z0_over_d", *choices]
-        for number, panels in enumerate(_sixes(rows, keys)):
-            some = pd.concat(panels)
+        for name, title, panels in _sixes(rows, keys):
+            shown = pd.concat(panels)
+            figure, axes = style.grid(len(panels), 2.3)
+            for ax, part in zip(axes, panels, strict=True):
+                for _, pile in part.iterrows():
+                    _curve(ax, pile, curves[pile["scene_id"]], colours[float(pile["d_m"])])
+                ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+                if (place := ax.get_subplotspec()) is None or place.is_first_col():
+                    ax.set_ylabel("$n/N$")
+            # the last grains of a pile may wait for a hundred times the stress of the others
+            stress = pd.concat([curves[one] for one in shown["scene_id"]])
+            early = stress[stress["fraction_moved"] <= SHOWN_UP_TO]["shields"]
+            early = early if len(early) else stress["shields"]
+            axes[0].set(xscale="log", xlim=(early.min() / 1.2, 1.2 * early.max()), ylim=(0, 1))
+            for ax in axes:
+                style.plain_ticks(ax.xaxis)
+            shields.label_lowest(axes, labels.TAU_AXIS)
+            used = set(shown["d_m"])
+            entries = [
+                style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used
+            ]
+            style.legends(figure, entries, [*shields.point_entries(shown, variants), *variants])
             yield Figure(
-                f"fractions-alpha{alpha:g}" + (f"-{number + 1}" if number else ""),
-                f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}" + _part(number),
-                captions.fractions(some),
-                tuple(sorted(set(some["case"].dropna()))),
-                _fractions(panels, keys, curves, colours, variants),
-                fold=number > 0 or alpha != scenes["alpha_deg"].min(),
+                f"fractions-alpha{alpha:g}{name}",
+                f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}{title}",
+                caption("fractions", about=shields.about(shown)),
+                case_names(shown),
+                figure,
+                fold=bool(name) or alpha != scenes["alpha_deg"].min(),
             )
-
-
-def extended(results: Results) -> Iterator[Figure]:
-    """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
-    found = results.joined("pile_threshold")
-    reached = found[drawable(found, "reynolds", "shields")] if len(found) else found
-    colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
-    for (ratio,), rows in split(reached, "z0_over_d"):
-        written = labels.ratio_of(float(str(ratio)), "d")
-        choices, rows, variants = parted(rows, *SHOWN, "fraction")
-        keys = ["alpha_deg", *choices]
-        used = list(dict.fromkeys((*DRAWN, *keys)))
-        for number, panels in enumerate(_sixes(rows, keys)):
-            some = pd.concat(panels)
-            yield Figure(
-                f"extended-shields-{written.replace('/', '').replace(' ', '')}"
-                + (f"-{number + 1}" if number else ""),
-                f"Thresholds of piles by slope, z₀ = {written}" + _part(number),
-                captions.extended(some),
-                tuple(sorted(set(some["case"].dropna()))),
-                _extended(results, [part[used] for part in panels], keys, colours, variants),
-                fold=number > 0 or ratio != reached["z0_over_d"].min(),
-            )
-
-
-def _part(number: int) -> str:
-    return f", more panels ({number})" if number else ""
-
-
-def _sixes(rows: pd.DataFrame, keys: list[str]) -> Iterator[list[pd.DataFrame]]:
-    """The panels by six, those of the most piles in the first figure, in each by rising keys."""
-    panels = [part for _, part in split(rows, *keys)]
-    order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
-    for start in range(0, len(panels), MOST):
-        yield [panels[i] for i in sorted(order[start : start + MOST])]
-
-
-def _fractions(
-    panels: list[pd.DataFrame],
-    keys: list[str],
-    curves: Mapping[str, pd.DataFrame],
-    colours: dict[float, str],
-    variants: list[style.Sample],
-) -> Canvas:
-    """n/N against tau of the grains that had moved, a panel for each z0/d and variant."""
-    figure, axes = style.grid(len(panels), 2.3)
-    for ax, part in zip(axes, panels, strict=True):
-        for _, pile in part.iterrows():
-            _curve(ax, pile, curves[pile["scene_id"]], colours[float(pile["d_m"])])
-        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-        if (place := ax.get_subplotspec()) is None or place.is_first_col():
-            ax.set_ylabel("$n/N$")
-    rows = pd.concat(panels)
-    axes[0].set(xscale="log", xlim=_reach([curves[one] for one in rows["scene_id"]]), ylim=(0, 1))
-    for ax in axes:
-        style.plain_ticks(ax.xaxis)
-    shields.label_lowest(axes, labels.TAU_AXIS)
-    used = set(rows["d_m"])
-    entries = [style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used]
-    style.legends(figure, entries, [*shields.point_entries(rows, variants), *variants])
-    return figure
-
-
-def _reach(curves: list[pd.DataFrame]) -> tuple[float, float]:
-    """The stresses that are shown: the last grains of a pile may wait for a hundred times those."""
-    rows = pd.concat(curves)
-    rows = rows[rows["shields"] > 0]
-    shown = rows[rows["fraction_moved"] <= SHOWN_UP_TO]["shields"]
-    shown = shown if len(shown) else rows["shields"]
-    return float(shown.min()) / 1.2, 1.2 * float(shown.max())
 
 
 def _curve(ax: Axes, pile: pd.Series, curve: pd.DataFrame, colour: str) -> None:
-    face = colour if pile["law_holds"] else "white"
     ax.plot(
         curve["shields"],
         curve["fraction_moved"],
@@ -130,51 +105,65 @@ def _curve(ax: Axes, pile: pd.Series, curve: pd.DataFrame, colour: str) -> None:
         ms=3,
         marker=str(pile[SHAPE]),
         markevery=-(-len(curve) // MARKERS),
-        mfc=face,
+        mfc=colour if pile["law_holds"] else "white",
         mew=0.7,
         gid=str(pile["scene_id"]),
     )
 
 
-def _extended(
-    results: Results,
-    panels: list[pd.DataFrame],
-    keys: list[str],
-    colours: dict[float, str],
-    variants: list[style.Sample],
-) -> Canvas:
-    """tau_c against Re* by fraction, the single grain's line beside it."""
-    rows = pd.concat(panels)
-    figure, axes = style.grid(len(panels), 2.6 if len(panels) > 1 else 3.4)
-    dashes = laws.dashes(rows["force_law"])
-    for ax, part in zip(axes, panels, strict=True):
-        references = _panel(ax, results, part, colours, dashes)
-        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-    # below the first grains lies the threshold of one, which they are held against
-    shields.prepare(axes, panels, (rows["reynolds"].min() / 5, rows["reynolds"].max() * 2))
-    shields.mark_drag_law(axes, panels)
-    entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
-    looks = [
-        *shields.within(axes, shields.line_entries(rows, dashes)),
-        *shields.point_entries(rows, variants),
-        *variants,
-        *shields.within(axes, references),
-    ]
-    style.legends(figure, entries, looks)
-    return figure
+def extended(results: Results) -> Iterator[Figure]:
+    """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
+    every = results.joined("pile_threshold")
+    reached = every[drawable(every, "reynolds", "shields")] if len(every) else every
+    colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
+    for (ratio,), rows in split(reached, "z0_over_d"):
+        written = labels.ratio_of(float(str(ratio)), "d")
+        choices, rows, variants = parted(rows, *SHOWN, "fraction")
+        keys = ["alpha_deg", *choices]
+        for name, title, panels in _sixes(rows, keys):
+            shown = pd.concat(panels)
+            figure, axes = style.grid(len(panels), 2.6 if len(panels) > 1 else 3.4)
+            dashes = theory.dashes(shown["force_law"])
+            for ax, part in zip(axes, panels, strict=True):
+                published = _thresholds(ax, results, part, colours, dashes)
+                ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+            # below the first grains lies the threshold of one, which they are compared with
+            shields.prepare(
+                axes, panels, (shown["reynolds"].min() / 5, shown["reynolds"].max() * 2)
+            )
+            shields.mark_drag_law(axes, panels)
+            entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
+            looks = [
+                *shields.within(axes, shields.line_entries(shown, dashes)),
+                *shields.point_entries(shown, variants),
+                *variants,
+                *shields.within(axes, published),
+            ]
+            style.legends(figure, entries, looks)
+            lines = shields.references(shown, sloped=True)
+            yield Figure(
+                f"extended-shields-{written.replace('/', '').replace(' ', '')}{name}",
+                f"Thresholds of piles by slope, z₀ = {written}{title}",
+                caption("extended", about=shields.about(shown), lines=lines),
+                case_names(shown),
+                figure,
+                fold=bool(name) or ratio != reached["z0_over_d"].min(),
+            )
 
 
-def _panel(
+def _thresholds(
     ax: Axes,
     results: Results,
     rows: pd.DataFrame,
     colours: dict[float, str],
-    dashes: Mapping[str, laws.Dash],
+    dashes: dict[str, theory.Dash],
 ) -> list[Artist]:
+    """Thresholds of one slope beside the closed form; returns the legend of the references."""
     piles = results.scenes[results.scenes["scene_id"].isin(rows["scene_id"])]
     for _, scenes in split(piles, "beta_deg"):
         shields.draw_branches(ax, theory.branches(scenes), "0.2", dashes)
-    for (fraction,), points in split(rows, "fraction"):
+    columns = [*dict.fromkeys((*SHOWN, *TAU, "fraction", "regime", "usable", SHAPE))]
+    for (fraction,), points in split(rows[columns], "fraction"):
         colour = colours[float(str(fraction))]
         for _, series in split(points, "nu_m2_s", "force_law", "regime", SHAPE):
             # piles that differ in more than d are a scatter, not a line
@@ -183,5 +172,152 @@ def _panel(
                 ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
         shields.draw_points(ax, points, colour, TAU)
     in_air = shields.draw_sloped_air(ax, piles, style.AIR)
-    wet = not in_air or not reference.in_gas(piles).all()
-    return [*in_air, *(shields.draw_water(ax) + shields.draw_measured(ax) if wet else [])]
+    wet = not in_air or not theory.in_gas(piles).all()
+    return [*in_air, *(shields.draw_water(ax) if wet else [])]
+
+
+def wear(results: Results) -> Iterator[Figure]:
+    """Beds that change beside the frozen ones, panels by slope, packing and method."""
+    rows = results.joined("bed_change")
+    if rows.empty:
+        return
+    colours = style.palette("d_m", sorted(set(rows["d_m"])))
+    for name, title, panels in _sixes(rows, list(WEAR)):
+        figure, axes = style.grid(len(panels), 2.1)
+        for ax, part in zip(axes, panels, strict=True):
+            for (d, _), own in split(part, "d_m", "scene_id"):
+                x, colour = own["fraction_moved"], colours[float(str(d))]
+                ax.plot(x, own["shields_frozen"], color=colour, ls="--", lw=0.9)
+                ax.plot(x, own["shields"], color=colour, lw=1.3)
+                end = own[x == own["holds_until"]]
+                ax.plot(end["fraction_moved"], end["shields"], "o", color=colour, ms=4)
+            ax.set_title(labels.panel(part.iloc[0], list(WEAR)), loc="left")
+        axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
+        shields.label_lowest(axes, "$n/N$")
+        for ax in axes[::2]:
+            ax.set_ylabel("Shields number $θ$")
+        entries = [style.entry(labels.written("d_m", d), colour) for d, colour in colours.items()]
+        looks = [
+            Line2D([], [], color="0.2", ls="--", lw=0.9, label="flow of the whole pile"),
+            Line2D([], [], color="0.2", lw=1.3, label="flow of the bed as it is"),
+            Line2D([], [], color="0.2", ls="", marker="o", ms=4, label="first 5 % apart"),
+        ]
+        style.legends(figure, entries, looks)
+        piles = (results.plan.piles[one] for one in pd.concat(panels)["scene_id"].unique())
+        cases = tuple(pile.runs[-1].name for pile in piles)
+        heading = f"Frozen bed and bed that changes{title}"
+        yield Figure(f"wear{name}", heading, caption("wear"), cases, figure)
+
+
+def poured(results: Results) -> Iterator[Figure]:
+    """Poured beds: the flow at which each grain goes, its pocket, and the hiding of sizes."""
+    rows = results.joined("pile_grain")
+    if "size_over_d" not in rows:
+        return
+    rows = rows[rows["size_over_d"].notna()]
+    firsts = rows.drop_duplicates("answered_method").sort_values("answered_method")["scene_id"]
+    shown = rows[rows["scene_id"].isin(firsts)]
+    # a grain that lies loose goes at no flow at all
+    reached = shown["ustar0_m_s"][drawable(shown, "ustar0_m_s")]
+    if len(reached):
+        norm = LogNorm(reached.min(), reached.max() * 1.001)
+        for scene_id in firsts:
+            own = shown[shown["scene_id"] == scene_id]
+            yield _poured_bed(results.plan.piles[str(scene_id)], own, norm)
+    yield _pivots(results, rows[rows["pivot_deg"].notna()])
+    classes = results.joined("size_class")
+    if (classes["hiding"].notna() & (classes["size_over_d"] != 1)).any():
+        yield _hiding(classes)
+
+
+def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
+    """The middle of a bed, seen from the side, or a strip seen from above."""
+    packed, method = pile.packing, labels.value("method", grains["answered_method"].iloc[0])
+    x, z = packed.centres.T
+    middle = (x[packed.windward].min() + x[packed.windward].max()) / 2
+    left = max(x.min() - 1, middle - LONGEST / 2)
+    right = min(x.max() + 1, left + LONGEST)
+    there = (x > left) & (x < right)
+    low, high = (0.0, packed.width) if packed.width else (z[there].min() - 1, z[there].max() + 1.5)
+    figure = style.canvas(max(style.WIDTH * (high - low) / (right - left), 1.2) + 1.2)
+    ax = figure.subplots()
+    flows = grains["ustar0_m_s"].to_numpy(float)
+    scale = ScalarMappable(norm, colormaps["viridis_r"])
+    colours = np.where(packed.mobile, LYING, FIXED).astype(object)
+    for place, flow in zip(np.flatnonzero(packed.windward), flows, strict=True):
+        colours[place] = scale.to_rgba(flow) if np.isfinite(flow) and flow > 0 else "white"
+    # seen from above the upper grains cover the others
+    order = np.argsort(z) if packed.width else np.arange(len(x))
+    places = packed.places.xyz[:, :2] if packed.width else packed.centres
+    sizes = packed.sizes[order]
+    discs = EllipseCollection(
+        sizes, sizes, np.zeros_like(x), units="xy", offsets=places[order],
+        offset_transform=ax.transData, facecolors=list(colours[order]), edgecolors=EDGE, lw=0.3,
+    )  # fmt: skip
+    ax.add_collection(discs)
+    up = "$y/d$" if packed.width else "$z/d$"
+    ax.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel=up)
+    bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
+    bar.set_label(r"$u^\star_0$ at which the grain goes, m/s; the same colours by every method")
+    style.plain_ticks(bar.ax.xaxis)
+    return Figure(
+        f"poured-{grains['answered_method'].iloc[0]}",
+        f"Where grains go, by {method}, {labels.plain('d_m', pile.scene.grain.diameter)}",
+        caption("poured", width=packed.width, count=len(flows), method=method),
+        tuple(run.name for run in pile.runs),
+        figure,
+    )
+
+
+def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
+    """The distribution of pivot angles of the exposed grains, beside that of natural beds."""
+    rows = rows.drop_duplicates(["grain_id", "s_m", "pivot_deg"])
+    figure = style.canvas(3.4)
+    ax = figure.subplots()
+    for (width,), part in split(rows.assign(width=rows["answered_width"].fillna(0.0)), "width"):
+        angles = np.sort(part["pivot_deg"].to_numpy(float))
+        percent = 100 * (np.arange(len(angles)) + 0.5) / len(angles)
+        beds = f"strips of {width:g} d" if width else "beds in one plane"
+        colour = "#d55e00" if width else "black"
+        ax.plot(angles, percent, color=colour, label=f"{beds}, {len(angles)} grains")
+    percent = np.linspace(0.5, 99.5, 100)
+    natural = "Kirchner et al. (1990), $D = D_{50}$"
+    ax.plot(measured.kirchner_pivot(percent), percent, color="0.5", ls="--", label=natural)
+    ax.axvline(30, color=style.WATER, lw=1, label="lattice, β = 60°")
+    ax.set(xlabel="pivot angle of an exposed grain, degrees", ylabel="percentile")
+    ax.set(xlim=(0, 120), ylim=(0, 100))
+    ax.legend(loc="lower right")
+    title, cases = "Pockets of the exposed grains", case_names(results.scenes)
+    return Figure("pivots", title, caption("pivots"), cases, figure)
+
+
+def _hiding(rows: pd.DataFrame) -> Figure:
+    """Thresholds of size classes over that of the median size, a panel for each method."""
+    methods = [part for _, part in split(rows, "answered_method")]
+    figure = style.canvas(3.6)
+    axes = list(figure.subplots(1, len(methods), sharex=True, sharey=True, squeeze=False)[0])
+    colours = style.palette("fraction", sorted(set(rows["fraction"])))
+    for ax, part in zip(axes, methods, strict=True):
+        ax.set_title(labels.value("method", part["answered_method"].iloc[0]), loc="left")
+        part = part[part["hiding"] > 0]
+        sizes = part["size_over_d"]
+        number = np.rint(np.log(sizes) / np.log(np.sqrt(2)))
+        for (fraction,), own in split(part, "fraction"):
+            logs = own[["size_over_d", "hiding"]].map(np.log).groupby(number[own.index])
+            mean, low, high = (np.exp(one) for one in (logs.mean(), logs.min(), logs.max()))
+            reach = [mean["hiding"] - low["hiding"], high["hiding"] - mean["hiding"]]
+            look: style.Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
+            colour = colours[float(str(fraction))]
+            ax.errorbar(mean["size_over_d"], mean["hiding"], yerr=reach, color=colour, **look)
+        ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
+        for _, formula, dash in HIDING:
+            ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1)
+        ax.set(xscale="log", yscale="log", xlabel="$d_i/d_{50}$")
+    axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
+    for ax in axes:
+        style.plain_ticks(ax.xaxis)
+        style.plain_ticks(ax.yaxis)
+    entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
+    looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in HIDING]
+    style.legends(figure, entries, looks)
+    return Figure("hiding", "Hiding and exposure of sizes", caption("hiding"), (), figure)

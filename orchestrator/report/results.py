@@ -14,28 +14,19 @@ from orchestrator.runs.case import is_whole
 from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables
+from orchestrator.tables.scenes import measured_hill
 
 FRACTION = 0.3
 """n/N at which one threshold stands for all of its pile."""
 RAMP_BELOW = 3.0
 """Quiet time, sqrt(d/g'), below which a sequence of load steps is a ramp."""
-
-
 MEANS = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
-"""Columns of a threshold of which many seeds have the mean."""
+"""Columns of a threshold of which several seeds have the mean."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """A study with all that came of it.
-
-    Attributes
-    ----------
-    study, plan, tables
-        As the pipeline made them.
-    cases : Path
-        The directory of the study's cases.
-    """
+    """A study with its plan, its tables and the directory of its cases."""
 
     study: Study
     plan: Plan
@@ -51,25 +42,25 @@ class Results:
         """The scenes with one kind of bed."""
         return self.scenes[self.scenes["bed"] == kind]
 
+    @cached_property
+    def _joins(self) -> dict[str, pd.DataFrame]:
+        return {}
+
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its rows' scenes beside its own, or an empty one."""
-        table = self.tables.get(name, pd.DataFrame())
-        if table.empty:
-            return pd.DataFrame()
-        extra = [column for column in self.scenes if column not in table or column == "scene_id"]
-        return table.merge(self.scenes[extra], on="scene_id", how="left", validate="many_to_one")
+        if name not in self._joins:
+            table = self.tables.get(name, pd.DataFrame())
+            if len(table):
+                extra = [one for one in self.scenes if one not in table or one == "scene_id"]
+                table = table.merge(
+                    self.scenes[extra], on="scene_id", how="left", validate="many_to_one"
+                )
+            self._joins[name] = table if len(table) else pd.DataFrame()
+        return self._joins[name]
 
     def values(self, column: str) -> list[float]:
         """The values that the study's scenes have in a column, rising."""
         return sorted({float(value) for value in self.scenes[column].dropna()})
-
-    def shown(self, scene_id: str) -> Pile:
-        """The pile that shows how a scene's grains move: where DEM only checked it, the check.
-
-        A check that has not run, or failed, shows nothing.
-        """
-        check = self.plan.checks.get(scene_id)
-        return check if check and self.has_files(check) else self.plan.piles[scene_id]
 
     @cached_property
     def exemplars(self) -> pd.DataFrame:
@@ -90,13 +81,18 @@ class Results:
         order = order.sort_values(by, ascending=[False] * 4 + [True], kind="stable")
         return order.sort_values("alpha_deg", kind="stable")
 
+    def shown(self, scene_id: str) -> Pile:
+        """The pile that shows how a scene's grains move: the check by DEM, where one has run."""
+        check = self.plan.checks.get(scene_id)
+        return check if check and self.has_files(check) else self.plan.piles[scene_id]
+
     def asked(self, pile: Pile) -> pd.Series:
         """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""
-        found = next(asked for asked, one in self.plan.piles.items() if one is pile)
-        return self.scenes[self.scenes["scene_id"] == found].iloc[0]
+        scene_id = next(asked for asked, one in self.plan.piles.items() if one is pile)
+        return self.scenes[self.scenes["scene_id"] == scene_id].iloc[0]
 
     def has_files(self, pile: Pile) -> bool:
-        """Whether a pile's runs and its flow's still have the files of pictures."""
+        """Whether the runs of a pile still have the files that pictures are drawn from."""
         return all(is_whole(one, self.cases) for one in pile.runs)
 
     @cached_property
@@ -106,6 +102,17 @@ class Results:
         done = set() if stress.empty else set(stress["flow_case"])
         piles = self.plan.piles.values()
         return {flow.name: pile for pile in piles for flow in pile.model.cases if flow.name in done}
+
+
+def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
+    """The flows over each hill that others measured, with its half length, the steepest first."""
+    flows = results.tables.get("flow", pd.DataFrame())
+    if "measured_source" not in flows:
+        return
+    for _, rows in reversed(list(flows.dropna(subset=["measured_source"]).groupby("alpha_deg"))):
+        hill = measured_hill(results.flows[str(rows["flow_case"].iloc[0])])
+        assert hill
+        yield hill.aspect, rows
 
 
 def nearest_fraction(thresholds: pd.DataFrame) -> float:
@@ -125,19 +132,16 @@ def split(
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     """Thresholds of piles that differ in their seed alone as one row, with all others as they are.
 
-    The row has the means over the usable seeds, over all where none is usable; the interval holds
-    those of all these seeds. The column ``seeds`` has their number, ``of_seeds`` that of all.
+    A row has the means over the usable seeds, over all seeds where none is usable; its interval
+    holds those of these seeds. The columns ``seeds`` and ``of_seeds`` have the number of these
+    seeds and of all, ``least`` and ``largest`` the range of their thresholds.
     """
     if rows.empty or rows["seed"].nunique() < 2:
-        return (
-            rows.assign(least=rows["shields"], largest=rows["shields"], seeds=1, of_seeds=1)
-            if len(rows)
-            else rows
-        )
+        ends = {"least": rows["shields"], "largest": rows["shields"]} if len(rows) else {}
+        return rows.assign(**ends, seeds=1, of_seeds=1)
     merged = []
-    for _, twins in rows.groupby(
-        [*fields.others(rows, "seed"), "fraction"], dropna=False, sort=False
-    ):
+    keys = [*fields.others(rows, "seed"), "fraction"]
+    for _, twins in rows.groupby(keys, dropna=False, sort=False):
         chosen = twins[valid(twins)] if valid(twins).any() else twins
         row = chosen.iloc[0].copy()
         row[MEANS] = chosen[MEANS].mean()
@@ -155,22 +159,29 @@ def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
     return ((values > 0) & (values < np.inf)).all(axis=1)
 
 
-def held(table: pd.DataFrame) -> pd.Series:
+def held(table: pd.DataFrame) -> "pd.Series[bool]":
     """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp.
 
-    A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the marker.
+    A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the criterion.
     """
     return ~(table["waiting_time"] < RAMP_BELOW)
 
 
 def by_dem(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows that DEM found; those of a formula hold nothing that was measured."""
+    """The rows that DEM answered; an empty table as it is."""
     return table[table["answered_method"] == "dem"] if len(table) else table
 
 
-def valid(table: pd.DataFrame) -> pd.Series:
+def valid(table: pd.DataFrame) -> "pd.Series[bool]":
     """Whether each threshold is usable; of scenes, whether their force law holds.
 
     A scene is judged at its own single-grain threshold.
     """
     return table["usable" if "usable" in table else "law_holds"].astype(bool)
+
+
+def case_names(*tables: pd.DataFrame) -> tuple[str, ...]:
+    """The cases behind the rows of tables, each once."""
+    return tuple(
+        sorted({str(one) for table in tables if len(table) for one in table["case"].dropna()})
+    )

@@ -1,35 +1,35 @@
-"""How all figures look: sizes, colours by meaning, markers, files."""
+"""How all figures look: sizes, colours by meaning, legends, files."""
 
+import re
 from collections.abc import Sequence
-from io import BytesIO, StringIO
+from dataclasses import dataclass
+from io import BytesIO
 from typing import Any, Literal
 
-import numpy as np
-from matplotlib import colormaps, rcParams
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.backends.backend_mixed import MixedModeRenderer
-from matplotlib.backends.backend_svg import FigureCanvasSVG, RendererSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from orchestrator.report import FIGURES
 from orchestrator.runs.files import Folder
 
 WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""
-
+PANELS = 6
+"""Largest number of panels of a figure."""
 SHADES = {
     "beta_deg": ("viridis", 0.0, 0.85),
     "alpha_deg": ("plasma", 0.0, 0.82),
     "fraction": ("YlGnBu", 0.35, 1.0),
     "d_m": ("turbo", 0.05, 0.95),
 }
-"""Colour maps of what rises in steps; few diameters have colours that are told apart better."""
+"""Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
 DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
 WATER = "#74aed6"
 AIR = "#8c6d46"
@@ -37,10 +37,48 @@ BED = "#d9c9a3"
 Look = dict[str, Any]
 """Properties of an artist."""
 Sample = Artist | tuple[Artist, ...]
-"""A sample of a legend: one mark, or some beside each other."""
-
+"""A sample of a legend: one mark, or several beside each other."""
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
-MINOR_TICK: Look = {"color": "black", "ms": 2, "mew": 0.6}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing with its heading and its caption.
+
+    Attributes
+    ----------
+    name : str
+        Stem of the names of its files.
+    title, caption : str
+        A heading, and what the figure shows, by which equations and with which uncertainty.
+    cases : tuple of str
+        Directories of the cases behind it.
+    canvas : matplotlib.figure.Figure or None
+        The drawing; None once its files are written.
+    image : bytes
+        The picture that the page shows, SVG or PNG, once it is made.
+    data : object
+        Data of the page's script for a pointer or a slider, as JSON; None if there are none.
+    fold : bool
+        Whether the page shows it on demand alone.
+    first : bool
+        Whether it answers the study's question and stands before all others.
+    """
+
+    name: str
+    title: str
+    caption: str
+    cases: tuple[str, ...]
+    canvas: Canvas | None
+    image: bytes = b""
+    data: Any = None
+    fold: bool = False
+    first: bool = False
+
+    @property
+    def leads(self) -> bool:
+        """Whether it stands at the head of the page."""
+        return self.first or (self.data is not None and not self.fold)
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
@@ -59,24 +97,22 @@ def canvas(height: float) -> Canvas:
 
 
 def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
-    """A figure of some panels of a height (inches), in two columns where there are several."""
+    """A figure of panels of a height (inches), in two columns where there are several."""
     columns = min(count, 2)
     lines = -(-count // columns)
     figure = canvas(height * lines + 0.9)
     axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
     for unused in axes[count:]:
         unused.remove()
-    for spine in (one for ax in axes[:count] for one in ax.spines.values()):
-        spine.set_in_layout(False)  # they lie on the panel's edge, which counts anyway
     return figure, list(axes[:count])
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
-    """Place the legend of colours above the panels, all else below them: no data are there."""
+    """Place the legend of colours above the panels and all other samples below them."""
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
-        handles: list[Any] = list(looks)  # its stubs know no samples of two marks
+        handles: list[Any] = list(looks)  # the stubs know no samples of two marks
         names = [str((one[0] if isinstance(one, tuple) else one).get_label()) for one in looks]
         beside = {tuple: HandlerTuple(ndivide=None)}
         figure.legend(handles, names, loc="outside lower center", ncols=3, handler_map=beside)
@@ -102,64 +138,22 @@ def upright_note(ax: Axes, x: float, text: str, at: Literal["top", "bottom"]) ->
 def plain_ticks(axis: Axis) -> None:
     """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set."""
     low, high = axis.get_view_interval()
-    digits = "2345678" if high < 5 * low else "25" if high < 50 * low else ""
+    digits = "2345678" if high < 5 * low else "25" if high < 200 * low else ""
+
+    def minor(x: float, _: int) -> str:
+        text = f"{x:.6g}"
+        return text if text.strip("0.")[0] in digits else ""
+
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    if digits:
-        axis.set_minor_formatter(FuncFormatter(lambda x, _: _leading(x, digits)))
-    else:
-        _light_ticks(axis, low, high)
-
-
-def _light_ticks(axis: Axis, low: float, high: float) -> None:
-    """Minor ticks without numbers as one artist: matplotlib’s own are five for each tick."""
-    axis.set_minor_locator(NullLocator())
-    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
-    places = np.outer(decades, np.arange(2, 10)).ravel()
-    places = places[(places >= low) & (places <= high)]
-    edge, ax = np.zeros_like(places), axis.axes
-    if axis is ax.xaxis:
-        ticks = Line2D(places, edge, marker=3, transform=ax.get_xaxis_transform())
-    else:
-        ticks = Line2D(edge, places, marker=0, transform=ax.get_yaxis_transform())
-    ticks.set(ls="", clip_on=False, in_layout=False, gid="minor ticks", **MINOR_TICK)
-    ax.add_artist(ticks)
-
-
-def _leading(x: float, digits: str) -> str:
-    """The number where its first digit is one of some."""
-    text = f"{x:.6g}"
-    return text if text.strip("0.")[0] in digits else ""
-
-
-class _Sheet(FigureCanvasSVG):
-    """SVG by one renderer: matplotlib's own way takes a second one, which reads each text anew."""
-
-    def __init__(self, figure: Canvas, out: StringIO) -> None:
-        super().__init__(figure)
-        figure.dpi = self.fixed_dpi
-        width, height = figure.get_size_inches()
-        pixels = rcParams["savefig.dpi"]
-        drawn = (width * self.fixed_dpi, height * self.fixed_dpi, out)
-        # matplotlib has no types for its renderers
-        vectors: Any = RendererSVG(  # type: ignore[no-untyped-call]
-            *drawn, image_dpi=pixels, metadata={"Date": None}
-        )
-        self.renderer: Any = MixedModeRenderer(  # type: ignore[no-untyped-call]
-            figure, width, height, pixels, vectors
-        )
-
-    def get_renderer(self) -> Any:
-        """The one that the layout measures with."""
-        return self.renderer
+    axis.set_minor_formatter(FuncFormatter(minor) if digits else NullFormatter())
 
 
 def svg(figure: Canvas) -> bytes:
     """A figure as SVG, without a date in it."""
-    out = StringIO()
-    sheet = _Sheet(figure, out)
-    figure.draw(sheet.renderer)  # lays out, then draws
-    sheet.renderer.finalize()
-    return out.getvalue().encode()
+    out = BytesIO()
+    figure.savefig(out, format="svg", metadata={"Date": None})
+    # hundredths of a point are enough; a scale stays as it is
+    return re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
 
 
 def save(figure: Canvas, folder: Folder, name: str) -> bytes:

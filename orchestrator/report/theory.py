@@ -1,24 +1,56 @@
-"""The closed form as lines: the threshold of one grain under a force law, of Re* alone.
+"""Lines to compare thresholds with: the closed form of one grain, and published curves.
 
-In (Re*, tau) a law is a curve that neither density, viscosity nor gravity changes: these only say
-which part of the curve the grains of a study are on.
+In (Re*, tau) the closed form of a law is a curve that neither density, viscosity nor gravity
+changes: these only say which part of the curve the grains of a study are on.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from orchestrator.physics import curves
+from orchestrator.physics.curves import Air
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import Threshold, shields_at
-from orchestrator.report import laws
+from orchestrator.physics.threshold import LAWS_OF, Threshold, shields_at
 from orchestrator.report.results import split
 from orchestrator.study import closed_form
+from orchestrator.types import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
-
+PAIR = LAWS_OF["transition"]
+"""The two laws of the paper, which hold at no common Re*: their lines need not be told apart."""
+Dash = Any
+"""A line's style, as matplotlib has it."""
+LOOKS: tuple[tuple[str, Dash], ...] = (
+    ("#5a5a5a", "--"),
+    ("#5a5a5a", "-"),
+    ("#c8102e", "-"),
+    ("#c8102e", (0, (4, 1.5))),
+    ("#009e73", "-"),
+    ("#7b3294", "-"),
+    ("#e69f00", "-"),
+    ("#e69f00", (0, (4, 1.5))),
+    ("#e377c2", "-"),
+    ("#009e73", (0, (4, 1.5))),
+    ("#7b3294", (0, (4, 1.5))),
+)
+"""Colour and dash where colours mean laws, in the order of `LAWS`: variants share a colour."""
+DASHES: tuple[Dash, ...] = (
+    "-",
+    (0, (5, 1.2)),
+    (0, (6, 1.2, 1, 1.2)),
+    (0, (2.5, 1)),
+    (0, (6, 1, 1, 1, 1, 1)),
+    (0, (9, 1.5)),
+    (0, (4, 1, 4, 1, 1, 1)),
+)
+"""Dashes where colours mean something else. Dotted is where a law does not hold."""
+FEW_LAWS = 3
+"""Laws that dashes tell apart; more have colours of their own."""
 SWEEP_M = (5e-5, 1e-3)
 """Diameters of the paper; a study with others widens the sweep."""
 POINTS = 240
@@ -28,9 +60,51 @@ GRAIN = [
     "d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s",
     "rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2",
 ]  # fmt: skip
-"""Columns of all that the closed form depends on, in its order."""
+"""Columns of all that the closed form depends on, in the order of `closed_form.SingleGrain`."""
 WHOLE = np.geomspace(1e-4, 1e6, 2001)
 """Re* of any grain."""
+LEAST_CURVES = 2
+"""The band for water is drawn only where at least this many curves were published for."""
+BAGNOLD_FROM = 3.5
+"""Bagnold's A is 0.1 above this Re* only; it rises below."""
+SLOPED = "Shao & Lu 2000"
+"""The curve for air that is drawn for sloping beds."""
+GAS_RATIO = 100.0
+"""Least rho_sol/rho_f of a fluid that curves for air may be compared with."""
+
+
+def look(name: str) -> tuple[str, Dash]:
+    """Colour and dash of a law where colours mean laws."""
+    return LOOKS[list(LAWS).index(name) % len(LOOKS)]
+
+
+def drawn(names: Iterable[str]) -> list[str]:
+    """The laws that are drawn for some scenes: of the paper's pair both if either is used."""
+    used = set(names)
+    pair = set(PAIR) if used & set(PAIR) else set()
+    return [name for name in LAWS if name in used | pair]
+
+
+def many(names: Iterable[str]) -> bool:
+    """Whether there are so many laws that colours must tell them apart."""
+    return len(set(dashes(names).values())) > FEW_LAWS
+
+
+def dashes(names: Iterable[str]) -> dict[str, Dash]:
+    """A dash for each of the laws that are drawn; the paper's pair has one."""
+    listed = drawn(names)
+    families = dict.fromkeys(PAIR if name in PAIR else (name,) for name in listed)
+    return {name: dash for family, dash in zip(families, DASHES, strict=False) for name in family}
+
+
+@dataclass(frozen=True)
+class Bed:
+    """All that the closed form depends on beside Re* and the law; angles in degrees."""
+
+    slope_deg: float
+    entrainment_angle_deg: float
+    roughness_ratio: float
+    lift_coefficient: float
 
 
 @dataclass(frozen=True)
@@ -50,39 +124,26 @@ class Branch:
     law: str
     reynolds: FloatArray
     shields: FloatArray
-    valid: NDArray[np.bool_]
-    continued: NDArray[np.bool_]
+    valid: BoolArray
+    continued: BoolArray
 
 
 def branches(scenes: pd.DataFrame) -> list[Branch]:
     """The lines through scenes of one slope, one entrainment angle and one z0/d."""
-    scenes = scenes[[*GRAIN, "z0_over_d", "force_law"]]  # parts of sixty columns are dear
+    scenes = scenes[[*GRAIN, "z0_over_d", "force_law"]]  # to part sixty columns takes long
     low, high = span(scenes)
     reynolds = np.geomspace(low / WIDER, high * WIDER, POINTS)
-    return [
-        branch(law, own, reynolds)
-        for _, own in split(scenes, "alpha_s")
-        for law in laws.drawn(own["force_law"])
-    ]
-
-
-def branch(law: str, scenes: pd.DataFrame, reynolds: FloatArray) -> Branch:
-    """The line of a law at some Re*, for the bed of some scenes."""
-    bed, here = bed_of(scenes), scenes[scenes["force_law"] == law]
-    first, last = span(here) if len(here) else (np.inf, 0.0)
-    valid = law_holds(law, reynolds, bed)
-    near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
-    return Branch(law, reynolds, shields(law, reynolds, bed), valid, near & ~valid)
-
-
-@dataclass(frozen=True)
-class Bed:
-    """All that the closed form depends on beside Re* and the law; angles in degrees."""
-
-    slope_deg: float
-    entrainment_angle_deg: float
-    roughness_ratio: float
-    lift_coefficient: float
+    lines = []
+    for _, own in split(scenes, "alpha_s"):
+        bed = bed_of(own)
+        for law in drawn(own["force_law"]):
+            here = own[own["force_law"] == law]
+            first, last = span(here) if len(here) else (np.inf, 0.0)
+            valid = law_holds(law, reynolds, bed)
+            near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
+            tau = shields(law, reynolds, bed)
+            lines.append(Branch(law, reynolds, tau, valid, near & ~valid))
+    return lines
 
 
 def bed_of(scenes: pd.DataFrame) -> Bed:
@@ -103,22 +164,22 @@ def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
     )
 
 
-def law_holds(law: str, reynolds: FloatArray, bed: Bed) -> NDArray[np.bool_]:
+def law_holds(law: str, reynolds: FloatArray, bed: Bed) -> BoolArray:
     """Whether a law holds at some Re*."""
     return LAWS[law].valid(reynolds, _unit(bed.roughness_ratio, bed.lift_coefficient))
 
 
 def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
-    """In units of d, nu and rho_f the friction velocity is Re*."""
+    """A grain in units of d, nu and rho_f, in which the friction velocity is Re*."""
     return Exposure(1.0, ratio, 1.0, 1.0, lift_coefficient)
 
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
     groups = split(scenes[[*GRAIN, "force_law"]], "force_law")
-    found = [one.reynolds for (law,), own in groups for one in thresholds(own, str(law))]
-    reynolds = np.array(found, float)
-    reynolds = reynolds[np.isfinite(reynolds)]
+    every = [one.reynolds for (law,), own in groups for one in thresholds(own, str(law))]
+    reynolds = np.array(every, float)
+    reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min()), float(reynolds.max())
 
 
@@ -127,13 +188,56 @@ def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     return closed_form.thresholds(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
 
 
-def sweep(scenes: pd.DataFrame) -> FloatArray:
-    """Diameters of the paper's range, or of the scenes' where that is wider, m."""
-    d = scenes["d_m"]
-    return np.geomspace(min(SWEEP_M[0], d.min()), max(SWEEP_M[1], d.max()), POINTS)
-
-
 def drag_law_limit(z0_over_d: float, law: str = "high") -> float:
     """Re* at which the particle Reynolds number V d/nu reaches the end of a law's drag."""
     particle = LAWS[law].particle_reynolds(WHOLE, _unit(z0_over_d))
     return float(np.exp(np.interp(np.log(LAWS[law].drag_end), np.log(particle), np.log(WHOLE))))
+
+
+def water_band(reynolds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest of the published curves for water at some Re*, NaN below two curves."""
+    lines = [curve.points(2000) for curve in curves.WATER]
+    table = np.array(
+        [
+            np.exp(np.interp(np.log(reynolds), np.log(x), np.log(y), left=np.nan, right=np.nan))
+            for x, y in lines
+        ]
+    )
+    there = np.isfinite(table)
+    enough = there.sum(axis=0) >= LEAST_CURVES
+    low = np.where(enough, np.where(there, table, np.inf).min(axis=0), np.nan)
+    high = np.where(enough, np.where(there, table, -np.inf).max(axis=0), np.nan)
+    return low, high
+
+
+def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
+    """Which scenes may be compared with curves for air."""
+    return scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]
+
+
+def air_lines(
+    scenes: pd.DataFrame, slope_deg: float = 0.0
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
+
+    The slope's factor is on u*. Of several gases the one of the least viscosity is taken; without
+    a gas there are no lines.
+    """
+    scenes = scenes[in_gas(scenes)]
+    if scenes.empty:
+        return {}
+    one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
+    air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
+    ends = min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max())
+    d = np.geomspace(*ends, POINTS)
+    factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])
+    lines = {name: air.shields_diagram(d, factor * _ustar(name, air, *ends)) for name in curves.AIR}
+    x, y = lines["Bagnold 1941"]
+    lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]
+    return lines
+
+
+@cache  # one of the curves is found by iteration, for each panel and slope of a figure anew
+def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
+    """Threshold friction velocity of a curve for air over diameters (m), m/s."""
+    return curves.AIR[name](np.geomspace(first, last, POINTS), air)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from orchestrator import pipeline, plan
 from orchestrator.grains import counting
-from orchestrator.report.pictures import bed
+from orchestrator.report import bed
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
 

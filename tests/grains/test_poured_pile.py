@@ -14,7 +14,7 @@ from orchestrator.grains import pile_case
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan, make
-from orchestrator.report import mixture
+from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.tables.piles import Answer, size_class_rows
@@ -152,7 +152,7 @@ def test_the_page_shows_where_grains_go_their_pockets_and_sizes(
 ) -> None:
     planned, cases = finished
     made = tables.make(ASKED, planned, cases, list(planned.cases))
-    found = {one.name: one for one in mixture.draw(Results(ASKED, planned, made, cases))}
+    found = {one.name: one for one in piles.poured(Results(ASKED, planned, made, cases))}
     assert {"poured-pivot", "poured-peeling", "poured-dem", "pivots", "hiding"} == set(found)
     bed = found["poured-dem"].canvas
     assert bed is not None

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator import tables
 from orchestrator.plan import Plan
-from orchestrator.report import mixture
+from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
 from tests import small_study
@@ -79,7 +79,7 @@ def test_pivots_and_dem_answer(finished: tuple[Plan, Path]) -> None:
 def test_the_page_shows_the_strip_from_above(finished: tuple[Plan, Path]) -> None:
     planned, cases = finished
     made = tables.make(ASKED, planned, cases, list(planned.cases))
-    found = {one.name: one for one in mixture.draw(Results(ASKED, planned, made, cases))}
+    found = {one.name: one for one in piles.poured(Results(ASKED, planned, made, cases))}
     assert {"poured-pivot", "poured-dem", "pivots"} == set(found)
     bed = found["poured-dem"].canvas
     assert bed is not None

@@ -16,8 +16,7 @@ from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.wear import Worn
-from orchestrator.report import wear as wear_figure
-from orchestrator.report.pictures import bed
+from orchestrator.report import bed, piles
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import STUDY, Workspace
 from orchestrator.study import study
@@ -194,7 +193,7 @@ def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:
 
 
 def test_the_figure_has_a_line_for_each_bed(results: Results) -> None:
-    (figure,) = wear_figure.draw(results)
+    (figure,) = piles.wear(results)
     assert figure.canvas is not None
     panels = figure.canvas.axes
     assert len(panels) == 2

@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from orchestrator.report import answer
+from orchestrator.report import words
 
 
 def _piles(low: float, high: float) -> pd.DataFrame:
@@ -20,7 +20,7 @@ def _piles(low: float, high: float) -> pd.DataFrame:
 
 
 def test_a_tolerance_below_the_models_interval_is_told() -> None:
-    (said,) = answer._worth(_piles(0.3, 1.1), 0.05)
+    (said,) = words._tolerance(_piles(0.3, 1.1), 0.05)
     assert "tolerance of 5% is about numerics" in said
     assert "−30% … +110%, most by packing" in said
 
@@ -30,12 +30,12 @@ def test_a_tolerance_below_the_models_interval_is_told() -> None:
     [(0.3, 1.1, None), (0.04, 0.02, 0.05), (math.nan, math.nan, 0.05)],
 )
 def test_nothing_is_told_of_others(low: float, high: float, tolerance: float | None) -> None:
-    assert not list(answer._worth(_piles(low, high), tolerance))
+    assert not list(words._tolerance(_piles(low, high), tolerance))
 
 
 def test_what_the_frozen_bed_is_known_to_move_is_told() -> None:
     piles = pd.DataFrame({"fraction": [0.1, 0.3, 0.7, 0.7], "frozen_bed": [0, 0.06, 0.2, math.nan]})
-    (said,) = answer._frozen(piles)
+    (said,) = words._frozen(piles)
     assert "2 of 4 thresholds" in said
     assert "up to 20%, from n/N = 30% on" in said
-    assert not list(answer._frozen(piles[:1]))
+    assert not list(words._frozen(piles[:1]))

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.report import document, style
 from orchestrator.report.document import Section
-from orchestrator.report.figure import Figure
+from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
 from tests.report.test_page import Page
 

@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
-from orchestrator.report import piles, shields, single, stress, style
-from orchestrator.report.figure import Figure
+from orchestrator.report import flows, piles, shields, style
+from orchestrator.report import grains as singles
 from orchestrator.report.results import Results
+from orchestrator.report.style import Figure
 from tests.report.conftest import only
 
 LINE, SOLID, HOLLOW = shields.RESULT
@@ -26,9 +27,8 @@ def pile_figures(results: Results) -> Iterator[Figure]:
 
 
 def single_figures(results: Results) -> Iterator[Figure]:
-    yield from single.by_angle(results)
-    yield from single.by_slope(results)
-    yield from single.accuracy(results)
+    yield from singles.draw(results)
+    yield from singles.accuracy(results)
 
 
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
@@ -67,7 +67,7 @@ def test_study_has_the_figures_of_its_beds(results: Results) -> None:
     names = {"dem-horizontal", "dem-slope-beta60", "accuracy"}
     one = only(results, "grain")
     assert {figure.name for figure in single_figures(one)} == names
-    assert list(pile_figures(one)) == list(stress.draw(one)) == []
+    assert list(pile_figures(one)) == list(flows.stress(one)) == []
     heap = only(results, "pile")
     assert list(single_figures(heap)) == []
     assert [figure.name for figure in pile_figures(heap)] == [
@@ -203,8 +203,8 @@ def test_piles_in_the_transition_are_hollow(results: Results) -> None:
 
 def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
     table = results.tables["wall_stress"]
-    top, profile = drawn(stress.draw(results))["wall-stress"]
-    for column in stress.ESTIMATES:
+    top, profile = drawn(flows.stress(results))["wall-stress"]
+    for column in flows.ESTIMATES:
         (line,) = marked(top, column)
         assert np.asarray(line.get_ydata()).tolist() == table[column].tolist()
         assert line.get_xdata() == pytest.approx(table["x_m"] / 0.01)
@@ -223,7 +223,7 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert {figure.name for figure in single_figures(empty)} == {
         "closed-form-horizontal", "closed-form-slope-beta60",
     }  # fmt: skip
-    assert list(pile_figures(empty)) == list(stress.draw(empty)) == []
+    assert list(pile_figures(empty)) == list(flows.stress(empty)) == []
 
 
 def test_the_closed_form_has_no_panels_of_what_answers(results: Results) -> None:
@@ -259,7 +259,7 @@ def test_diameters_beyond_the_papers_are_crossed(results: Results) -> None:
     ax = found["dem-horizontal"][0]
     points, crosses = (
         sum(np.size(line.get_xdata()) for line in marked(ax, *marks))
-        for marks in ((SOLID, HOLLOW), (single.CROSS,))
+        for marks in ((SOLID, HOLLOW), (singles.CROSS,))
     )
     assert points == crosses > 0
 
@@ -271,7 +271,7 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
     assert [figure.fold for figure in figures] == [False, True, False, True]
     for figure in figures:
         axes = drawn([figure])[figure.name]
-        assert 0 < len(axes) <= piles.MOST
+        assert 0 < len(axes) <= style.PANELS
         numbered = {}
         for ax in axes:
             place = ax.get_subplotspec()

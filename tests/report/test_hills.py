@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.physics.measured import rushil_hill
-from orchestrator.report import answer, hills
+from orchestrator.report import flows, words
 from orchestrator.report.results import Results
 from tests import small_study
 
@@ -52,7 +52,7 @@ def test_the_flow_slows_at_the_foot_and_gains_up_to_near_the_top(results: Result
 
 
 def test_computed_stands_beside_measured(results: Results) -> None:
-    (figure,) = hills.draw(results)
+    (figure,) = flows.hills(results)
     assert figure.canvas
     lines = [line for axes in figure.canvas.axes for line in axes.lines]
     (measured_,) = (line for line in lines if line.get_gid() == "measured")
@@ -64,19 +64,19 @@ def test_computed_stands_beside_measured(results: Results) -> None:
 
 
 def test_the_page_of_a_measured_hill_begins_with_it(results: Results) -> None:
-    (figure,) = hills.draw(results)
+    (figure,) = flows.hills(results)
     assert figure.leads
     assert figure.canvas
     said = [text.get_text() for legend in figure.canvas.legends for text in legend.texts]
     assert said == ["k-ε", "RNG k-ε", "measured end of the reversed flow (unverified)"]
-    (sentence,) = hills.sentences(results)
+    (sentence,) = words._hills(results)
     assert "half length 3 h: measured to 6.5 h (unverified); by k-ε to " in sentence
-    assert answer.sentences(results)[0] == sentence
+    assert words.sentences(results)[0] == sentence
 
 
 def test_a_panel_without_reversed_flow_says_so(results: Results) -> None:
-    flows = results.tables["flow"].assign(reattachment_over_h=np.nan, separation_over_h=np.nan)
-    (figure,) = hills.draw(replace(results, tables={**results.tables, "flow": flows}))
+    table = results.tables["flow"].assign(reattachment_over_h=np.nan, separation_over_h=np.nan)
+    (figure,) = flows.hills(replace(results, tables={**results.tables, "flow": table}))
     assert figure.canvas
     texts = [text.get_text() for axes in figure.canvas.axes for text in axes.texts]
     assert texts == ["no reversed flow"]

@@ -10,18 +10,9 @@ from orchestrator import plan
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
-from orchestrator.report import (
-    compared,
-    facts,
-    fits,
-    laws,
-    measured,
-    overview,
-    page,
-    shields,
-    theory,
-)
-from orchestrator.report.fits import Fit
+from orchestrator.report import grains as singles
+from orchestrator.report import measured, shields, style, theory
+from orchestrator.report.measured import Fit
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Bed
 from orchestrator.study import study
@@ -73,31 +64,31 @@ def test_factors_are_those_of_the_law_from_the_medians() -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_ranges_are_where_a_law_is_between_the_percentiles(law: str) -> None:
     fit = Fit(law, BED, 0.01, 1e3)
-    inside = np.zeros(len(fits.GRID), bool)
-    for low, high in fits.runs(fit.met):
-        inside |= (low < fits.GRID) & (high > fits.GRID)
-    tau = theory.shields(law, fits.GRID, BED)
-    holds = theory.law_holds(law, fits.GRID, BED)
-    for x, y, valid, found in zip(fits.GRID, tau, holds, inside, strict=True):
+    inside = np.zeros(len(measured.GRID), bool)
+    for low, high in measured.ranges(fit.met):
+        inside |= (low < measured.GRID) & (high > measured.GRID)
+    tau = theory.shields(law, measured.GRID, BED)
+    holds = theory.law_holds(law, measured.GRID, BED)
+    for x, y, valid, found in zip(measured.GRID, tau, holds, inside, strict=True):
         (one,) = [b for b in BUFFINGTON_MONTGOMERY if b.low <= x < b.high]
         assert found == (valid and one.tenth <= y <= one.ninetieth)
     assert fit.decades == pytest.approx(
-        sum(np.log10(high / low) for low, high in fits.runs(fit.met))
+        sum(np.log10(high / low) for low, high in measured.ranges(fit.met))
     )
 
 
 def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     narrow = bridged(5.0, 8.0)
-    ((low, high),) = fits.runs(narrow.met)
+    ((low, high),) = measured.ranges(narrow.met)
     assert (low, high) == pytest.approx((5.0, 8.0), rel=0.01)
     assert np.isfinite(narrow.factors).sum() == 1
     nowhere = bridged(400.0, 500.0)
-    assert fits.runs(nowhere.met) == []
-    assert measured.sheet([nowhere]).rows[0][3:] == ("nowhere", "0.0", "—", "—")
+    assert measured.ranges(nowhere.met) == []
+    assert measured.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
 
 
 def test_combinations_are_those_of_the_study(several: Results, flat: pd.DataFrame) -> None:
-    found = fits.fits(several)
+    found = measured.fits(several)
     asked = flat[["force_law", "beta_deg", "z0_over_d"]].drop_duplicates()
     assert {(f.law, f.bed.entrainment_angle_deg, f.bed.roughness_ratio) for f in found} == {
         tuple(row) for row in asked.to_numpy().tolist()
@@ -105,7 +96,7 @@ def test_combinations_are_those_of_the_study(several: Results, flat: pd.DataFram
     assert [round(f.decades, 2) for f in found] == sorted(
         (round(f.decades, 2) for f in found), reverse=True
     )
-    firsts = fits.best(found)
+    firsts = measured.best(found)
     assert {f.law for f in firsts} == set(flat["force_law"])
     for one in firsts:
         own = [f for f in found if f.law == one.law]
@@ -113,10 +104,10 @@ def test_combinations_are_those_of_the_study(several: Results, flat: pd.DataFram
 
 
 def test_sheet_says_the_numbers() -> None:
-    (row,) = measured.sheet([bridged()]).rows
-    assert row == (
+    (row,) = measured.sheet([bridged()]).to_numpy().tolist()
+    assert row == [
         "bridged", "50°", "d/30", "0.1 … 163", "3.2", "1.19", "1.62 at Re* = 0.55"
-    )  # fmt: skip
+    ]  # fmt: skip
 
 
 def test_sentences_follow_from_the_numbers() -> None:
@@ -136,35 +127,21 @@ def test_sentences_follow_from_the_numbers() -> None:
     assert not any("air" in said for said in measured.sentences(liquid, every))
 
 
-def test_page_has_the_section_where_grains_lie_on_a_flat_bed(several: Results) -> None:
-    found = page.measured_section(several)
-    assert found is not None
-    sheet = found["best"]
-    assert isinstance(sheet, facts.Sheet)
-    assert len(sheet.rows) == 4
-    slopes = several.scenes[several.scenes["bed"] == "pile"]
-    assert page.measured_section(replace(several, tables={"scenes": slopes})) is None
-
-
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:
-    (figure,) = overview.draw(several)
+    (figure,) = shields.draw(several)
     assert figure.canvas is not None
     (ax,) = figure.canvas.axes
     lines = [line for line in ax.lines if line.get_gid() == shields.RESULT[0]]
     colours = {line.get_color() for line in lines}
-    met = {fit.law for fit in fits.best(fits.fits(several)) if fit.decades > 0}
-    assert colours == {laws.look(name)[0] for name in met}
+    met = {fit.law for fit in measured.best(measured.fits(several)) if fit.decades > 0}
+    assert colours == {theory.look(name)[0] for name in met}
     (medians,) = [line for line in ax.lines if line.get_gid() == shields.MEASURED]
-    assert np.asarray(medians.get_ydata()).tolist() == fits.MEDIANS.tolist()
-    figures = {figure.name: figure for figure in compared.draw(several)}
+    assert np.asarray(medians.get_ydata()).tolist() == measured.MEDIANS.tolist()
+    figures = {figure.name: figure for figure in singles.draw(several)}
     assert list(figures) == ["shields-d30", "shields-d10"]
     for figure in figures.values():
         assert figure.canvas is not None
-        assert len(figure.canvas.axes) == 2 <= compared.MOST
-
-
-def test_few_laws_are_compared_by_the_figures_of_angles(results: Results) -> None:
-    assert list(compared.draw(results)) == []
+        assert len(figure.canvas.axes) == 2 <= style.PANELS
 
 
 def test_preset_reaches_over_the_whole_diagram_with_few_runs() -> None:

@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.report import answer, overview
+from orchestrator.report import shields, words
 from orchestrator.report.results import Results
 from orchestrator.study.closed_form import closed_form
 from tests.report.conftest import only
 
 
 def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
-    (figure,) = overview.draw(results)
+    (figure,) = shields.draw(results)
     assert figure.canvas is not None
     (ax,) = figure.canvas.axes
     drawn = {line.get_gid(): line for line in ax.lines}
@@ -36,19 +36,19 @@ def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
 def test_of_many_piles_one_fraction_is_drawn(results: Results) -> None:
     heap = only(results, "pile")
     scenes, found = heap.tables["scenes"], heap.tables["pile_threshold"]
-    many = range(overview.FEW + 1)
+    many = range(shields.FEW + 1)
     tables = {
         "scenes": pd.concat([scenes.assign(scene_id=f"{i}") for i in many]),
         "pile_threshold": pd.concat([found.assign(scene_id=f"{i}") for i in many]),
     }
-    shown = overview.shown_piles(replace(results, tables={**heap.tables, **tables}))
+    shown = shields.shown_piles(replace(results, tables={**heap.tables, **tables}))
     assert set(shown["fraction"]) == {0.3}
     assert len(shown) == len(many)
-    assert len(overview.shown_piles(heap)) == len(found)
+    assert len(shields.shown_piles(heap)) == len(found)
 
 
 def test_the_sentence_is_what_the_table_says(results: Results) -> None:
-    first, *_ = answer.sentences(results)
+    first, *_ = words.sentences(results)
     piles = results.tables["pile_threshold"]
     row = piles[piles["fraction"] == 0.3].iloc[0]
     single = float(closed_form(results.plan.decisions[row["scene_id"]].asked).shields)
@@ -61,29 +61,27 @@ def test_the_sentence_is_what_the_table_says(results: Results) -> None:
 
 def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
-    said = answer.sentences(grains)
+    said = words.sentences(grains)
     assert said[0].startswith("One grain of 0.05 mm on 0° starts to move at u* ")
-    sheet = answer.sheet(grains)
-    assert sheet is not None
-    assert all(len(row) == len(sheet.head) for row in sheet.rows)
+    assert words.sheet(grains) is not None
     without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
     exact = replace(grains, tables={**grains.tables, "single_grain": without})
-    sheet = answer.sheet(exact)
+    sheet = words.sheet(exact)
     assert sheet is not None
-    (method,) = {row[sheet.head.index("by")] for row in sheet.rows}
+    (method,) = set(sheet["by"])
     assert method == "closed form"
-    assert "One grain" in answer.sentences(exact)[0]
+    assert "One grain" in words.sentences(exact)[0]
 
 
 def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     bad = results.tables["pile_threshold"].assign(usable=False, why_not="Re* 2 is below 30")
     changed = replace(results, tables={**results.tables, "pile_threshold": bad})
-    first, *others = answer.sentences(changed)
+    first, *others = words.sentences(changed)
     assert first.endswith("(not usable: Re* 2 is below 30).")
     assert others[0] == "Usable: 0 of 4 thresholds."
-    sheet = answer.sheet(changed)
+    sheet = words.sheet(changed)
     assert sheet is not None
-    assert {row[-1] for row in sheet.rows} == {"no: Re* 2 is below 30"}
+    assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
 
 
 BROWSER = shutil.which("chromium")

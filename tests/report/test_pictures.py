@@ -9,19 +9,18 @@ import pandas as pd
 import pytest
 
 from orchestrator.errors import SolverError
-from orchestrator.report import captions
-from orchestrator.report.figure import Figure
-from orchestrator.report.pictures import bed, flow, flow_field, mesh
-from orchestrator.report.pictures.bed import Steps
+from orchestrator.report import bed, flows
+from orchestrator.report.bed import Steps
 from orchestrator.report.results import Results
+from orchestrator.report.style import Figure
 from tests.report.conftest import only
 
 
 def test_field_is_that_of_the_flow(results: Results) -> None:
-    (figure,) = flow.draw(results)
+    (figure,) = flows.flow(results)
     (pile,) = results.plan.piles.values()
     shown = (-0.02, 0.1, 0.0, 0.03)
-    velocity = flow_field.velocity(results.cases / pile.flow.name, shown, (60, 240))
+    velocity = flows.velocity(results.cases / pile.flow.name, shown, (60, 240))
     speed = np.linalg.norm(velocity, axis=-1) / 10.0
     assert 0.7 < speed[-1].min() < speed[-1].max() < 1.2
     # outside: the triangle of the pile, 0.01 m high and 2 · 0.01/tan 15° wide
@@ -35,7 +34,7 @@ def test_field_is_that_of_the_flow(results: Results) -> None:
 
 def test_mesh_is_that_of_the_flow(results: Results) -> None:
     (pile,) = results.plan.piles.values()
-    edges = mesh.read_edges(results.cases / pile.flow.name)
+    edges = flows.read_edges(results.cases / pile.flow.name)
     table = results.tables["wall_stress"]
     faces = len(table)
     # of a grid of quadrilaterals and the one column before it; its height is that of the lid
@@ -45,7 +44,7 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
     line = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
     assert len(middles.intersection(line)) > 0.9 * faces
-    (figure,) = mesh.draw(results)
+    (figure,) = flows.mesh(results)
     assert figure.canvas is not None
     for ax in figure.canvas.axes:
         (line_,) = (line for line in ax.lines if line.get_gid() == "mesh")
@@ -54,7 +53,7 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
 
 def test_a_case_without_results_is_named(tmp_path: Path) -> None:
     with pytest.raises(SolverError, match="no results"):
-        flow_field.velocity(tmp_path, (0.0, 1.0, 0.0, 1.0), (2, 2))
+        flows.velocity(tmp_path, (0.0, 1.0, 0.0, 1.0), (2, 2))
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +126,7 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert not any(found["frames"])
     # no load step ran
     assert found["step"] == "flow"
-    assert "load step" not in captions.bed(results, peeled)
+    assert "load step" not in bed.words(results, peeled)
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 

@@ -6,17 +6,17 @@ import pytest
 
 from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import reference, theory
+from orchestrator.report import theory
 from orchestrator.report.results import Results
 
 
 def test_band_holds_every_curve_within_its_range() -> None:
     for curve in curves.WATER:
         reynolds, theta = curve.points(2000)
-        band = reference.water_band(reynolds)
-        common = np.isfinite(band.low)
+        low, high = theory.water_band(reynolds)
+        common = np.isfinite(low)
         assert common.sum() > 1500
-        inside = (theta > 0.998 * band.low) & (theta < 1.002 * band.high)
+        inside = (theta > 0.998 * low) & (theta < 1.002 * high)
         # curves made of pieces jump where these meet
         assert inside[common].mean() > 0.995
 
@@ -27,33 +27,33 @@ def test_band_is_the_envelope_of_the_curves_that_cover_a_place() -> None:
     for curve in curves.WATER:
         reynolds, theta = curve.points(4000)
         found.append(np.interp(place, reynolds, theta, left=np.nan, right=np.nan))
-    band = reference.water_band(place)
-    assert band.low == pytest.approx(np.nanmin(found, axis=0), rel=2e-3)
-    assert band.high == pytest.approx(np.nanmax(found, axis=0), rel=2e-3)
+    low, high = theory.water_band(place)
+    assert low == pytest.approx(np.nanmin(found, axis=0), rel=2e-3)
+    assert high == pytest.approx(np.nanmax(found, axis=0), rel=2e-3)
 
 
 def test_no_band_where_one_curve_is_alone() -> None:
-    band = reference.water_band(np.array([0.011, 0.02]))
-    assert np.isnan(band.low).tolist() == np.isnan(band.high).tolist() == [True, False]
+    low, high = theory.water_band(np.array([0.011, 0.02]))
+    assert np.isnan(low).tolist() == np.isnan(high).tolist() == [True, False]
 
 
 def test_air_needs_a_gas(results: Results) -> None:
     grains = results.beds("grain")
-    assert set(reference.air_lines(grains)) == set(curves.AIR)
-    assert reference.air_lines(grains.assign(rho_f_kg_m3=1000.0)) == {}
+    assert set(theory.air_lines(grains)) == set(curves.AIR)
+    assert theory.air_lines(grains.assign(rho_f_kg_m3=1000.0)) == {}
 
 
 def test_slope_raises_the_friction_velocity_in_air(results: Results) -> None:
     grains = results.beds("grain")
-    flat, up = (reference.air_lines(grains, slope)[reference.SLOPED] for slope in (0.0, 20.0))
+    flat, up = (theory.air_lines(grains, slope)[theory.SLOPED] for slope in (0.0, 20.0))
     factor = float(curves.slope_factor_on_ustar(np.array(20.0), 35.0))
     assert up[0] == pytest.approx(factor * flat[0])
     assert up[1] == pytest.approx(factor**2 * flat[1])
 
 
 def test_bagnold_ends_where_his_constant_changes(results: Results) -> None:
-    reynolds, theta = reference.air_lines(results.beds("grain"))["Bagnold 1941"]
-    assert reynolds.min() >= reference.BAGNOLD_FROM
+    reynolds, theta = theory.air_lines(results.beds("grain"))["Bagnold 1941"]
+    assert reynolds.min() >= theory.BAGNOLD_FROM
     assert theta == pytest.approx(0.01)
 
 

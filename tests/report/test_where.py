@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.report import where
-from orchestrator.report.pictures import bed
+from orchestrator.report import bed, flows
 from orchestrator.report.results import Results
 from tests import small_study
 
@@ -44,7 +43,7 @@ def test_each_form_of_a_train_has_its_thresholds(results: Results) -> None:
 
 
 def test_the_map_shows_every_grain_at_its_place(results: Results) -> None:
-    (figure,) = where.draw(results)
+    (figure,) = flows.where(results)
     grains = results.tables["pile_grain"]
     (dots,) = (
         artist
@@ -61,14 +60,14 @@ def test_the_map_shows_every_grain_at_its_place(results: Results) -> None:
 
 def test_the_picture_of_a_long_train_shows_single_grains(results: Results) -> None:
     (pile,) = results.plan.piles.values()
-    assert bed._part(pile) == ""
+    assert "Shown" not in bed.words(results, pile)
     five = pile.scene.model_copy(update={"bed": pile.bed.model_copy(update={"forms": 20})})
     train = replace(pile, scene=five)
-    assert float(train.line.toe[0]) > bed.MOST * bed.LONG
+    assert float(train.line.toe[0]) > bed.WHOLE * bed.LONG
     left, right, *_ = bed.window(train)
     assert right - left == pytest.approx(bed.LONG)
     assert left < float(train.line.crest[0]) < right
-    assert "of the first form" in bed._part(train)
+    assert "of the first form" in bed.words(results, train)
 
 
 def test_pictures_of_a_page_do_not_change_each_others_texts(results: Results) -> None:

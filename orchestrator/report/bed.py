@@ -1,4 +1,4 @@
-"""The bed of a pile with its grains and the flow: one SVG, and the grains at each load step."""
+"""The picture of a bed with its grains and the flow, and the grains at each stop of a slider."""
 
 import base64
 import itertools
@@ -16,26 +16,20 @@ from PIL import Image
 from orchestrator.bed.line import BedLine
 from orchestrator.grains import dump, motion, wear
 from orchestrator.grains.method import Dem
-from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.report import captions, labels, page
-from orchestrator.report.apart import varying
-from orchestrator.report.figure import Figure
-from orchestrator.report.pictures import flow
-from orchestrator.report.results import Results, split
+from orchestrator.report import flows, labels
+from orchestrator.report.page import caption, fill
+from orchestrator.report.results import FRACTION, Results, split
+from orchestrator.report.style import Figure
+from orchestrator.study import fields
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-Window = tuple[float, float, float, float]
-"""Left, right, bottom, top, d."""
-
-FRACTION = 0.3
-"""n/N of the state that is shown first."""
 LONG = 100.0
 """Length of a face, d, beyond which its upper end is shown alone: grains must be seen."""
-MOST = 4.0
-"""Length of a whole bed over that: the faces of a train of short forms are many."""
+WHOLE = 4.0
+"""Length of a whole bed over `LONG` up to which all forms are shown."""
 STOPS = 300
-"""Most stops of the slider of a bed without dynamics."""
+"""Largest number of stops of the slider of a bed without dynamics."""
 SHIFT = 0.02
 """Grains that have moved by less since they were last drawn stay, d."""
 
@@ -86,42 +80,36 @@ def read(pile: Pile, cases: Path) -> Steps:
     Only grains within the picture are read, at `STOPS` of the load steps if there are more: all
     grains of a long bed at all load steps would need many gigabytes.
     """
-    packing, found = pile.packing, pile.motion(cases)
+    packing, moved = pile.packing, pile.motion(cases)
     (left, right, bottom, _), (x, z) = window(pile), packing.centres.T
     inside = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
     rolling = packing.mobile if isinstance(pile.method, Dem) else False
     grains = np.flatnonzero(inside | rolling)
     counted = np.zeros(len(x), np.int64)
-    counted[packing.windward] = found.level
+    counted[packing.windward] = moved.level
     if isinstance(pile.method, Dem):
         after = [_by_dem(pile, cases / run.name) for run in pile.method.runs]
         every = np.concatenate([packing.centres[None], *after])
         places, stops = every[:, grains], np.arange(len(every))
     else:
-        share = int(np.argmax(found.moved >= FRACTION * found.count - 1e-9))
-        spaced = np.linspace(0, len(found.flow) - 1, min(STOPS, len(found.flow)))
+        share = int(np.argmax(moved.moved >= FRACTION * moved.count - 1e-9))
+        spaced = np.linspace(0, len(moved.flow) - 1, min(STOPS, len(moved.flow)))
         stops = np.unique([*spaced.round().astype(int), share])
         places = np.broadcast_to(packing.centres[grains], (len(stops), len(grains), 2))
-    lines = ((0, pile.line), *_lines(pile, found, stops, cases))
+    lines = [(0, pile.line)]
+    for worn in pile.flows[1:]:  # the first grain that moves under its flow
+        left_ = np.isfinite(wear.grains(pile, worn, cases).left).sum()
+        stop = int(np.searchsorted(moved.moved[stops], left_, side="right"))
+        lines.append((stop, wear.line(pile, worn, cases)))
     level = np.where(counted > 0, np.searchsorted(stops, counted), 0)[grains]
     if len(lines) > 1:
         gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
         places = np.where(gone[..., None], np.nan, places)
-    return Steps(pile, grains, places, level, found.flow[stops], found.moved[stops], lines)
-
-
-def _lines(
-    pile: Pile, found: Motion, stops: IntArray, cases: Path
-) -> Iterator[tuple[int, BedLine]]:
-    """Each bed line with the stop at which the first grain moves under its flow."""
-    for worn in pile.flows[1:]:
-        left = wear.grains(pile, worn, cases).left
-        before = int(np.searchsorted(found.moved[stops], np.isfinite(left).sum(), side="right"))
-        yield before, wear.line(pile, worn, cases)
+    return Steps(pile, grains, places, level, moved.flow[stops], moved.moved[stops], tuple(lines))
 
 
 def _by_dem(pile: Pile, directory: Path) -> FloatArray:
-    """The places of the grains at the end of each load step of a run, from its dump, d."""
+    """The places of all grains at the end of each load step of a run, from its dump, d."""
     packing = pile.packing
     samples = pd.read_csv(directory / motion.SAMPLES)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
@@ -131,27 +119,6 @@ def _by_dem(pile: Pile, directory: Path) -> FloatArray:
     d = pile.scene.grain.diameter
     places[np.searchsorted(ends, rows["step"]), rows["id"] - 1] = rows[["x", "z"]] / d
     return places
-
-
-def draw(results: Results) -> Iterator[Figure]:
-    """One figure for each slope, by rising slope; the first stands for the study."""
-    if results.exemplars.empty:
-        return
-    telling = varying(results.exemplars, "alpha_deg", "d_m")
-    for number, (row, pile) in enumerate(chosen(results)):
-        steps = read(pile, results.cases)
-        shown = steps.first(FRACTION)
-        yield Figure(
-            f"bed-alpha{pile.bed.slope_deg:g}",
-            f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
-            + ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling])),
-            captions.bed(results, pile) + _part(pile),
-            tuple(one.name for one in reversed(pile.runs)),
-            None,
-            _svg(steps, shown, results.cases).encode(),
-            data(steps, shown),
-            fold=number > 0,
-        )
 
 
 def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
@@ -164,18 +131,70 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
         yield from itertools.islice((pair for pair in piles if results.has_files(pair[1])), 1)
 
 
+def draw(results: Results) -> Iterator[Figure]:
+    """One figure for each slope, by rising slope; the first stands for the study."""
+    if results.exemplars.empty:
+        return
+    telling = labels.varying(results.exemplars, "alpha_deg", "d_m")
+    for number, (row, pile) in enumerate(chosen(results)):
+        steps = read(pile, results.cases)
+        shown = steps.first(FRACTION)
+        yield Figure(
+            f"bed-alpha{pile.bed.slope_deg:g}",
+            f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
+            + ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling])),
+            words(results, pile),
+            tuple(one.name for one in reversed(pile.runs)),
+            None,
+            _svg(steps, shown, results.cases).encode(),
+            data(steps, shown),
+            fold=number > 0,
+        )
+
+
+def words(results: Results, pile: Pile) -> str:
+    """The caption: how the pile was answered, and what of it is shown."""
+    columns = ["z0_over_d", "packing", "force_law"]
+    columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
+    used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
+    part, (_, right, *_) = "", window(pile)
+    if _is_level(pile):
+        part = f"Shown: {LONG:g} d of the bed." if right < pile.line.x[-2] else ""
+    elif not _is_short(pile):
+        form = " of the first form" if pile.bed.forms > 1 else ""
+        part = f"Shown: the upper end of the windward face{form}."
+    return caption(
+        "bed",
+        width=pile.bed.width,
+        by_dem=pile.by_dem,
+        criterion=labels.value(
+            "displacement_criterion", pile.scene.protocol.displacement_criterion
+        ),
+        method=pile.scene.protocol.method,
+        flow=bool(pile.model.cases),
+        update=pile.scene.protocol.update,
+        properties=", ".join(labels.plain(c, v) for c, v in used.items() if v is not None),
+        part=part,
+    )
+
+
 def data(steps: Steps, shown: int) -> dict[str, Any]:
-    """Data for a slider through the load steps: the mobile grains that are elsewhere after each.
+    """Data for the slider: the mobile grains that are elsewhere at each stop.
 
     ``frames`` has three numbers for each such grain: its number, x and -z; null if it has left.
     """
     mobile = steps.pile.packing.mobile[steps.grains]
     last, frames = steps.places[0, mobile].copy(), []
-    for places in steps.places[1:, mobile]:
-        gone = np.isnan(places[:, 0])
-        new = (gone != np.isnan(last[:, 0])) | (np.abs(places - last).max(axis=1) > SHIFT)
-        frames.append([_triple(i, places[i]) for i in np.flatnonzero(new).tolist()])
-        last[new] = places[new]
+    for places in steps.places[1:]:
+        now = places[mobile]
+        gone = np.isnan(now[:, 0])
+        new = (gone != np.isnan(last[:, 0])) | (np.abs(now - last).max(axis=1) > SHIFT)
+        frame: list[float | None] = []
+        for i in np.flatnonzero(new).tolist():
+            x, z = now[i].tolist()
+            frame += [i, None, None] if gone[i] else [i, round(x, 2), round(-z, 2)]
+        frames.append(frame)
+        last[new] = now[new]
     return {
         "step": "load step" if steps.pile.by_dem else "flow",
         "shown": shown,
@@ -184,15 +203,15 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         "moved": steps.totals.tolist(),
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
-        "frames": [list(itertools.chain(*frame)) for frame in frames],
+        "frames": frames,
         **({"lines": _paths(steps)} if len(steps.lines) > 1 else {}),
     }
 
 
 def _paths(steps: Steps) -> list[list[Any]]:
-    """Each bed line as a path of the picture, after the step from which on it is there."""
+    """Each bed line as a path of the picture, after the stop from which on it is there."""
     left, right, *_ = window(steps.pile)
-    return [[step, "M" + _path(line, left, right)[1:]] for step, line in steps.lines]
+    return [[stop, "M" + _path(line, left, right)[1:]] for stop, line in steps.lines]
 
 
 def _path(line: BedLine, left: float, right: float) -> str:
@@ -200,31 +219,15 @@ def _path(line: BedLine, left: float, right: float) -> str:
     return " ".join(f"L{a:.2f} {-b:.2f}" for a, b in zip(x, line.height(x), strict=True))
 
 
-def _triple(number: int, place: FloatArray) -> tuple[int, float | None, float | None]:
-    if np.isnan(place[0]):
-        return int(number), None, None
-    return int(number), round(float(place[0]), 2), round(-float(place[1]), 2)
-
-
-def window(pile: Pile) -> Window:
-    """The whole pile, or the upper end of a long face."""
+def window(pile: Pile) -> flows.Window:
+    """Left, right, bottom and top of the picture, d: the whole pile, or the end of a long face."""
     (x, z), toe = pile.line.crest, float(pile.line.toe[0])
     if _is_level(pile):
         left = pile.line.x[1] - 2
         return left, min(pile.line.x[-2] + 2, left + LONG), -4.0, 6.0
-    beside = 0.06 * toe
     if _is_short(pile):
-        return -beside, toe + beside, -2.0, float(z) + max(0.5 * z, 6.0)
+        return -0.06 * toe, 1.06 * toe, -2.0, float(z) + max(0.5 * z, 6.0)
     return float(x) - 0.7 * LONG, float(x) + 0.3 * LONG, float(z) - 0.2 * LONG, float(z) + 12.0
-
-
-def _part(pile: Pile) -> str:
-    """A sentence for the caption where the picture leaves out a part of the bed."""
-    if _is_level(pile):
-        _, right, *_ = window(pile)
-        return f" Shown: {LONG:g} d of the bed." if right < pile.line.x[-2] else ""
-    of = " of the first form" if pile.bed.forms > 1 else ""
-    return "" if _is_short(pile) else f" Shown: the upper end of the windward face{of}."
 
 
 def _is_level(pile: Pile) -> bool:
@@ -234,7 +237,7 @@ def _is_level(pile: Pile) -> bool:
 
 def _is_short(pile: Pile) -> bool:
     """Whether single grains are seen in a picture of all forms."""
-    return float(pile.line.crest[0]) <= LONG and float(pile.line.toe[0]) <= MOST * LONG
+    return float(pile.line.crest[0]) <= LONG and float(pile.line.toe[0]) <= WHOLE * LONG
 
 
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
@@ -246,7 +249,13 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     base = np.where(counted, "e", "m")
     moved = (steps.level > 0) & (steps.level <= shown)
     look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
-    return page.fill(
+    length = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n > (right - left) / 25)
+
+    def circles(places: FloatArray, chosen: BoolArray) -> list[tuple[str, str, str]]:
+        rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
+        return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
+
+    return fill(
         "bed.svg.j2",
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
         left=left,
@@ -255,17 +264,12 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         bottom=bottom,
         ground=f"M{left:.2f} {-bottom:.2f} {_path(pile.line, left, right)} "
         f"L{right:.2f} {-bottom:.2f}Z",
-        line=[path for step, path in _paths(steps) if step <= shown][-1],
+        line=[path for stop, path in _paths(steps) if stop <= shown][-1],
         wears=len(steps.lines) > 1,
-        flow=_flow(pile, cases, (left, right, bottom, top)),
-        fixed=_circles(centres, sizes, ~mobile),
-        mobile=zip(
-            _circles(here, sizes, mobile),
-            look[mobile],
-            base[mobile],
-            strict=True,
-        ),
-        bar=_bar(right - left),
+        flow=_flow(pile, cases, (left, right, bottom, top)) if pile.model.cases else "",
+        fixed=circles(centres, ~mobile),
+        mobile=zip(circles(here, mobile), look[mobile], base[mobile], strict=True),
+        bar=length,
         size=f"{(right - left) / 75:.3g}",
         d=labels.millimetres(pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",
@@ -273,23 +277,9 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     )
 
 
-def _circles(
-    places: FloatArray, sizes: FloatArray, chosen: BoolArray
-) -> list[tuple[str, str, str]]:
-    rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
-    return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
-
-
-def _bar(width: float) -> int:
-    """Length of a scale bar, d."""
-    return next(n for n in (1, 2, 5, 10, 20, 50, 100) if n > width / 25)
-
-
-def _flow(pile: Pile, cases: Path, window: Window) -> str:
-    """The flow's speed as a pale picture; none of a theory, which has no field."""
-    if not pile.model.cases:
-        return ""
-    velocity = flow.sampled(pile, cases, window, pile.scene.grain.diameter)
+def _flow(pile: Pile, cases: Path, window: flows.Window) -> str:
+    """The flow's speed as a pale picture, PNG in base64."""
+    velocity = flows.over_u_e(pile, cases, window, pile.scene.grain.diameter)
     speed = np.linalg.norm(velocity, axis=-1)[::-1]
     colours = colormaps["Blues"](0.6 * np.clip(np.nan_to_num(speed), 0, 1), bytes=True)
     colours[np.isnan(speed), 3] = 0

@@ -1,0 +1,560 @@
+"""The answer of a study in sentences and tables, and all other words of its page."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import metadata
+from platform import python_version
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pandas as pd
+
+from orchestrator import __version__
+from orchestrator.fidelity import levels as fidelity
+from orchestrator.fidelity.calibration import lowest_floor
+from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.physics.laws import LAWS
+from orchestrator.physics.measured import MEASURED_SOURCE
+from orchestrator.physics.velocity import log_law_speed
+from orchestrator.report import labels, theory
+from orchestrator.report.results import (
+    Results,
+    by_dem,
+    held,
+    measured_hills,
+    nearest_fraction,
+    seeds_as_one,
+    split,
+    valid,
+)
+from orchestrator.runs.case import IDENTITY
+from orchestrator.runs.files import read_json
+from orchestrator.study import fields
+from orchestrator.study.closed_form import closed_form
+
+GAS_BELOW = 100.0
+"""Density that tells gases from liquids, kg/m3: a gas has a wind."""
+TELLING = 3
+"""Fields beside slope and diameter that a sentence tells of a pile."""
+FEW = 12
+"""Piles, or values of a parameter, that are listed each; of more the range is told."""
+PACKAGES = (
+    *("gmsh", "jinja2", "matplotlib", "meshio", "numpy"),
+    *("pandas", "pydantic", "pyvista", "scipy", "vtk"),
+)
+SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
+"""Columns that each row of the table of piles tells."""
+
+
+def text(results: Results) -> str:
+    """The short table, then the sentences, for a terminal."""
+    answer = "\n".join(sentences(results)) or "No case has given a result yet."
+    table = sheet(results)
+    if table is None:
+        return answer
+    rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = (
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
+    return "\n".join([*lines, "", answer])
+
+
+def sentences(results: Results) -> list[str]:
+    """The answer, from the least slope to the largest; a warning where little is usable."""
+    piles, grains = results.joined("pile_threshold"), results.joined("single_grain")
+    if len(piles):
+        hills = list(_hills(results))
+        telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:TELLING]
+        ends = _ends(results) if valid(piles).any() or not hills else []
+        answers = [*hills, *(_pile(row, results, telling) for row in ends)]
+        notes = [*_frozen(piles), *_defaults(results), *_tolerance(piles, results.study.tolerance)]
+        return [*answers, *_usable(piles), *notes]
+    return [*_grains(grains), *_usable(grains)] if len(grains) else []
+
+
+def _ends(results: Results) -> list[pd.Series]:
+    """The piles of the least and of the largest slope in each fluid; pictures show them, too."""
+    ends = []
+    for _, piles in split(results.exemplars, "rho_f_kg_m3"):
+        firsts = piles.drop_duplicates("alpha_deg")
+        ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
+    return sorted(ends, key=lambda row: float(row["alpha_deg"]))
+
+
+def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
+    single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
+    size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
+    pile = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
+    seeds = ""
+    if row["of_seeds"] > 1:
+        usable = "" if row["seeds"] == row["of_seeds"] else f" usable ones of {row['of_seeds']}"
+        ends = f"({row['least']:.3g} … {row['largest']:.3g})"
+        seeds = f" in the mean of {row['seeds']}{usable} seeds {ends}"
+    return (
+        f"{pile}: {row['fraction']:.0%} of the exposed grains move at "
+        f"{row['shields'] / single:.2g} times the stress of a single one, τ_c = "
+        f"{row['shields']:.3g}{seeds}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
+    )
+
+
+def _grains(grains: pd.DataFrame) -> Iterator[str]:
+    """The finest and the coarsest grain of the least slope."""
+    here = grains[grains["alpha_deg"] == grains["alpha_deg"].min()]
+    here = here[valid(here)] if valid(here).any() else here
+    here = here.sort_values("d_m", kind="stable")
+    for at in sorted({0, len(here) - 1}):
+        row = here.iloc[at]
+        by_run = pd.notna(row["ustar_m_s"])
+        shields = row["shields_dem" if by_run else "shields_closed_form"]
+        yield (
+            f"One grain of {labels.millimetres(row['d_m'])} on "
+            f"{labels.value('alpha_deg', row['alpha_deg'])} starts to move at "
+            f"{_flow(row, 'ustar_m_s' if by_run else 'ustar_closed_form_m_s')}, τ_c = "
+            f"{shields:.3g}{_unless(row)}."
+        )
+
+
+def _flow(row: pd.Series, column: str) -> str:
+    ustar, speed = row[column], ""
+    if pd.notna(row.get("mean_speed_m_s")):
+        speed = f", {row['mean_speed_m_s']:.2g} m/s in the mean over {row['depth_m']:g} m of depth"
+    elif row["rho_f_kg_m3"] < GAS_BELOW:
+        speed = f", {float(log_law_speed(ustar, 1.0, row['z0_m'])):.2g} m/s wind at 1 m"
+    return f"u* {ustar:.2g} m/s{speed}"
+
+
+def _unless(row: pd.Series) -> str:
+    return "" if row["usable"] else f" (not usable: {row['why_not']})"
+
+
+def _hills(results: Results) -> Iterator[str]:
+    """Where reversed flow ends behind each hill that others measured, by model and as measured."""
+    for hill, rows in measured_hills(results):
+        models = [labels.value("turbulence_model", name) for name in rows["turbulence_model"]]
+        ends = list(zip(models, rows["reattachment_over_h"].tolist(), strict=True))
+        parts = [f"by {name} to {end:.1f} h" for name, end in ends if pd.notna(end)]
+        none = [name for name, end in ends if pd.isna(end)]
+        parts += [f"none by {', '.join(none)}"] if none else []
+        end = rows["measured_reattachment_over_h"].iloc[0]
+        measured = f"measured to {end:.1f} h" if pd.notna(end) else "none measured"
+        measured += "" if rows["measured_verified"].all() else " (unverified)"
+        yield (
+            f"Reversed flow behind the top of the hill of half length {hill:g} h: {measured}; "
+            f"{', '.join(parts)}."
+        )
+
+
+def _usable(table: pd.DataFrame) -> Iterator[str]:
+    usable = int(valid(table).sum())
+    if usable < len(table):
+        yield f"Usable: {usable} of {len(table)} thresholds."
+
+
+def _frozen(piles: pd.DataFrame) -> Iterator[str]:
+    """Where the flow of the whole pile is known to be too little to go by."""
+    beyond = piles["frozen_bed"] > FROZEN_BED
+    if beyond.any():
+        least, largest = piles.loc[beyond, "fraction"].min(), piles["frozen_bed"].max()
+        yield (
+            "The flow of the whole pile acts until the last grain has gone. With "
+            f"`protocol.update = 0.1` the flow follows the bed: {int(beyond.sum())} of "
+            f"{len(piles)} thresholds then move by more than {FROZEN_BED:.0%} (up to "
+            f"{largest:.0%}, from n/N = {least:.0%} on; column frozen_bed)."
+        )
+
+
+def _defaults(results: Results) -> Iterator[str]:
+    """The levels that answered where the study file says nothing of them."""
+    chosen = [d for d in results.plan.decisions.values() if d.by_default]
+    if chosen:
+        names = ", ".join(dict.fromkeys(one.levels.text for one in chosen if one.levels))
+        error = max(one.known.total for one in chosen)
+        yield (
+            f"Answered by default on the levels {names}: at most {error:.0%} off DEM, less than "
+            f"the model's own choices move a threshold ({lowest_floor():.0%}). `--tolerance 0` "
+            "runs DEM."
+        )
+
+
+def _tolerance(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
+    """A warning about a tolerance below the interval of the model's own choices."""
+    rows = piles.dropna(subset=["shields", "shields_model_low"])
+    if not tolerance or rows.empty:
+        return
+    low = 1 - rows["shields_model_low"] / rows["shields"]
+    high = rows["shields_model_high"] / rows["shields"] - 1
+    if tolerance < float(((low + high) / 2).min()):
+        yield (
+            f"The tolerance of {tolerance:.0%} is about numerics. The choices that all models here "
+            f"share move the same thresholds by −{low.max():.0%} … +{high.max():.0%}, most by "
+            f"{rows['model_share'].mode().iloc[0]} (see `orchestrator budget`)."
+        )
+
+
+def sheet(results: Results) -> pd.DataFrame | None:
+    """The thresholds in at most a screen: of few piles each, of many their range by slope."""
+    piles = results.joined("pile_threshold")
+    if piles.empty:
+        return grains(results)
+    here = piles[piles["fraction"] == nearest_fraction(piles)]
+    one_each = seeds_as_one(here)
+    if len(one_each) <= FEW:
+        return _each(one_each)
+    tau = f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
+    return _ranges(here, ["alpha_deg", "force_law"], tau, "shields", "ustar0_m_s")
+
+
+def grains(results: Results) -> pd.DataFrame | None:
+    """By slope, force law, fluid and method: the range of the thresholds of single grains."""
+    rows = results.joined("single_grain")
+    if rows.empty:
+        return None
+    dem, values = rows["answered_method"] == "dem", {}
+    for name in ("shields", "ustar"):
+        unit = "_m_s" if name == "ustar" else ""
+        run = f"{name}_dem" if name == "shields" else name
+        for end in ("", "_low", "_high"):
+            exact = rows[f"{name}_closed_form{unit}"]
+            values[f"{name}{end}"] = rows[f"{run}{end}{unit}"].where(dem, exact)
+    by = dem.map({True: "DEM", False: "closed form"})
+    keys = ["alpha_deg", "force_law", "by"]
+    return _ranges(rows.assign(by=by, **values), keys, "τ_c", "shields", "ustar")
+
+
+def _each(rows: pd.DataFrame) -> pd.DataFrame:
+    """A row for each pile; seeds are one."""
+    telling = labels.varying(rows, "alpha_deg", "d_m", "force_law")
+    cells = []
+    for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows():
+        cell = {
+            "slope": labels.value("alpha_deg", row["alpha_deg"]),
+            "d": labels.millimetres(row["d_m"]),
+            "forces": labels.value("force_law", row["force_law"]),
+        }
+        for one in telling:
+            told = labels.is_told(one, row[one])
+            cell[labels.words(one).label] = labels.value(one, row[one]) if told else "—"
+        if (rows["of_seeds"] > 1).any():
+            ends = f": {row['least']:.4f} … {row['largest']:.4f}" if row["seeds"] > 1 else ""
+            cell["τ_c of each seed"] = f"{row['seeds']} of {row['of_seeds']}{ends}"
+        low, high = row["shields_model_low"], row["shields_model_high"]
+        model = "—" if pd.isna(low) else f"{low:.3f} … {high:.3f}, most by {row['model_share']}"
+        reached = pd.notna(row["shields"])
+        cell |= {
+            f"τ_c at n/N = {row['fraction']:.0%}": _number(row["shields"], ".4f"),
+            "interval": _interval(row["shields_low"], row["shields_high"]),
+            "model's interval": model if reached else "—",
+            "u*₀, m/s": _number(row["ustar0_m_s"], ".3f"),
+            "usable": "yes" if row["usable"] else f"no: {row['why_not']}",
+        }
+        cells.append(cell)
+    return pd.DataFrame(cells)
+
+
+def _ranges(
+    rows: pd.DataFrame, keys: list[str], tau: str, shields: str, ustar: str
+) -> pd.DataFrame:
+    """Ranges of usable thresholds by some columns; fluids are never merged."""
+    fluids = [one for one in ("rho_f_kg_m3", "nu_m2_s") if rows[one].nunique() > 1]
+    cells = []
+    for _, own in split(rows, *keys, *fluids):
+        first, usable = own.iloc[0], own[valid(own)]
+        cells.append(
+            {
+                "slope": labels.value("alpha_deg", first["alpha_deg"]),
+                "d": f"{_span(own['d_m'] * 1e3, 'g')} mm",
+                "forces": labels.value("force_law", first["force_law"]),
+                **{labels.words(one).symbol: labels.value(one, first[one]) for one in fluids},
+                **({"by": first["by"]} if "by" in keys else {}),
+                tau: _span(usable[shields], ".4f"),
+                "interval": _interval(
+                    usable[f"{shields}_low"].min(), usable[f"{shields}_high"].max()
+                ),
+                "u*₀, m/s": _span(usable[ustar], ".3f"),
+                "usable": f"{len(usable)} of {len(own)}",
+            }
+        )
+    return pd.DataFrame(cells)
+
+
+def _number(value: float, form: str) -> str:
+    return "—" if pd.isna(value) else format(float(value), form)
+
+
+def _interval(low: float, high: float) -> str:
+    return "—" if pd.isna(low) or pd.isna(high) else f"{min(low, high):.4f} … {max(low, high):.4f}"
+
+
+def _span(values: pd.Series, form: str) -> str:
+    ends = (values.min(), values.max())
+    return " … ".join(dict.fromkeys(_number(value, form) for value in ends))
+
+
+def piles(results: Results) -> pd.DataFrame | None:
+    """The thresholds of the piles, a row for each, with the name of its case last."""
+    rows = results.joined("pile_threshold")
+    if rows.empty:
+        return None
+    extra = labels.varying(rows, *SHOWN, "fraction")
+    cells = []
+    for _, own in split(rows, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
+        row = own.iloc[0]
+        slope, ratio = labels.value("alpha_deg", row["alpha_deg"]), row["z0_over_d"]
+        cell = {
+            "pile: α, d, z₀": f"{slope}, {labels.millimetres(row['d_m'])},\n"
+            f"{labels.ratio_of(ratio, 'd')}",
+            "forces, ν in m²/s": f"{labels.value('force_law', row['force_law'])}, "
+            f"{row['nu_m2_s']:g}",
+            **({"other choices": "\n".join(labels.told(row, extra))} if extra else {}),
+            "N": str(row["count"]),
+        }
+        for _, one in own.sort_values("fraction").iterrows():
+            interval = _interval(one["shields_low"], one["shields_high"])
+            cell[f"τ_c at n/N = {one['fraction']:.0%}"] = (
+                str(one["why_not"])
+                if pd.isna(one["shields"])
+                else f"{one['shields']:.4f}\n({interval})\nu*₀ {one['ustar0_m_s']:.3f} m/s"
+            )
+        cells.append({**cell, "case": row["case"] if isinstance(row["case"], str) else ""})
+    table = pd.DataFrame(cells).fillna("—")
+    return table[[*(one for one in table if one != "case"), "case"]]
+
+
+def single_grains(results: Results) -> pd.DataFrame | None:
+    """How far DEM is from the closed form, by force law, whether it holds, and protocol."""
+    rows = by_dem(results.joined("single_grain"))
+    if rows.empty:
+        return None
+    exact = rows["ustar_closed_form_m_s"]
+    width = (rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2
+    rows = rows.assign(
+        holds=np.where(valid(rows), "yes", "no"),
+        protocol=np.where(held(rows), "holds", "ramps"),
+        off=rows["ustar_m_s"] / exact - 1,
+        width=width,
+    )
+    cells = [
+        {
+            "forces": labels.value("force_law", own["force_law"].iloc[0]),
+            "law holds": own["holds"].iloc[0],
+            "protocol": own["protocol"].iloc[0],
+            "grains": str(len(own)),
+            "never moved": str(int(own["off"].isna().sum())),
+            "mean of u*/u*(closed form) − 1": f"{own['off'].mean():+.3%}",
+            "largest |u*/u*(closed form) − 1|": f"{own['off'].abs().max():.3%}",
+            "median half width of the interval": f"±{own['width'].median():.3%}",
+        }
+        for _, own in split(rows, "force_law", "holds", "protocol")
+    ]
+    table = pd.DataFrame(cells)
+    return table.sort_values(["forces", "law holds", "protocol"], ascending=False)
+
+
+def force_laws(results: Results) -> pd.DataFrame:
+    """The force laws of the scenes: where each holds, and where it was taken from."""
+    rows = []
+    for name, law in LAWS.items():
+        if (results.scenes["force_law"] == name).any():
+            low, high = law.reynolds
+            parts = [f"Re* ≥ {low:g}"] if low > 0 else []
+            parts += [f"Re* < {high:g}"] if np.isfinite(high) else []
+            if np.isfinite(law.drag_end):
+                parts.append(f"V d/ν < {law.drag_end:g} (drag: {law.drag_law})")
+            rows.append((law.label, ", ".join(parts) or "every Re*", law.reference))
+    return pd.DataFrame(rows, columns=["force law", "holds for", "source"])
+
+
+def parameters(results: Results) -> pd.DataFrame:
+    """The values that each parameter of the scenes takes."""
+    rows = []
+    for column, one in fields.COLUMNS.items():
+        asked, run = _values(results.scenes[column]), fields.ANSWERED + column
+        answered = _values(results.scenes[run]) if run in fields.ANSWERS else asked
+        if asked or answered:
+            symbol = one.info.symbol.replace("_0", "₀")
+            name = f"{one.info.label}, {symbol}" if symbol else one.info.label
+            other = "" if answered == asked else answered
+            rows.append((name, one.info.unit, one.name or column, asked or "default", other))
+    head = ["parameter", "unit", "in a study file", "asked for", "answered with, if otherwise"]
+    return pd.DataFrame(rows, columns=head)
+
+
+def _values(column: pd.Series) -> str:
+    values = list(column.dropna().unique())
+    if all(isinstance(value, str) for value in values):
+        return ", ".join(sorted(map(str, values)))
+    numbers = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
+    return (
+        ", ".join(numbers)
+        if len(numbers) <= FEW
+        else f"{len(numbers)} from {numbers[0]} to {numbers[-1]}"
+    )
+
+
+def programs(results: Results) -> pd.DataFrame:
+    """The solvers by what the cases say of them, and the libraries."""
+    used: dict[str, set[str]] = {}
+    for name in results.plan.cases:
+        identity = read_json(results.cases / name / IDENTITY)
+        solvers = identity.get("programs", {}) if isinstance(identity, dict) else {}
+        for program, version in solvers.items():
+            used.setdefault(str(program), set()).add(str(version))
+    return versions({program: ", ".join(sorted(values)) for program, values in used.items()})
+
+
+def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
+    """Solvers with their versions, this package, and the libraries that are not among them."""
+    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
+    installed = {one.metadata["Name"].lower(): one.version for one in metadata.distributions()}
+    rows += [
+        (name, installed.get(name, "not installed")) for name in PACKAGES if name not in solvers
+    ]
+    return pd.DataFrame(rows, columns=["program", "version"])
+
+
+def times(timings: pd.DataFrame) -> pd.DataFrame | None:
+    """Wall time of the finished cases by their kind: in the solver, and outside it."""
+    if timings.empty:
+        return None
+    rows = []
+    for name, own in [
+        *((str(kind), own) for (kind,), own in split(timings, "kind")),
+        ("all", timings),
+    ]:
+        wall = own["solver_s"] + own["outside_s"]
+        seconds = (own["solver_s"].sum(), own["outside_s"].sum(), wall.max())
+        rows.append((name, str(len(own)), *(f"{value:.1f}" for value in seconds)))
+    head = ["kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s"]
+    return pd.DataFrame(rows, columns=head)
+
+
+def levels(results: Results) -> pd.DataFrame | None:
+    """On which fidelity levels the piles were answered, why, and what is known of them."""
+    table = results.joined("pile_threshold")
+    rows = []
+    for (flow, grain, why), own in split(table, "flow_level", "grain_level", "why"):
+        error = own["error_estimate"].max()
+        rows.append(
+            {
+                "flow | grains": f"{flow} | {grain}",
+                "description": fidelity.meaning([str(flow), str(grain)]),
+                "reason": str(why),
+                "piles": str(own["scene_id"].nunique()),
+                "known error of τ_c, up to": "not known"
+                if pd.isna(error)
+                else f"{100 * error:.1f} %",
+            }
+        )
+    return pd.DataFrame(rows) if rows else None
+
+
+def checks(results: Results) -> pd.DataFrame | None:
+    """The piles that DEM answered as well: how far the cheap answers are from it."""
+    rows = [
+        {
+            "piles": f"{labels.amount(one['alpha_deg'], '°')}, {one['packing']}, "
+            f"{labels.value('force_law', one['force_law'])}",
+            "d": f"{1e3 * one['d_m']:g} mm",
+            "n/N": f"{one['fraction']:.0%}",
+            "τ_c": f"{one['shields']:.4g}",
+            "by DEM": f"{one['shields_dem']:.4g} "
+            f"({one['shields_dem_low']:.4g} … {one['shields_dem_high']:.4g})",
+            "difference": f"{100 * one['difference']:+.1f} %",
+            "agree": "yes" if one["agree"] else "no",
+            "case": str(one["case"]),
+        }
+        for one in results.tables.get("check", pd.DataFrame()).to_dict("records")
+    ]
+    return pd.DataFrame(rows) if rows else None
+
+
+def remarks(results: Results) -> dict[str, Any]:
+    """Counts that a reader must know before using this study's results; 0 or None is no remark."""
+    scenes, thresholds = results.scenes, results.joined("pile_threshold")
+    outside = scenes[~valid(scenes)]
+    both = outside["force_law"].isin(theory.PAIR) & (outside["regime"] == "transition")
+    counts: dict[str, Any] = {
+        "outside": len(outside),
+        "transition": int(both.sum()),
+        "unreached": int(thresholds["shields"].isna().sum()) if len(thresholds) else 0,
+        "thresholds": len(thresholds),
+        "far": (0, 0),
+        "silent": 0,
+    }
+    curve = results.tables.get("pile_curve", pd.DataFrame())
+    for name in ("carried_off", "fallen_upstream"):
+        largest = curve.groupby("scene_id")[name].max() if len(curve) else pd.Series(dtype=int)
+        counts[name] = (int((largest > 0).sum()), int(largest.max() if len(largest) else 0))
+    grains = by_dem(results.joined("single_grain"))
+    if len(grains):
+        ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]
+        far = ((ratio - 1).abs() > 0.01) & held(grains)
+        counts["far"] = (int(far.sum()), int((far & valid(grains)).sum()))
+        counts["silent"] = int(ratio.isna().sum())
+    return counts
+
+
+def contents(
+    results: Results, timings: pd.DataFrame, failures: Mapping[str, str]
+) -> dict[str, Any]:
+    """The words and numbers of the page beside its figures, by the names of its template.
+
+    Parameters
+    ----------
+    results : Results
+        The results of the study.
+    timings : DataFrame
+        Wall times of the finished cases.
+    failures : mapping of str to str
+        Causes by name of case.
+    """
+    from orchestrator.report import flows, measured  # both import what draws
+
+    ranked = measured.fits(results)
+    eq10 = flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else (0.0, 0.0)
+    methods = set(results.scenes["answered_method"])
+    run = [pile.scene for pile in results.plan.piles.values()]
+    root, names = (
+        results.cases.name,
+        [n for n in results.plan.cases if (results.cases / n).is_dir()],
+    )
+    foams = (path for name in names for path in sorted((results.cases / name).glob("*.foam")))
+    foam = next(foams, None)
+    return {
+        "title": results.study.title,
+        "study": results.study,
+        "scene_count": len(results.scenes),
+        "case_count": len(results.plan.cases),
+        "piles": piles(results),
+        "grains": grains(results),
+        "single_grains": single_grains(results),
+        "levels": levels(results),
+        "checks": checks(results),
+        "remarks": remarks(results),
+        "paper_pair": bool(results.scenes["force_law"].isin(theory.PAIR).any()),
+        "force_laws": force_laws(results),
+        "measured_source": MEASURED_SOURCE,
+        "factors_from": measured.FACTORS_FROM,
+        "measured": list(measured.sentences(results.beds("grain"), ranked)) if ranked else None,
+        "best_laws": measured.sheet(measured.best(ranked)),
+        "every_law": measured.sheet(ranked),
+        "answer": sentences(results),
+        "short": sheet(results),
+        "failures": failures,
+        "links": {name: quote(f"{root}/{name}/") for name in names},
+        "tables": list(results.tables),
+        "parameters": parameters(results),
+        "programs": programs(results),
+        "times": times(timings),
+        "wall_stress": bool(results.flows),
+        "eq10_mean": eq10[0],
+        "eq10_crest": eq10[1],
+        "by_dem": "dem" in methods,
+        "without_dem": bool(methods - {"dem"}),
+        "mixed": any(scene.grain.sizes is not None for scene in run),
+        "strips": any(pile.bed.width for pile in results.plan.piles.values()),
+        "example_case": names[-1] if names else "NAME",
+        "example_foam": f"{foam.parent.name}/{foam.name}" if foam else "",
+    }
