@@ -14,10 +14,8 @@ import pandas as pd
 from orchestrator.plan import Plan
 from orchestrator.study.study import Study
 from orchestrator.tables import piles, scenes
-from orchestrator.tables.columns import COLUMNS
-from orchestrator.tables.scatter import with_scatter
-from orchestrator.tables.text import csv, read, write
-from orchestrator.tables.usable import with_usable
+from orchestrator.tables.text import COLUMNS, csv, read, write
+from orchestrator.tables.usable import with_scatter, with_usable
 
 Tables = dict[str, pd.DataFrame]
 

@@ -1,16 +1,22 @@
-"""Tables as CSV files."""
+"""Tables as CSV files, and the meanings of their columns."""
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from io import BytesIO
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 import pandas as pd
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs.files import Folder
-from orchestrator.tables.columns import COLUMNS
+from orchestrator.study import fields
 
+COLUMNS: dict[str, str] = {
+    **pd.read_csv(Path(__file__).with_name("columns.csv"), index_col="column")["meaning"],
+    **{column: one.phrase for column, one in fields.COLUMNS.items()},
+    **{column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()},
+}
+"""Every column of every table, with its meaning; units are in the names."""
 BEGINS = ("=", "+", "-", "@", "\t", "\n")
 """Spreadsheets run a cell that begins with one of these as a formula."""
 NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.tables.scatter import with_scatter
+from orchestrator.tables.usable import with_scatter
 
 
 def _tables() -> tuple[pd.DataFrame, pd.DataFrame]:

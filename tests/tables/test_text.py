@@ -12,7 +12,7 @@ import pytest
 from orchestrator import tables
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs.files import Folder
-from orchestrator.tables.columns import COLUMNS
+from orchestrator.tables import COLUMNS
 
 FORMULAS = ["=1+1", "+A1", "-A1", "@SUM(A1)", "\t=1", "\r=1", "=cmd|' /C calc'!A0", "-rf"]
 
