@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 from orchestrator.errors import OrchestratorError, SolverError
 from orchestrator.runs.files import (
-    TEMPORARY,
     Folder,
     canonical_json,
     digest_file,
@@ -181,7 +180,7 @@ def prepare(case: Case, cases: Path) -> Path:
         if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
             return bool(inputs[name] == _digest(old / name))
         path = PurePosixPath(name)
-        final = path.with_name(TEMPORARY.sub(r"\1", path.name)).as_posix()
+        final = path.with_name(re.sub(r"^\.(.+)\.tmp$", r"\1", path.name)).as_posix()
         return final in names or _fits(final, patterns)
 
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)

@@ -44,13 +44,7 @@ def digest_files(paths: Iterable[Path], *, root: Path) -> dict[str, str]:
 
 
 def opened(path: Path) -> BufferedReader:
-    """Open a file to read it; a pipe or a device, which might never end, is refused.
-
-    Raises
-    ------
-    OSError
-        If it is not a file, or cannot be read.
-    """
+    """Open a file to read it; OSError also for a pipe or a device, which might never end."""
     handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -74,7 +68,7 @@ def write_json(path: Path, value: Any) -> None:
 
 def write_durably(path: Path, content: str | bytes) -> None:
     """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = path.with_name(f".{path.name}.tmp")
     try:
         temporary.unlink(missing_ok=True)
         with temporary.open("xb") as stream:
@@ -101,17 +95,12 @@ def remove_empty_directory(path: Path) -> None:
 
 def size_of(path: Path) -> int:
     """Size of a file, or of all files below a directory, bytes; a file that vanishes counts 0."""
-    if path.is_symlink() or not path.is_dir():
-        return _size(path)
-    files = (Path(folder) / name for folder, _, names in os.walk(path) for name in names)
-    return sum(map(_size, files))
-
-
-def _size(path: Path) -> int:
-    try:
+    if path.is_dir() and not path.is_symlink():
+        walked = os.walk(path)
+        return sum(size_of(Path(folder, name)) for folder, _, names in walked for name in names)
+    with contextlib.suppress(OSError):
         return path.lstat().st_size
-    except OSError:
-        return 0
+    return 0
 
 
 RECORD = "written.sha256"
@@ -119,12 +108,7 @@ RECORD = "written.sha256"
 is written: a killed process leaves no file that is not listed."""
 KEPT = "kept"
 """Where files are moved that stand in the way and that this program did not write."""
-TEMPORARY = re.compile(r"^\.(.+)\.\d+\.tmp$")
-"""Pattern of files that a killed process was about to write, with their final names."""
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
-
-Ours = Callable[[str], bool]
-"""Whether a file is this program's, from its name."""
 
 
 class Folder:
@@ -146,36 +130,45 @@ class Folder:
     def __init__(self, root: Path) -> None:
         self.root = root
 
+    def path(self, name: str) -> Path:
+        """The path of a name, no part of which is a link or leads out of the directory."""
+        parts = PurePosixPath(name).parts
+        if not parts or ".." in parts or parts[0] == "/":
+            raise InputError(f"{name!r} leads out of the directory", where=str(self.root))
+        for path in itertools.accumulate(parts, Path.joinpath, initial=self.root):
+            if path != self.root and path.is_symlink():
+                raise InputError(
+                    f"it is a link to {os.readlink(path)}, and this program writes through none",
+                    where=str(path),
+                    remedy="remove the link; the directory as a whole may lie elsewhere: --out",
+                )
+        return path
+
     def put(self, name: str, content: str | bytes) -> None:
         """Write a file in one step; a file of its name that was not put there is kept aside."""
         data = content.encode() if isinstance(content, str) else content
         with self._naming(RECORD):
-            record = self.path(RECORD)
-            if not self._is_record():
-                self._make_way(RECORD, lambda _: False)
-            elif record.stat().st_nlink > 1:  # a second name of the file, in a backup, keeps it
-                write_durably(record, record.read_bytes())
-            with record.open("ab", buffering=0) as stream:
-                stream.write(os.fsencode(f"{hashlib.sha256(data).hexdigest()}  {name}\n"))
-        self._write(name, data, self._is_put)
+            record = self._way(RECORD, is_ours=True)
+            text = self._text()
+            if text and record.stat().st_nlink > 1:  # a backup may have a second name of the file
+                write_durably(record, os.fsencode(text))
+            end = "" if text.endswith("\n") or not text else "\n"
+            with record.open("ab", buffering=0) as stream:  # processes may add side by side
+                stream.write(f"{end}{hashlib.sha256(data).hexdigest()}  {name}\n".encode())
+        with self._naming(name):
+            write_durably(self._way(name), data)
 
     def note(self, name: str, content: str | bytes) -> None:
         """Write a file whose name is this program's whatever it holds; it is not recorded."""
-        self._write(name, content, lambda _: True)
-
-    def make(self, name: str) -> None:
-        """Make a sub-directory if it is missing, before processes put files into it at once."""
         with self._naming(name):
-            self._make(self.path(name))
+            write_durably(self._way(name, is_ours=True), content)
 
     def drop(self, name: str) -> None:
         """Remove a file; one that was not put, or has changed since, is kept aside."""
         with self._naming(name):
-            path = self.path(name)
-            self._make_way(name, self._is_put)
-            path.unlink(missing_ok=True)
+            self._way(name).unlink(missing_ok=True)
 
-    def clear(self, name: str, is_ours: Ours) -> Path:
+    def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
         """Make way for a sub-directory; files of others in it are kept aside as they lie.
 
         Parameters
@@ -191,16 +184,14 @@ class Folder:
             Its place, which is empty now, in a directory that exists.
         """
         with self._naming(name):
-            path = self._reach(name)
+            path = self.path(name)
             for place, _, files in os.walk(path, topdown=False):
-                for file in (Path(place) / each for each in files):
+                for file in (Path(place, each) for each in files):
                     if not file.is_symlink() and is_ours(file.relative_to(path).as_posix()):
                         file.unlink()
                 with contextlib.suppress(OSError):
-                    Path(place).rmdir()
-            if os.path.lexists(path):
-                self._keep(name)
-        return path
+                    os.rmdir(place)
+            return self._way(name)
 
     @contextlib.contextmanager
     def renewed(self, *places: str, but: Sequence[str] = ()) -> Iterator[None]:
@@ -214,24 +205,27 @@ class Folder:
         self._write_record(before)
         yield
         new = self._lines()[len(before) :]
-        old = [
+        old = {
             (digest, name)
             for digest, name in before
             if name not in but and (not places or PurePosixPath(name).parts[0] in places)
-        ]
+        }
+        again = {name for _, name in new}
         for digest, name in old:
-            if name not in {name for _, name in new} and self._digest(name) == digest:
+            if name not in again and self._digest(name) == digest:
                 self.drop(name)
         self._write_record([*(line for line in before if line not in old), *new])
 
-    def read(self, name: str) -> bytes:
-        """Read a file that was put.
+    def written(self, but: Sequence[str] = ()) -> dict[str, str]:
+        """Digests of all files that were put, except for `but`, by name."""
+        return {name: digest for digest, name in self._lines() if name not in but}
 
-        Raises
-        ------
-        OrchestratorError
-            If it is not there as it was put.
-        """
+    def is_whole(self, but: Sequence[str] = ()) -> bool:
+        """Whether all files that were put, except for `but`, are unchanged."""
+        return all(self._digest(name) == digest for name, digest in self.written(but).items())
+
+    def read(self, name: str) -> bytes:
+        """Read a file that was put; OrchestratorError if it is not there as it was put."""
         with self._naming(name), opened(self.path(name)) as stream:
             data = stream.read()
         if hashlib.sha256(data).hexdigest() != self.written().get(name):
@@ -242,70 +236,21 @@ class Folder:
             )
         return data
 
-    def written(self, but: Sequence[str] = ()) -> dict[str, str]:
-        """Digests of all files that were put, except for `but`, by name."""
-        return {name: digest for digest, name in self._lines() if name not in but}
+    def _way(self, name: str, *, is_ours: bool = False) -> Path:
+        """The path of a name, with its directory made and anything of others moved away.
 
-    def is_whole(self, but: Sequence[str] = ()) -> bool:
-        """Whether all files that were put, except for `but`, are unchanged."""
-        return all(self._digest(name) == digest for name, digest in self.written(but).items())
-
-    def path(self, name: str) -> Path:
-        """The path of a name, no part of which is a link.
-
-        Raises
-        ------
-        InputError
-            Naming the link, or the name that leads out of the directory.
+        A file of that name stays if it is this program's: it was put, or `is_ours`.
         """
-        parts = PurePosixPath(name).parts
-        if not parts or ".." in parts or parts[0] == "/":
-            raise InputError(f"{name!r} leads out of the directory", where=str(self.root))
-        path = self.root
-        for part in parts:
-            path = path / part
-            if path.is_symlink():
-                raise InputError(
-                    f"it is a link to {os.readlink(path)}, and this program writes through none",
-                    where=str(path),
-                    remedy="remove the link; the directory as a whole may lie elsewhere: --out",
-                )
-        return path
-
-    def drop_temporaries(self, *names: str) -> None:
-        """Remove the temporary files that a killed process left of some names and those put."""
-        listed = {PurePosixPath(name) for name in (*names, *self.written())}
-        for folder in {name.parent for name in listed}:
-            for path in (self.root / folder).glob(".*.tmp"):
-                target = TEMPORARY.fullmatch(path.name)
-                if target and folder / target[1] in listed and _is_file(path):
-                    path.unlink()
-
-    def _write(self, name: str, content: str | bytes, is_ours: Ours) -> None:
-        with self._naming(name):
-            path = self._reach(name)
-            self._make_way(name, is_ours)
-            write_durably(path, content)
-
-    def _reach(self, name: str) -> Path:
-        """The path of a name, in a directory that exists."""
         path = self.path(name)
-        for folder in reversed(PurePosixPath(name).parents[:-1]):
-            self._make(self.root / folder)
-        return path
-
-    def _make(self, path: Path) -> None:
-        if os.path.lexists(path) and not path.is_dir():
-            self._keep(path.relative_to(self.root).as_posix())
-        path.mkdir(exist_ok=True)
-
-    def _make_way(self, name: str, is_ours: Ours) -> None:
-        """Move away anything in a place but a file of this program or an empty directory."""
-        path = self.root / name
+        for folder in reversed(path.relative_to(self.root).parents[:-1]):
+            if os.path.lexists(self.root / folder) and not (self.root / folder).is_dir():
+                self._keep(folder.as_posix())
+            (self.root / folder).mkdir(exist_ok=True)
         with contextlib.suppress(OSError):
             path.rmdir()
-        if os.path.lexists(path) and not (path.is_file() and is_ours(name)):
+        if os.path.lexists(path) and not (path.is_file() and (is_ours or self._is_put(name))):
             self._keep(name)
+        return path
 
     def _keep(self, name: str) -> None:
         """Move something that is not this program's to a free place below `KEPT`."""
@@ -330,23 +275,17 @@ class Folder:
         except (OSError, InputError):
             return None
 
+    def _text(self) -> str:
+        record = self.path(RECORD)
+        return os.fsdecode(record.read_bytes()) if record.is_file() else ""
+
     def _lines(self) -> list[tuple[str, str]]:
         """Digests and names of the record, as far as it can be read."""
-        return [(line[1], line[2]) for line in map(_LINE.fullmatch, self._text()) if line]
-
-    def _text(self) -> list[str]:
-        record = self.path(RECORD)
-        return os.fsdecode(record.read_bytes()).split("\n") if _is_file(record) else []
-
-    def _is_record(self) -> bool:
-        """Whether the record's file holds lines of a record and nothing else."""
-        return _is_file(self.root / RECORD) and all(
-            not line or _LINE.fullmatch(line) for line in self._text()
-        )
+        lines = map(_LINE.fullmatch, self._text().split("\n"))
+        return [(line[1], line[2]) for line in lines if line]
 
     def _write_record(self, lines: Iterable[tuple[str, str]]) -> None:
-        text = "".join(f"{digest}  {name}\n" for digest, name in dict.fromkeys(lines))
-        self._write(RECORD, os.fsencode(text), lambda _: self._is_record())
+        self.note(RECORD, "".join(f"{digest}  {name}\n" for digest, name in dict.fromkeys(lines)))
 
     @contextlib.contextmanager
     def _naming(self, name: str) -> Iterator[None]:
@@ -355,7 +294,3 @@ class Folder:
             yield
         except OSError as error:
             raise of_system(error, str(self.root / name)) from None
-
-
-def _is_file(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink()

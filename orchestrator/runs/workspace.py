@@ -103,7 +103,6 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
                 remedy=f"choose another{kind.option}",
             ) from None
         _check(folder, kind, name)  # another process may have been first
-        folder.drop_temporaries(RECORD, kind.marker)
         if new and read_marker(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
         yield folder
