@@ -1,6 +1,5 @@
 """A small study that faults are injected into, its driver as a process, its undisturbed tables."""
 
-import contextlib
 import os
 import shutil
 import signal
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 HEAD = """
 time_limit = 300
 [protocol]
@@ -36,6 +36,7 @@ grain = { diameter = 2e-3 }
 bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30", mobile_layers = 1 }
 flow = { cells_per_face = 10 }
 """
+Driver = subprocess.Popen[str]
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Bench:
 
     folder: Path
     undisturbed: Path
-    drivers: "list[subprocess.Popen[str]]" = field(default_factory=list)
+    drivers: list[Driver] = field(default_factory=list)
 
     @property
     def environment(self) -> dict[str, str]:
@@ -62,31 +63,20 @@ class Bench:
         return {**os.environ, "PYTHONPATH": str(ROOT)}
 
     @property
+    def source(self) -> Path:
+        """The study file."""
+        return self.folder / "small.toml"
+
+    @property
     def out(self) -> Path:
         """The study's directory."""
         return self.folder / "out"
 
-    def start(
-        self,
-        *,
-        programs: Path | None = None,
-        python: Sequence[str] = ("-m", "orchestrator"),
-        under: Sequence[str] = (),
-    ) -> "subprocess.Popen[str]":
-        """Start the study's driver.
-
-        Parameters
-        ----------
-        programs : Path, optional
-            Holds programs that stand before the real ones.
-        python : sequence of str
-            What Python runs.
-        under : sequence of str
-            A command that becomes the driver, such as nohup.
-        """
+    def start(self, *, programs: Path | None = None, under: Sequence[str] = ()) -> Driver:
+        """Start the study's driver, with programs before the real ones, under a command."""
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
         driver = subprocess.Popen(
-            [*under, sys.executable, *python, "study", "small.toml", "--out", str(self.out)],
+            [*under, *ORCHESTRATOR, "study", "small.toml", "--out", str(self.out)],
             cwd=self.folder,
             env={**self.environment, "PATH": os.pathsep.join(paths)},
             stdout=subprocess.PIPE,
@@ -104,15 +94,16 @@ class Bench:
                 driver.kill()
 
     def study(self, *, programs: Path | None = None) -> tuple[int, str]:
-        """Run the study to its end; its exit code and what it said."""
+        """Run the study to its end; its exit code and what it printed."""
         return ended(self.start(programs=programs))
 
     def check_finished(self) -> None:
         """See that the same command ends well, with the tables of the undisturbed run."""
-        code, said = self.study()
-        assert code == 0, said
+        code, printed = self.study()
+        assert code == 0, printed
         assert (self.out / "report.html").is_file()
         assert same_tables(self.out, self.undisturbed)
+        assert none_left_in(self.folder)
         assert not list(self.out.rglob("*.tmp"))
 
 
@@ -120,44 +111,42 @@ def undisturbed(folder: Path, text: str) -> Path:
     """The directory of a study that has run to its end; it is run once."""
     bench = Bench(folder, folder / "out")
     if not (bench.out / "report.html").is_file():
-        (folder / "small.toml").write_text(text)
-        code, said = bench.study()
-        assert code == 0, said
+        bench.source.write_text(text)
+        code, printed = bench.study()
+        assert code == 0, printed
     return bench.out
 
 
-def ended(driver: "subprocess.Popen[str]", limit_s: float = 600.0) -> tuple[int, str]:
-    """Wait for a driver; its exit code and all that it said, which holds no traceback."""
-    out, said = driver.communicate(timeout=limit_s)
-    assert "Traceback" not in said
-    return driver.returncode, out + said
+def ended(driver: Driver) -> tuple[int, str]:
+    """Wait for a driver; its exit code and all that it printed, which holds no traceback."""
+    out, printed = driver.communicate(timeout=600)
+    assert "Traceback" not in printed
+    return driver.returncode, out + printed
 
 
-def same_tables(one: Path, other: Path) -> bool:
+def same_tables(first: Path, second: Path) -> bool:
     """Whether two studies have the same tables of results, byte for byte."""
-    names = {path.name for path in (one / "tables").iterdir()}
-    return names == {path.name for path in (other / "tables").iterdir()} and all(
-        (one / "tables" / name).read_bytes() == (other / "tables" / name).read_bytes()
-        for name in names
+    one, other = (
+        {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
+        for out in (first, second)
     )
+    return one == other
 
 
-def wait_for(seen: Callable[[], bool], driver: "subprocess.Popen[str]") -> bool:
+def wait_for(seen: Callable[[], bool], driver: Driver) -> bool:
     """Wait until something is seen; False if the driver ends before that."""
-    limit = time.monotonic() + 300.0
     while not seen():
-        if driver.poll() is not None or time.monotonic() > limit:
+        if driver.poll() is not None:
             return False
         time.sleep(0.001)
     return True
 
 
-def pause(driver: "subprocess.Popen[str]") -> None:
+def pause(driver: Driver) -> None:
     """Pause a driver where it is, unless it has ended."""
     driver.send_signal(signal.SIGSTOP)
     while driver.poll() is None:
-        state = Path(f"/proc/{driver.pid}/stat").read_text().rpartition(")")[2].split()[0]
-        if state in "TZ":
+        if Path(f"/proc/{driver.pid}/stat").read_text().rpartition(")")[2].split()[0] in "TZ":
             return
         time.sleep(0.001)
 
@@ -165,15 +154,13 @@ def pause(driver: "subprocess.Popen[str]") -> None:
 def processes_in(folder: Path) -> dict[int, str]:
     """Names of the living processes that work below a folder, by their number."""
     found = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                inside = Path(os.readlink(entry / "cwd")).is_relative_to(folder)
-                alive = (entry / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
-                if inside and alive:
-                    found[int(entry.name)] = (entry / "comm").read_text().strip()
-            except OSError:
-                continue
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            inside = Path(os.readlink(entry / "cwd")).is_relative_to(folder)
+            if inside and (entry / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                found[int(entry.name)] = (entry / "comm").read_text().strip()
+        except OSError:
+            continue
     return found
 
 
@@ -184,20 +171,6 @@ def none_left_in(folder: Path) -> bool:
             return True
         time.sleep(0.05)
     return False
-
-
-def kill_program(cases: Path, kind: str, name: str, number: signal.Signals) -> bool:
-    """Send a signal to the program of a name in a case of a kind; whether there was one."""
-    pids = [
-        pid
-        for case in cases.glob(f"{kind}-*")
-        for pid, found in processes_in(case).items()
-        if found == name
-    ]
-    for pid in pids:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, number)
-    return bool(pids)
 
 
 def wrapper(folder: Path, program: str, before: str) -> Path:

@@ -1,43 +1,18 @@
-"""The studies that faults are injected into, and the count of the faults."""
+"""The studies that faults are injected into, and a file system of their own."""
 
-from collections.abc import Iterator
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.conftest import Shared
 from tests.faults.bench import CELLS, HEAD, PILE, Bench, undisturbed
-from tests.faults.ledger import Ledger
 
-LEDGER = Ledger()
-
-
-@pytest.fixture(scope="session")
-def ledger() -> Ledger:
-    return LEDGER
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    # a process among several has a place for what it tells the one that started it
-    if (output := getattr(session.config, "workeroutput", None)) is not None:
-        output["ledger"] = LEDGER.told()
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node: Any) -> None:
-    LEDGER.hear(getattr(node, "workeroutput", {}).get("ledger", []))
-
-
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config
-) -> None:
-    if LEDGER.runs:
-        assert config.cache
-        path = LEDGER.write(config.cache.mkdir("faults"))
-        terminalreporter.section(f"faults, {path}")
-        terminalreporter.write_line(LEDGER.table().to_string(index=False))
+Mount = Callable[[str], Path]
 
 
 @pytest.fixture(scope="session")
@@ -61,3 +36,29 @@ def cells(tmp_path: Path, finished_cells: Path) -> Iterator[Bench]:
     (tmp_path / "small.toml").write_text(HEAD + CELLS)
     with closing(Bench(tmp_path, finished_cells)) as bench:
         yield bench
+
+
+@pytest.fixture
+def finished(cells: Bench) -> Bench:
+    """The study of two cells, finished."""
+    shutil.copytree(cells.undisturbed, cells.out)
+    return cells
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Mount]:
+    """Mount a file system of its own with some options, or mount it anew with others."""
+    folder = tmp_path / "disk"
+
+    def mount(options: str) -> Path:
+        again = "remount," if folder.exists() else ""
+        folder.mkdir(exist_ok=True)
+        command = ["mount", "-t", "tmpfs", "-o", again + options, "tmpfs", str(folder)]
+        if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode:
+            folder.rmdir()
+            pytest.skip("a file system can be mounted by root alone")
+        return folder
+
+    yield mount
+    if folder.exists():
+        subprocess.run(["umount", str(folder)], check=True)

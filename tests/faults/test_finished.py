@@ -5,21 +5,17 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator import cli, plan
 from orchestrator.runs import case
+from orchestrator.runs.files import read_json
 from orchestrator.study import study
-from tests.faults.bench import HEAD, PILE, Bench, case_of, same_tables
-
-
-@pytest.fixture
-def finished(cells: Bench) -> Bench:
-    shutil.copytree(cells.undisturbed, cells.out)
-    return cells
+from tests.faults.bench import HEAD, ORCHESTRATOR, PILE, ROOT, Bench, case_of, same_tables
+from tests.faults.conftest import Mount
 
 
 def _lose_cases(out: Path) -> None:
@@ -46,29 +42,59 @@ def test_tables_whose_cases_are_not_here_are_kept(
     assert {**after, finished.out / ".lock": b""} == {**before, finished.out / ".lock": b""}
 
 
-@pytest.fixture
-def full_disk(finished: Bench) -> Iterator[Path]:
-    """A file system without any room that holds the finished study."""
-    disk = finished.folder / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=20M", "tmpfs", str(disk)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("a file system can be mounted by root alone")
-    shutil.copytree(finished.out, disk / "out")
-    subprocess.run(
-        ["sh", "-c", "head -c 30000000 /dev/zero >filler"], cwd=disk, stderr=subprocess.DEVNULL
-    )
-    yield disk / "out"
-    subprocess.run(["umount", str(disk)], check=True)
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
-def test_prune_makes_room_on_a_full_disk(
-    full_disk: Path, capsys: pytest.CaptureFixture[str]
+def test_a_pruned_study_is_finished_and_its_page_is_the_same(
+    pile: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert list(full_disk.glob("cases/*/*.dump"))
-    assert cli.main(["prune", str(full_disk)]) == 0, capsys.readouterr().err
-    assert not list(full_disk.glob("cases/*/*.dump"))
-    assert all((path / case.DONE).is_file() for path in full_disk.glob("cases/*"))
+    shutil.copytree(pile.undisturbed, pile.out)
+    (cells,) = case_of(pile.out, "cells")
+    assert cli.main(["status", str(pile.out)]) == 0
+    size = float(capsys.readouterr().out.partition("size: ")[2].split()[0])
+    assert size == pytest.approx(_size(pile.out) / 1e6, rel=0.01)
+    assert cli.main(["prune", str(pile.out)]) == 0
+    printed = capsys.readouterr().out
+    assert "pruned: 1 cases" in printed
+    # the page shows the pile and its flow
+    assert all(next(case_of(pile.out, kind)).name in printed for kind in ("pile", "flow"))
+    assert not list(cells.glob("*.dump"))
+    assert case.size(cells, read_json(cells / case.DONE) or {}) == _size(cells)
+    assert cli.main(["study", str(pile.source), "--out", str(pile.out)]) == 0
+    assert "no solver was started" in capsys.readouterr().err
+    assert cli.main(["report", str(pile.out)]) == 0
+    assert same_tables(pile.out, pile.undisturbed)
+    names = [
+        {path.name for path in (out / "figures").iterdir()} for out in (pile.out, pile.undisturbed)
+    ]
+    assert names[0] == names[1]
+
+
+def test_every_case_can_be_pruned_and_run_again_by_hand(pile: Bench) -> None:
+    shutil.copytree(pile.undisturbed, pile.out)
+    cases = pile.out / "cases"
+    for run in plan.make(study.load(str(pile.source))).cases.values():
+        case.prune(run, cases)
+        assert case.is_done(run, cases)
+        assert not case.is_whole(run, cases)
+        subprocess.run(["./Allrun"], cwd=cases / run.name, check=True)
+        assert case.is_whole(run, cases)
+        assert case.is_done(run, cases)
+        (cases / run.name / case.DONE).unlink()
+        case.prune(run, cases)  # it is not done: nothing is dropped
+        assert list((cases / run.name).glob("*.dump")) or run.kind == "flow"
+
+
+def test_prune_makes_room_on_a_full_disk(finished: Bench, disk: Mount) -> None:
+    out = disk("size=20M") / "out"
+    shutil.copytree(finished.out, out)
+    fill = "head -c 30000000 /dev/zero >filler 2>/dev/null"
+    subprocess.run(["sh", "-c", fill], cwd=out.parent)
+    assert list(out.glob("cases/*/*.dump"))
+    assert cli.main(["prune", str(out)]) == 0
+    assert not list(out.glob("cases/*/*.dump"))
+    assert all((path / case.DONE).is_file() for path in out.glob("cases/*"))
 
 
 def test_a_marker_vouches_for_its_own_case_alone(
@@ -108,13 +134,10 @@ def test_two_files_of_one_name_do_not_share_a_directory(
 
 
 def _command(folder: Path, *words: str, **variables: str) -> "subprocess.CompletedProcess[str]":
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), **variables}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
     return subprocess.run(
         words, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
-
-
-ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 
 
 def test_warnings_that_are_errors_end_no_command(tmp_path: Path) -> None:
