@@ -10,14 +10,13 @@ import numpy as np
 
 from orchestrator.fidelity import calibration, decision, limits
 from orchestrator.fidelity.decision import Decision
-from orchestrator.fidelity.levels import Pair, changed
+from orchestrator.fidelity.levels import changed
 from orchestrator.flow.channel import mean_speed
 from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.plan import Plan
 from orchestrator.study.scene import Scene
@@ -76,40 +75,42 @@ def grains(answer: Answer) -> Columns:
 
 def size_class_rows(answer: Answer) -> Iterator[Row]:
     """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
-    pile, scene = answer.pile, answer.pile.scene
-    if not pile.pouring:
-        return
-    listed = list(classes.classes(pile.packing.sizes[pile.packing.windward]))
+    pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
+    sizes = classes.classes(pile.packing.sizes[pile.packing.windward]) if pile.pouring else ()
+    listed = [(one, classes.of(motion, one.chosen)) for one in sizes]
     for fraction in scene.protocol.fractions:
-        found = {one.number: _of_class(answer, one, fraction) for one in listed}
-        middle = found[0]["shields_own"] if 0 in found else np.nan
-        whole = threshold.first_level(answer.motion, fraction)
-        for one in listed:
-            moved = answer.motion.moved_by(whole or 0)[one.chosen]
+        found = {
+            one.number: threshold.of_pile(
+                own, answer.face.speed[one.chosen], fraction, scene.fluid.density
+            )
+            for one, own in listed
+        }
+        middle = next(
+            (shields(scene, found[0].tau) / one.size for one, _ in listed if one.number == 0),
+            np.nan,
+        )
+        whole = threshold.first_level(motion, fraction)
+        for one, _ in listed:
+            row = found[one.number]
+            value, low, high = (
+                shields(scene, tau) / one.size for tau in (row.tau, row.tau_low, row.tau_high)
+            )
+            moved = motion.moved_by(whole or 0)[one.chosen]
             yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
                 "size_over_d": one.size,
                 "count": int(one.chosen.sum()),
                 "class_moved": moved.mean() if whole else np.nan,
-                **found[one.number],
+                "ustar0_m_s": row.ustar0,
+                "shields_own": value,
+                "shields_own_low": low,
+                "shields_own_high": high,
                 # the grains of the middle class may lie loose: no ratio to a threshold of zero
-                "hiding": found[one.number]["shields_own"] / middle if middle > 0 else np.nan,
+                "hiding": value / middle if middle > 0 else np.nan,
                 "hiding_wilcock_crowe": float(wilcock_crowe_hiding(one.size) / one.size),
                 "hiding_egiazaroff": float(egiazaroff_hiding(one.size)),
             }
-
-
-def _of_class(answer: Answer, one: classes.SizeClass, fraction: float) -> Row:
-    scene, speed = answer.pile.scene, answer.face.speed[one.chosen]
-    motion = classes.of(answer.motion, one.chosen)
-    found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
-    names = ("shields_own", "shields_own_low", "shields_own_high")
-    stresses = (found.tau, found.tau_low, found.tau_high)
-    return {
-        "ustar0_m_s": found.ustar0,
-        **{n: shields(scene, tau) / one.size for n, tau in zip(names, stresses, strict=True)},
-    }
 
 
 def curve(answer: Answer) -> Columns:
@@ -134,64 +135,59 @@ def curve(answer: Answer) -> Columns:
 
 
 def threshold_rows(answer: Answer) -> Iterator[Row]:
-    """The threshold of a pile at each fraction that its scene asks for."""
-    pile, motion, speed = answer.pile, answer.motion, answer.face.speed
-    scene = pile.scene
+    """The threshold of a pile at each fraction that its scene asks for.
+
+    The interval holds load steps and count, and at least the known error as a factor both ways; it
+    is empty where no error is known. The model's interval is of the choices that all levels share.
+    """
+    pile, motion, speed, decision = answer.pile, answer.motion, answer.face.speed, answer.decision
+    scene, asked, error = pile.scene, decision.asked, decision.error_estimate
+    z0, top, depth = scene.bed.roughness, scene.flow.top, scene.flow.depth
     pivot, place = pile.pivot_thresholds(speed), point(scene)
     for fraction in scene.protocol.fractions:
         found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
-        yield {
+        factor = np.nan if error is None else 1 + error
+        value, model = shields(scene, found.tau), calibration.spread(asked, fraction)
+        row = {
             "scene_id": answer.scene_id,
             **place,
             "packing": pile.bed.packing,
             "stress": scene.forces.stress,
             "fraction": fraction,
-            "shields": shields(scene, found.tau),
-            **_interval(scene, found, answer.decision.error_estimate),
-            **_model_interval(answer.decision.asked, fraction, shields(scene, found.tau)),
-            "frozen_bed": calibration.frozen_bed(answer.decision.asked, fraction),
+            "shields": value,
+            "shields_low": np.minimum(shields(scene, found.tau_low), value / factor),
+            "shields_high": np.maximum(shields(scene, found.tau_high), value * factor),
+            "shields_model_low": value * (1 - model.low),
+            "shields_model_high": value * (1 + model.high),
+            "model_share": model.dominant or None,
+            "frozen_bed": calibration.frozen_bed(asked, fraction),
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
-            **_speeds(scene, found.ustar0),
+        }
+        # a field user measures the wind at 1 m, or the mean speed of a channel
+        if depth is None:
+            row["u_1m_m_s"] = found.ustar0 / undisturbed_ustar(1.0, 1.0, z0)
+        else:
+            mean = mean_speed(found.ustar0, depth, z0, closed=top == "closed channel")
+            row |= {"mean_speed_m_s": mean, "discharge_m2_s": mean * depth}
+        yield row | {
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
-            **_levels(answer.decision.levels),
-            "error_estimate": answer.decision.error_estimate,
+            **_levels(decision),
+            "error_estimate": error,
             "case": pile.runs[-1].name if pile.runs else None,
         }
 
 
-def _levels(levels: Pair | None) -> Row:
-    assert levels
-    return {f"{part}_level": one.name for part, one in zip(("flow", "grain"), levels, strict=True)}
-
-
-def _interval(scene: Scene, found: PileThreshold, error: float | None) -> Row:
-    """The interval of load steps and count; at least the known error, as a factor both ways.
-
-    It is empty where no error is known.
-    """
-    if error is None:
-        return {"shields_low": np.nan, "shields_high": np.nan}
-    return {
-        "shields_low": shields(scene, min(found.tau_low, found.tau / (1 + error))),
-        "shields_high": shields(scene, max(found.tau_high, found.tau * (1 + error))),
-    }
-
-
-def _model_interval(scene: Scene, fraction: float, shields: float) -> Row:
-    """The interval of the choices that all levels share; never a part of the numerical one."""
-    found = calibration.spread(scene, fraction)
-    return {
-        "shields_model_low": shields * (1 - found.low),
-        "shields_model_high": shields * (1 + found.high),
-        "model_share": found.dominant or None,
-    }
+def _levels(answer: Decision) -> Row:
+    assert answer.levels
+    flow, grains = answer.levels
+    return {"flow_level": flow.name, "grain_level": grains.name}
 
 
 def check_rows(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
@@ -207,7 +203,7 @@ def check_rows(study: Study, plan: Plan, cases: Path, done: Container[str]) -> I
                 **point(scene),
                 "packing": pile.bed.packing,
                 "fraction": one.cheap.fraction,
-                **_levels(plan.decisions[asked].levels),
+                **_levels(plan.decisions[asked]),
                 "shields": shields(scene, one.cheap.tau),
                 "shields_dem": shields(scene, one.dem.tau),
                 "shields_dem_low": shields(scene, one.dem.tau_low),
@@ -216,15 +212,6 @@ def check_rows(study: Study, plan: Plan, cases: Path, done: Container[str]) -> I
                 "agree": one.agree,
                 "case": pile.case.name,
             }
-
-
-def _speeds(scene: Scene, ustar0: float) -> Row:
-    """Speeds that a field user measures: at 1 m, or the mean of a channel, with the discharge."""
-    z0, flow = scene.bed.roughness, scene.flow
-    if flow.depth is None:
-        return {"u_1m_m_s": ustar0 / undisturbed_ustar(1.0, 1.0, z0)}
-    mean = mean_speed(ustar0, flow.depth, z0, closed=flow.top == "closed channel")
-    return {"mean_speed_m_s": mean, "discharge_m2_s": mean * flow.depth}
 
 
 def shields(scene: Scene, tau: Any) -> Any:
