@@ -1,7 +1,6 @@
 """External programs: one run in a process group of its own, limited, logged, never orphaned."""
 
 import contextlib
-import ctypes
 import errno
 import os
 import re
@@ -19,7 +18,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from orchestrator.errors import Interrupted, SolverError
-from orchestrator.runs import terminal
 
 GRACE_S = 2.0
 """Time between SIGTERM and SIGKILL."""
@@ -88,7 +86,6 @@ def run(
     output_limit: float = float("inf"),
     file_limit: int | None = None,
     tries: int = 1,
-    fds: Sequence[int] = (),
 ) -> Ended:
     """Run a program to its end in a process group of its own, and keep its output.
 
@@ -132,7 +129,6 @@ def run(
                 stdout=stream,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                pass_fds=fds,
                 env={name: value for name, value in given.items() if value is not None},
             )
             try:
@@ -295,13 +291,3 @@ def shortage() -> str:
         if soft != resource.RLIM_INFINITY and soft < value * unit:
             return f"the limit of {what} is {soft // unit}: raise it, ulimit -{option} {value}"
     return ""
-
-
-def follow(parent: int) -> None:
-    """Make this forked process end with its parent, and leave the signals of a user to that."""
-    for number in terminal.ENDING:
-        signal.signal(number, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGKILL)

@@ -10,7 +10,7 @@ import math
 import os
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -152,7 +152,7 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
     name = os.fsencode(path.stem).decode("utf-8", "replace")
     if name.strip(".") == "":
         raise InputError("a file of dots names no study", where=source, remedy="rename it")
-    return parse(text, name=name, where=source)
+    return replace(parse(text, name=name, where=source), file=str(path.absolute()))
 
 
 def parse(text: str, *, name: str, where: str) -> Study:

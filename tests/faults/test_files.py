@@ -37,6 +37,10 @@ def _truncated(share: float) -> Callable[[Path], None]:
     return lambda path: os.truncate(path, int(path.stat().st_size * share))
 
 
+def _garbage(path: Path) -> None:
+    path.write_bytes(b"\x00\xff{]" * 50)
+
+
 def _directory(path: Path) -> None:
     path.unlink()
     path.mkdir()
@@ -44,7 +48,7 @@ def _directory(path: Path) -> None:
 
 HARMS: dict[str, Callable[[Path], None]] = {
     **{f"truncated to {share:.0%}": _truncated(share) for share in (0.0, 0.3, 0.99)},
-    "garbage": lambda path: path.write_bytes(b"\x00\xff{]" * 50) and None,
+    "garbage": _garbage,
     "a directory": _directory,
     "removed": Path.unlink,
 }
