@@ -15,7 +15,7 @@ from orchestrator.fidelity.calibration import lowest_floor
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
-from orchestrator.physics.velocity import log_law_speed
+from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
 from orchestrator.report import labels, theory
 from orchestrator.report.results import (
     Results,
@@ -121,7 +121,8 @@ def _flow(row: pd.Series, column: str) -> str:
     if pd.notna(row.get("mean_speed_m_s")):
         speed = f", {row['mean_speed_m_s']:.2g} m/s in the mean over {row['depth_m']:g} m of depth"
     elif row["rho_f_kg_m3"] < GAS_BELOW:
-        speed = f", {float(log_law_speed(ustar, 1.0, row['z0_m'])):.2g} m/s wind at 1 m"
+        z0 = max(row["z0_m"], float(smooth_wall_roughness(ustar, row["nu_m2_s"])))
+        speed = f", {float(log_law_speed(ustar, 1.0, z0)):.2g} m/s wind at 1 m"
     return f"u* {ustar:.2g} m/s{speed}"
 
 
