@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -88,13 +88,7 @@ class Choice:
     patterns: Sequence[str] = ()
 
     def names(self, chosen: Pack) -> list[str]:
-        """Names of the chosen scenes.
-
-        Raises
-        ------
-        InputError
-            If there are none.
-        """
+        """Names of the chosen scenes; raises InputError if there are none."""
         names = [
             name
             for name, given in chosen.scenes.items()
@@ -102,11 +96,8 @@ class Choice:
             and (not self.patterns or any(fnmatch.fnmatchcase(name, p) for p in self.patterns))
         ]
         if not names:
-            raise InputError(
-                "no scene of the pack is chosen",
-                where=str(chosen.root),
-                remedy="see its scenes.csv, and --level and --scene",
-            )
+            remedy = "see its scenes.csv, and --level and --scene"
+            raise InputError("no scene of the pack is chosen", str(chosen.root), remedy)
         return names
 
 
@@ -171,8 +162,7 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
     chosen = pack.read(root.absolute())
     names, words = choice.names(chosen), split(command)
     out = (out or _default_place(root)).absolute()
-    _check_names([out.name])
-    _check_apart(out, chosen)
+    _check_places([out], out, chosen)
     ours = Ours(chosen, out / OURS / "cases")
     for name in names:
         ours.check(name)
@@ -222,14 +212,13 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
             raise InputError("there is no such directory", where=str(place), remedy="name another")
         if any(OF_SCHEMA_1.fullmatch(path.name) for path in place.iterdir()):
             pack.refuse_schema("its answers are to a pack of schema 1", place)
-    _check_names([place.absolute().name for place in results])
     about = _about(results[0]) if len(results) == 1 else {}
-    place = (out or (results[0] if about else _default_place(root))).absolute()
-    _check_apart(place, chosen)
-    is_of_run = bool(about) and place == results[0].absolute()
+    out = (out or (results[0] if about else _default_place(root))).absolute()
+    _check_places(results, out, chosen)
+    is_of_run = bool(about) and out == results[0].absolute()
     kind = workspace.RESULTS if is_of_run else workspace.COMPARISON
     contenders = [judge(chosen, names, place) for place in results]
-    with workspace.claimed(place, kind, about["name"] if is_of_run else chosen.root.name) as folder:
+    with workspace.claimed(out, kind, about["name"] if is_of_run else chosen.root.name) as folder:
         return _written(chosen, contenders, folder)
 
 
@@ -243,20 +232,15 @@ def _default_place(root: Path) -> Path:
     return Path("results") / f"benchmark-{root.absolute().name}"
 
 
-def _check_names(names: Sequence[str]) -> None:
-    """See that no two solvers, nor one and ours, have one name."""
-    twice = next((name for name in names if [OURS, *names].count(name) > 1), None)
-    if twice is not None:
-        raise InputError(
-            f"two solvers have the name {twice}",
-            where="RESULTS",
-            remedy="name each directory of results after its solver",
-        )
-
-
-def _check_apart(out: Path, chosen: Pack) -> None:
+def _check_places(results: Sequence[Path], out: Path, chosen: Pack) -> None:
+    """See that each solver has a name of its own, and that nothing is written into the pack."""
+    names = [OURS, *(place.absolute().name for place in results)]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        remedy = "name each directory of results after its solver"
+        raise InputError(f"two solvers have the name {twice[0]}", "RESULTS", remedy)
     if out.resolve().is_relative_to(chosen.root.resolve()):
-        raise InputError("the results may not lie in the pack", where=str(out), remedy="use --out")
+        raise InputError("the results may not lie in the pack", str(out), "use --out")
 
 
 def split(command: str) -> list[str]:
@@ -267,43 +251,30 @@ def split(command: str) -> list[str]:
     InputError
         If it has no ``{case}`` or ``{out}``, is for a shell, or its program is not there.
     """
-
-    def refuse(what: str, remedy: str = "") -> NoReturn:
-        raise InputError(what, where="--solver", remedy=remedy)
-
     try:
         words = shlex.split(command)
     except ValueError as error:
-        refuse(f"the command cannot be read: {error}")
-    for part in ("{case}", "{out}"):
-        if not any(part in word for word in words):
-            refuse(f"the command has no {part}", "such as 'my-solver {case} {out}'")
-    for word in filter(OPERATORS.fullmatch, words):
-        refuse(f"no shell reads the command: {word} would be an argument", "write: sh -c '...'")
-    if shutil.which(words[0]) is None:
-        refuse(f"there is no program {words[0]} that may be run", "give its path; see chmod +x")
-    return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
+        raise InputError(f"the command cannot be read: {error}", "--solver") from None
+    lacking = [part for part in ("{case}", "{out}") if not any(part in word for word in words)]
+    operators = [word for word in words if OPERATORS.fullmatch(word)]
+    if lacking:
+        what, remedy = f"the command has no {lacking[0]}", "such as 'my-solver {case} {out}'"
+    elif operators:
+        what, remedy = f"no shell reads the command: {operators[0]}", "write: sh -c '...'"
+    elif shutil.which(words[0]) is None:
+        what, remedy = f"there is no program {words[0]} that may be run", "give its path"
+    else:
+        return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
+    raise InputError(what, "--solver", remedy)
 
 
 def solve(
     words: Sequence[str], scene: Path, limits: Limits
 ) -> tuple[bytes | None, bytes, dict[str, Any]]:
-    """Run a solver on a scene, in a directory of its own that is removed afterwards.
+    """Run a solver on a copy of a scene, in a directory that is removed afterwards.
 
-    Parameters
-    ----------
-    words : sequence of str
-        Its command, as `split` gives it.
-    scene : Path
-        The directory of the scene, of which it gets a copy.
-    limits : Limits
-        Its limits.
-
-    Returns
-    -------
-    tuple
-        Bytes of its answer, None if there is none; its output; and its times (s), memory (MiB) and
-        ``error``, which says why the answer does not count.
+    Returns the bytes of its answer, None if there is none; its output; and its times (s), memory
+    (MiB) and ``error``, the reason why the answer does not count.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         work, log = Path(folder, "work"), Path(folder, LOG)
@@ -474,8 +445,8 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
                 "message": one_line(error),  # it repeats the output of a program
                 **{key: _known(used.get(key)) for key in ("seconds", "cpu_s", "peak_mib")},
                 **{f"ours_{key}": _known(used_by_ours.get(key)) for key in ("seconds", "cpu_s")},
-                STEPS: _steps(answer),
-                f"ours_{STEPS}": _steps(again),
+                STEPS: _known(answer["answer"][answer["quantity"] == STEPS].max()),
+                f"ours_{STEPS}": _known(again["answer"][again["quantity"] == STEPS].max()),
             }
         )
     keys = ["scene", "quantity", "place"]
@@ -513,11 +484,6 @@ def _used(folder: Path) -> Row:
 def _known(value: Any) -> float:
     """A time or a memory, NaN where it is none: anybody may have written it."""
     return float(value) if isinstance(value, int | float) and 0 < value < 1e300 else np.nan
-
-
-def _steps(answer: pd.DataFrame) -> float:
-    given = answer["answer"][answer["quantity"] == STEPS]
-    return _known(given.iloc[0]) if len(given) else np.nan
 
 
 def relative(answer: Any, value: Any) -> Any:

@@ -1,7 +1,7 @@
 """Levels 1 and 2: scenes whose answers are formulas, and the parameters of all scenes."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -97,84 +97,61 @@ def _three(centres: Any, diameter: Any) -> pd.DataFrame:
 
 def checks() -> Iterator[Problem]:
     """Level 2: the contact law, on the reference grain of the decks."""
-    for damping in DAMPINGS:
-        yield collision(damping)
-    for angle in INCLINES_DEG:
-        yield incline(angle)
-    for speed in SPEEDS:
-        yield sliding(speed)
-    for push in PUSHES:
-        yield passing(push)
+    for damping in DAMPINGS:  # two grains meet; the contact ends where the force does
+        root = np.sqrt(1 - damping**2)
+        restitution = np.exp(-damping / root * (np.pi - 2 * np.arcsin(damping)))
+        given = _contact(damping) | {"speed_m_s": MEETING * UNIT, "time_step": 0.01}
+        yield _check("collision", damping, given, [("restitution", restitution, None)])
+    friction = float(np.tan(np.radians(_contact()["phi_deg"])))
+    for degrees in INCLINES_DEG:  # a grain rolls or slides down a plane
+        sin, cos = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+        value = 5 / 7 * sin if sin < 3.5 * friction * cos else sin - friction * cos
+        given = _contact() | {"incline_deg": degrees, "time_step": 0.2}
+        yield _check("incline", degrees, given, [("acceleration_over_g", value, None)])
+    for speed in SPEEDS:  # a grain slides until it rolls
+        given = _contact() | {"speed_m_s": speed * UNIT, "time_step": 0.02}
+        given["roll_time_s"] = 2 * speed * UNIT / (7 * friction * GRAVITY)
+        names = ("speed_over_start", "speed_over_start", "spin_over_start")
+        rows = zip(names, (6 / 7, 5 / 7, 5 / 7), (0.5, 2.0, 2.0), strict=True)
+        yield _check("sliding", speed, given, rows)
+    beta = np.radians(PASSING_DEG)
+    x, z = float(np.cos(beta)), -float(np.sin(beta))
+    grains = _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)
+    for push in PUSHES:  # a grain is pushed over its neighbour
+        given = _contact(stiffness=PASSING_STIFFNESS) | {
+            "alpha_deg": 0.0,
+            "beta_deg": PASSING_DEG,
+            "displacement_criterion": CRITERION,
+            "time_step": 0.2,
+        }
+        given["force_n"] = push * given["weight_n"] / float(np.tan(beta))
+        time_of_passing = ("passing_time_over_t", passing_time(push, CRITERION), None)
+        yield _check("passing", push, given, [time_of_passing], {"grains": grains})
 
 
 def _contact(damping: float = 0.1, stiffness: float = STIFFNESS) -> Row:
-    """The grain of the check decks."""
-    grain = Grain(diameter=DIAMETER, density=DENSITY, damping=damping, stiffness=stiffness)
+    """Parameters of the grain of the check decks."""
     weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
     return {
         "d_m": DIAMETER,
         "rho_sol_kg_m3": DENSITY,
-        "phi_deg": grain.friction_angle_deg,
-        "stiffness": grain.stiffness,
+        "phi_deg": Grain(diameter=DIAMETER).friction_angle_deg,
+        "stiffness": stiffness,
         "damping": damping,
-        **mechanics(DIAMETER, DENSITY, GRAVITY, weight, grain.stiffness),
+        **mechanics(DIAMETER, DENSITY, GRAVITY, weight, stiffness),
     }
 
 
-def collision(damping: float) -> Problem:
-    """Two grains that meet: how fast they part."""
-    given = _contact(damping)
-    root = np.sqrt(1 - damping**2)
-    # the contact ends where the force does, not the overlap
-    exponent = damping / root * (np.pi - 2 * np.arcsin(damping))
-    asked = table_of([expectation("restitution", float(np.exp(-exponent)), CHECK)])
-    given |= {"speed_m_s": MEETING * UNIT, "time_step": 0.01}
-    return Problem(f"collision-{damping:g}", "collision", given, {}, asked)
-
-
-def incline(incline_deg: float) -> Problem:
-    """A grain that is let go on a plane: how it speeds up."""
-    given = _contact()
-    friction = np.tan(np.radians(given["phi_deg"]))
-    a = np.radians(incline_deg)
-    rolls = np.tan(a) < 3.5 * friction
-    value = 5 / 7 * np.sin(a) if rolls else np.sin(a) - friction * np.cos(a)
-    asked = table_of([expectation("acceleration_over_g", float(value), CHECK)])
-    given |= {"incline_deg": incline_deg, "time_step": 0.2}
-    return Problem(f"incline-{incline_deg:g}", "incline", given, {}, asked)
-
-
-def sliding(speed: float) -> Problem:
-    """A grain that slides until it rolls; `speed` in sqrt(d g')."""
-    given = _contact()
-    start = speed * UNIT
-    friction = float(np.tan(np.radians(given["phi_deg"])))
-    rows = [
-        expectation("speed_over_start", 6 / 7, CHECK, 0.5),
-        expectation("speed_over_start", 5 / 7, CHECK, 2.0),
-        expectation("spin_over_start", 5 / 7, CHECK, 2.0),
-    ]
-    roll_time = 2 * start / (7 * friction * given["reduced_gravity_m_s2"])
-    given |= {"speed_m_s": start, "roll_time_s": roll_time, "time_step": 0.02}
-    return Problem(f"sliding-{speed:g}", "sliding", given, {}, table_of(rows))
-
-
-def passing(push: float) -> Problem:
-    """A grain that is pushed over its neighbour; `push` as in `passing_time`."""
-    given = _contact(stiffness=PASSING_STIFFNESS)
-    beta = np.radians(PASSING_DEG)
-    value = passing_time(push, CRITERION)
-    asked = table_of([expectation("passing_time_over_t", value, CHECK)])
-    given |= {
-        "alpha_deg": 0.0,
-        "beta_deg": PASSING_DEG,
-        "displacement_criterion": CRITERION,
-        "force_n": push * given["weight_n"] / float(np.tan(beta)),
-        "time_step": 0.2,
-    }
-    x, z = float(np.cos(beta)), -float(np.sin(beta))
-    tables = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
-    return Problem(f"passing-{push:g}", "passing", given, tables, asked)
+def _check(
+    kind: str,
+    number: float,
+    given: Row,
+    rows: Iterable[tuple[str, float, float | None]],
+    tables: Mapping[str, pd.DataFrame] | None = None,
+) -> Problem:
+    """A check of a kind, named by its number; each row is a quantity, its value and its place."""
+    asked = table_of(expectation(name, float(value), CHECK, at) for name, value, at in rows)
+    return Problem(f"{kind}-{number:g}", kind, given, tables or {}, asked)
 
 
 def push_of(scene: Mapping[str, Any]) -> float:

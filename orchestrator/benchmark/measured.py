@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -39,22 +39,15 @@ LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
 
 
-@dataclass(frozen=True)
-class Margins:
+class Margins(NamedTuple):
     """How far an answer to a pile may be off besides what the load steps and seeds enclose.
 
-    Attributes
-    ----------
-    threshold : float
-        Relative tolerance of thresholds.
-    count : float
-        Tolerance of the numbers of moved grains, over N.
-    until : float
-        Largest n/N that is judged.
+    The relative tolerance of thresholds, that of the numbers of moved grains over N, and the
+    largest n/N that is judged.
     """
 
     threshold: float
-    count: float
+    counted: float
     until: float = 1.0
 
 
@@ -235,8 +228,8 @@ def _counted(quantity: str, curve: pd.DataFrame, load_step: int, margins: Margin
     """Expectation of a number of grains: that of a load step earlier or later, and its margin."""
     total, n = float(curve["count"].iloc[0]), curve[quantity].to_numpy(float)
     near = n[load_step - 1 : load_step + 2]
-    low = max(float(near.min()) - margins.count * total, 0.0)
-    high = min(float(near.max()) + margins.count * total, total)
+    low = max(float(near.min()) - margins.counted * total, 0.0)
+    high = min(float(near.max()) + margins.counted * total, total)
     tolerance = 0.0 if near.max() <= margins.until * total else np.nan
     value = n[load_step]
     return expectation(quantity, value, tolerance, load_step, (low, high), value)
@@ -258,7 +251,7 @@ def _threshold(bed: Bed, margins: Margins, row: Mapping[Any, Any]) -> Iterator[R
         # some load steps and leaps in the next. The interval also holds the thresholds of our run
         # at so much less of N, and at more.
         most = float(bed.curve["moved"].iloc[-1] / bed.curve["count"].iloc[-1])
-        places = max(fraction - margins.count, 1e-9), min(fraction + margins.count, most)
+        places = max(fraction - margins.counted, 1e-9), min(fraction + margins.counted, most)
         fewer, more = bed.pile.thresholds(bed.cases, places)
         low, high = min(low, fewer.tau_low * unit), max(high, more.tau_high * unit)
         flows = min(flows[0], fewer.ustar0), max(flows[1], more.ustar0)

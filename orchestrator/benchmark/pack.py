@@ -4,6 +4,7 @@ docs/benchmark.md is the contract for solvers. A pack may come from anywhere: `r
 whose files are not those of its manifest, or whose names, links or numbers no export makes.
 """
 
+import contextlib
 import json
 import math
 import os
@@ -12,7 +13,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, NoReturn
 
@@ -46,12 +47,12 @@ MAX_TOLERANCE, MAX_WIDTH = 0.5, 10.0
 wider ones would pass any answer."""
 _NAME, _MEMBER = r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*", r"[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
 _BED = (*COUNTS, "ustar0_m_s", "shields")
-_GRAIN = ("d_m", "rho_sol_kg_m3", "phi_deg", "damping", "time_step", "reduced_gravity_m_s2")
+_GRAIN = ("d_m", "rho_sol_kg_m3", "damping", "time_step", "reduced_gravity_m_s2")
 _FLUID = ("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "alpha_deg", "beta_deg", "z0_m", "alpha_s")
-_FLOW = (
-    *("alpha_deg", "h_m", "z0_m", "rho_f_kg_m3"),
-    *("u_e_height_m", "u_e_m_s", "ustar0_m_s"),
-)
+
+
+SIGNED = ("alpha_deg", "alpha_s")
+"""Required numbers that may be zero or negative."""
 
 
 class Kind(NamedTuple):
@@ -82,9 +83,9 @@ KINDS: dict[str, Kind] = {
         ("passing_time_over_t",),
     ),
     "pivot": Kind(2, (*_GRAIN, *_FLUID), ("ustar_m_s",)),
-    "flow": Kind(3, _FLOW, ("windward_mean",), ("ustar_over_ustar0",)),
+    "flow": Kind(3, ("alpha_deg", "z0_m"), ("windward_mean",), ("ustar_over_ustar0",)),
     "pile": Kind(4, (*_GRAIN, *_FLUID, "count"), (), _BED),
-    "line": Kind(5, (*_GRAIN, *_FLUID, *_FLOW), ("count",), _BED),
+    "line": Kind(5, (*_GRAIN, *_FLUID), ("count",), _BED),
 }
 
 Text = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
@@ -110,21 +111,6 @@ class Manifest(BaseModel):
 _PARAMETERS = TypeAdapter(
     dict[Key, Whole | float | Word], config=ConfigDict(strict=True, allow_inf_nan=False)
 )
-RANGES: dict[str, tuple[float, float]] = {
-    "alpha_deg": (-90.0, 90.0),
-    **dict.fromkeys(("phi_deg", "incline_deg", "beta_deg"), (0.1, 89.9)),
-    **dict.fromkeys(("damping", "time_step"), (1e-6, 0.999)),
-    **dict.fromkeys(("d_m", "z0_m", "h_m", "u_e_height_m"), (1e-9, 1e4)),
-    **dict.fromkeys(("rho_sol_kg_m3", "rho_f_kg_m3"), (1e-6, 1e6)),
-    **dict.fromkeys(("g_m_s2", "reduced_gravity_m_s2", "nu_m2_s"), (1e-12, 1e6)),
-    **dict.fromkeys(("speed_m_s", "u_e_m_s", "ustar0_m_s"), (1e-9, 1e6)),
-    **dict.fromkeys(("force_n", "weight_n"), (1e-30, 1e9)),
-    "stiffness": (1.0, 1e12),
-    "alpha_s": (0.0, 1e3),
-    "displacement_criterion": (1e-3, 10.0),
-    "count": (1, 1e6),
-}
-"""Ranges of the parameters that the comparison itself reads; SI units, degrees."""
 
 
 @dataclass(frozen=True)
@@ -165,11 +151,6 @@ class Problem:
         return f"{self.level}-{self.name}"
 
     @property
-    def is_judged(self) -> bool:
-        """Whether any of its numbers has a tolerance."""
-        return bool(self.expected["tolerance"].notna().any())
-
-    @property
     def head(self) -> Row:
         """Its first entries in ``scene.json`` and ``scenes.csv``."""
         return {"scene": self.scene, "level": self.level, "kind": self.kind}
@@ -208,24 +189,12 @@ def expectation(
 ) -> Row:
     """A row of the expected answers.
 
-    Parameters
-    ----------
-    quantity : str
-        The quantity.
-    value : float
-        Its expected value.
-    tolerance : float
-        Relative tolerance; NaN for a number that is shown and not judged.
-    at : float, optional
-        The argument of a quantity that is a function.
-    interval : tuple of float, optional
-        Ends of the interval of the value; by default the value itself.
-    ours : float
-        Our own answer.
+    `at` is the argument of a quantity that is a function; the interval is by default the value
+    itself. A relative tolerance of NaN is not judged. `ours` is our own answer.
     """
-    low, high = interval or (value, value)
     place = "" if at is None else NUMBER % at
-    return dict(zip(COLUMNS, (quantity, place, value, low, high, tolerance, ours), strict=True))
+    values = (quantity, place, value, *(interval or (value, value)), tolerance, ours)
+    return dict(zip(COLUMNS, values, strict=True))
 
 
 def table_of(rows: Iterable[Row]) -> pd.DataFrame:
@@ -272,7 +241,12 @@ class Pack:
         InputError
             Naming the first file that is not as the manifest says.
         """
-        _verify(self.root, self.manifest)
+        digests = digest_files(_members(self.root).values(), root=self.root)
+        stated = self.manifest.sha256
+        for name in sorted({*stated, *digests}):
+            if stated.get(name) != digests.get(name):
+                how = "is missing" if name not in digests else "is not what was exported"
+                _refuse(f"the file {name} {how}", self.root)
 
 
 def read(root: Path) -> Pack:
@@ -290,10 +264,11 @@ def read(root: Path) -> Pack:
             remedy="write one with: python -m orchestrator benchmark export",
         )
     manifest = _manifest(root / MANIFEST)
-    _verify(root, manifest)
+    pack = Pack(root, {}, pd.DataFrame(), manifest)
+    pack.verify()
     folders = {name.split("/")[1] for name in manifest.sha256 if name.startswith(f"{SCENES}/")}
-    if folders != {*manifest.scenes}:
-        _refuse(f"the manifest does not list the scenes in {SCENES}", root)
+    if folders != {*manifest.scenes} or len(folders) < len(manifest.scenes):
+        _refuse(f"its manifest does not list each scene of {SCENES} once", root)
     _check_study(root / STUDY)
     scenes = {name: _scene(root / SCENES / name / SCENE, name) for name in manifest.scenes}
     expected = _expected(root / EXPECTED, scenes)
@@ -302,7 +277,7 @@ def read(root: Path) -> Pack:
         _check_file(path)
         if path.read_bytes() != csv(asked[["quantity", "at"]]).encode():
             _refuse(f"it does not ask what {EXPECTED} answers", path)
-    return Pack(root, scenes, expected, manifest)
+    return replace(pack, scenes=scenes, expected=expected)
 
 
 def _refuse(what: str, where: Path) -> NoReturn:
@@ -343,14 +318,6 @@ def _check_file(path: Path) -> None:
         _refuse(f"it is larger than {MAX_BYTES // 2**20} MiB", path)
 
 
-def _verify(root: Path, manifest: Manifest) -> None:
-    digests = digest_files(_members(root).values(), root=root)
-    for name in sorted({*manifest.sha256, *digests}):
-        if manifest.sha256.get(name) != digests.get(name):
-            how = "is missing" if name not in digests else "is not what was exported"
-            _refuse(f"the file {name} {how}", root)
-
-
 def _json(path: Path) -> Any:
     _check_file(path)
     try:
@@ -365,12 +332,9 @@ def _manifest(path: Path) -> Manifest:
     if isinstance(schema, int) and schema != SCHEMA:
         refuse_schema(f"its schema is {schema}, and this program reads {SCHEMA}", path)
     try:
-        manifest = Manifest.model_validate(value)
+        return Manifest.model_validate(value)
     except ValidationError as error:
         _refuse(_first_fault(error), path)
-    if len(set(manifest.scenes)) < len(manifest.scenes):
-        _refuse("it lists a scene twice", path)
-    return manifest
 
 
 def refuse_schema(what: str, where: Path) -> NoReturn:
@@ -397,10 +361,11 @@ def _scene(path: Path, name: str) -> Row:
     head = [parameters.get(key) for key in ("schema", "scene", "level")]
     if kind is None or head != [SCHEMA, name, kind.level] or name[0] != str(kind.level):
         _refuse(f"schema, scene, level and kind are not those of {name}", path)
-    for key in {*kind.required, *(RANGES.keys() & parameters)}:
-        (low, high), value = RANGES[key], parameters.get(key)
-        if isinstance(value, str) or value is None or not low <= value <= high:
-            _refuse(f"{key} is no number from {low:g} to {high:g}", path)
+    for key in kind.required:
+        value = parameters.get(key)
+        is_positive = isinstance(value, int | float) and 0 < value < 1e30
+        if not is_positive and not (key in SIGNED and isinstance(value, int | float)):
+            _refuse(f"{key} is no number of its kind", path)
     if "alpha_s" in kind.required and parameters.get("force_law") not in LAWS:
         _refuse(f"force_law is none of {', '.join(LAWS)}", path)
     numbers: Mapping[str, Any] = parameters
@@ -420,25 +385,23 @@ def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
     table[list(COLUMNS[2:])] = numbers
     if set(table["scene"]) != set(scenes):
         _refuse("its scenes are not those of the manifest", path)
-    kind = table["scene"].map(lambda name: scenes[name]["kind"])
-    asked = {
-        (name, quantity, function)
-        for name, one in KINDS.items()
-        for function, quantities in ((False, one.single), (True, one.functions))
-        for quantity in quantities
-    }
-    questions = zip(kind, table["quantity"], table["at"] != "", strict=True)
     at = pd.to_numeric(table["at"], errors="coerce")
     value, low, high = table["value"], table["low"], table["high"]
+    is_function = table["at"] != ""
+    asked = [
+        quantity
+        in (KINDS[scenes[name]["kind"]].functions if at else KINDS[scenes[name]["kind"]].single)
+        for name, quantity, at in zip(table["scene"], table["quantity"], is_function, strict=True)
+    ]
     judged, counts = table["tolerance"].notna(), table["quantity"].isin(COUNTS)
     wide = high - low > MAX_WIDTH * value.abs()
     faults = {
-        "asks what its kind does not": pd.Series([one not in asked for one in questions]),
-        "has an at that is no number": (table["at"] != "") & ~(at.abs() < 1e30),
+        "asks what its kind does not": ~pd.Series(asked),
+        "has an at that is no number": is_function & ~(at.abs() < 1e30),
         "lacks a finite value": ~(value.abs() < 1e30),
         "has no interval that holds its value": ~((low <= value) & (value <= high)),
         "has a tolerance beyond 0 ... 0.5": judged & ~table["tolerance"].between(0, MAX_TOLERANCE),
-        "accepts any answer": judged & wide & ~(counts & (high <= RANGES["count"][1])),
+        "accepts any answer": judged & wide & ~(counts & (high <= 1e6)),
         "has an infinite number of ours": table["ours"].abs() > 1e30,
         "has a negative count or Shields number": (low < 0)
         & (counts | (table["quantity"] == "shields")),
@@ -522,7 +485,7 @@ def write(
     with workspace.claimed(root, workspace.PACK, name) as folder:
         about = {"kind": workspace.PACK.word, "name": name}
         folder.note(MANIFEST, text_of(about))  # it is no pack until all is there
-        listed = [one for one in problems if one.is_judged]
+        listed = [one for one in problems if one.expected["tolerance"].notna().any()]
         scenes = folder.clear(SCENES, lambda path: bool(re.fullmatch(f"{_NAME}/{_MEMBER}", path)))
         for one in listed:
             one.write(scenes / one.scene)
@@ -556,31 +519,17 @@ def _tables(problems: Sequence[Problem]) -> dict[str, pd.DataFrame]:
 
 def _processor() -> str:
     """The machine's processor, as far as it is stated."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, platform.machine())
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.machine()
 
 
 README = """# A benchmark pack
 
-Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions and expected answers,
-for a native code of the same model. SI units, angles in degrees. The format, schema 2, is
-docs/benchmark.md of the project.
-
-- `expected.csv`: for each number asked its `value`, interval `low` ... `high`, relative `tolerance`
-  (empty: not judged), and the answer of our run, `ours`
-- `scenes.csv`: the parameters of each scene; an empty field does not apply
-- `study.toml`: the study file that the scenes come from
-- `scenes/`: one directory for each scene, the input of a solver
-- `times.csv`: the time of our run of each scene, on the machine that `manifest.json` names
-- `manifest.json`: schema, scenes, versions, machine, digests
-
-Levels: 1, forces and threshold of one grain; 2, contact law, and one grain on its two neighbours;
-3, stress on the bed; 4, grains of a pile under a given stress; 5, flow and grains.
-
-Programs that gave the answers of our runs:
+Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions (`scenes/`) and expected
+answers (`expected.csv`), for a native code of the same model. The format, schema 2, is
+docs/benchmark.md of the project. Programs that gave the answers of our runs:
 
 """

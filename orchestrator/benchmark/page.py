@@ -31,27 +31,23 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#5
 MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
 """Markers of the levels."""
 LIMITS = (
-    "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs: agreement "
-    "there is that of solvers, not with nature.",
+    "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs.",
     "The intervals hold the step between two load steps, the count’s resolution and the scatter "
     "over packings where it was run; they do not hold the error of the flow model.",
     "Scenes of less than a second are mostly start-up of the programs.",
 )
 ERRORS = (
     "Errors are relative, over the judged numbers of a scene; the bias is their median with its "
-    "sign, over all scenes: it shows a fault that each scene’s interval still holds. Time and CPU "
-    "time are the solver’s over ours, which ran in turn with it, the median of the scenes: below 1 "
-    "is faster than ours. The CPU time is disturbed less where other programs run. Every number is "
-    "in comparison.csv beside this page, every scene in verdicts.csv."
+    "sign. Time and CPU time are the solver’s over ours, which ran in turn with it, the median of "
+    "the scenes. Every number is in comparison.csv beside this page, every scene in verdicts.csv."
 )
 THRESHOLDS = (
     "Threshold Shields numbers, ours and each solver’s. One with a * is outside the interval of "
     "the expected answer, one with ** also beyond its tolerance: it fails."
 )
 COSTS = (
-    "CPU time of each pile under the given stress, s and over ours, the solver’s start included. "
-    "Where a solver states its time steps, M/s is millions of them a second of CPU time, times the "
-    "mobile grains."
+    "CPU time of each pile under the given stress, s and over ours. Where a solver states its time "
+    "steps, M/s is millions of them a second of CPU time, times the mobile grains."
 )
 SHOWN = {
     "solver": "solver",

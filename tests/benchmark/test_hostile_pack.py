@@ -147,7 +147,7 @@ HARMS: dict[str, Harm] = {
     "Infinity": lambda root: _edit(_scene(root) / "scene.json", more=float("inf")),
     "1e999": lambda root: (_scene(root) / "scene.json").write_text('{"d_m": 1e999}'),
     "10^400": lambda root: _edit(_scene(root) / "scene.json", d_m=10**400),
-    "damping of 5": lambda root: _edit(_scene(root) / "scene.json", damping=5.0),
+    "damping of -5": lambda root: _edit(_scene(root) / "scene.json", damping=-5.0),
     "a strange word": lambda root: _edit(_scene(root, "line") / "scene.json", packing="$\\frac"),
     "a strange key": lambda root: _edit(_scene(root) / "scene.json", **{"=1+1": 1}),
     "lighter than the fluid": lambda root: _edit(
