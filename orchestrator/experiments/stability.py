@@ -10,9 +10,8 @@ place: beyond `WRONG` it is wrong, and nothing said so.
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -35,6 +34,7 @@ from orchestrator.study.study import TIME_LIMIT_S, make_scene
 from orchestrator.types import Row
 
 FOLDER = Path(__file__).parent / "maps"
+TITLE = "Where each method fails"
 DEFAULT = "default"
 """In a file, the value that is a field's default; TOML has none."""
 WRONG = 0.05
@@ -44,69 +44,33 @@ NOTICED = ("exploded", "noisy", "stalled")
 
 
 class Place(NamedTuple):
-    """One place on an axis: what it is called, and the fields that it sets."""
+    """A place of a map: its values on the axes, its scenes, and those they are compared with.
 
-    label: float | str
-    changes: Mapping[str, Any]
+    x is None where the run is read at several fractions.
+    """
 
-
-class Axis(NamedTuple):
-    """An axis of a map: its label with its unit, its places, whether these are fractions."""
-
-    label: str
-    places: tuple[Place, ...]
-    is_fraction: bool = False
-
-
-class Run(NamedTuple):
-    """The scenes of one place of a map, and those that they are compared with."""
-
-    x: Place
-    y: Place
+    x: float | str | None
+    y: float | str
     scenes: tuple[Scene, ...]
     references: tuple[Scene, ...]
 
 
-@dataclass(frozen=True)
-class Map:
-    """One map.
-
-    Attributes
-    ----------
-    name, title, question : str
-        The file's name; a headline; what the map is for.
-    judge : {"pile", "grain"}
-        Whether thresholds of a pile are compared with those of its reference, or one grain's with
-        the closed form.
-    x, y : Axis
-        The axes.
-    runs : tuple of Run
-        For each y all x; only one for a y whose x are fractions.
-    """
+class Map(NamedTuple):
+    """A map: its name, what its file says, its places."""
 
     name: str
-    title: str
-    question: str
-    judge: Literal["pile", "grain"]
-    x: Axis
-    y: Axis
-    runs: tuple[Run, ...]
+    data: Mapping[str, Any]
+    places: tuple[Place, ...]
 
     @property
     def limits(self) -> tuple[str, ...]:
         """The limits that were read off it, in sentences."""
         return limits.SAYS.get(self.name, ())
 
-
-class Judged(NamedTuple):
-    """A map, and a table with a row for each of its places.
-
-    The columns are map; x and y, numbers or texts; verdict, "good", "wrong" or one of `NOTICED`;
-    caught, whether the run itself noticed; error, relative and signed, or NaN; note, the cause.
-    """
-
-    map: Map
-    table: pd.DataFrame
+    @property
+    def fractions(self) -> list[float]:
+        """The fractions at which one run is read along x; empty for other axes."""
+        return [float(value) for value in self.data["x"].get("fractions", ())]
 
 
 def load_all() -> list[Map]:
@@ -124,42 +88,30 @@ def load(path: Path) -> Map:
     """
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     try:
-        x, y = _axis(data["x"]), _axis(data["y"])
-        words = {name: data[name] for name in ("title", "question", "judge")}
-        return Map(path.stem, x=x, y=y, runs=tuple(_runs(data, x, y, path.name)), **words)
+        _ = [data[name] for name in ("title", "question", "judge")]
+        across, down = ([*_axis(data[axis])] for axis in ("x", "y"))
     except KeyError as missing:
         raise InputError(f"{missing} is missing", where=str(path)) from None
+    places = []
+    for y, below in down:
+        for x, beside in across:
+            changes = {**below, **beside}
+            compared = {**changes, **data.get("reference", {})}
+            scenes = (_scenes(data, fields, path.name) for fields in (changes, compared))
+            places.append(Place(x, y, *scenes))
+    return Map(path.stem, data, tuple(places))
 
 
-def _axis(data: Mapping[str, Any]) -> Axis:
-    if "fractions" in data:
-        places = tuple(Place(value, {}) for value in data["fractions"])
-        return Axis(data["label"], places, is_fraction=True)
-    if "entries" in data:
-        return Axis(
-            data["label"], tuple(Place(one["label"], one["set"]) for one in data["entries"])
-        )
-
-    def times(value: Any, factor: float) -> Any:
-        return value * factor if isinstance(value, int | float) else value
-
-    places = tuple(
-        Place(value, {name: times(value, factor) for name, factor in data["fields"].items()})
-        for value in data["values"]
-    )
-    return Axis(data["label"], places)
-
-
-def _runs(data: Mapping[str, Any], x: Axis, y: Axis, where: str) -> Iterator[Run]:
-    fractions = [float(place.label) for place in x.places] if x.is_fraction else None
-    for down in y.places:
-        for across in x.places[:1] if fractions else x.places:
-            changes = {**down.changes, **across.changes}
-            if fractions:
-                changes["protocol.fractions"] = fractions
-            scenes = _scenes(data, changes, where)
-            references = _scenes(data, {**changes, **data.get("reference", {})}, where)
-            yield Run(across, down, scenes, references)
+def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
+    """The places of an axis: the label, and the fields that it sets."""
+    if "fractions" in axis:
+        yield None, {"protocol.fractions": [float(value) for value in axis["fractions"]]}
+    for entry in axis.get("entries", ()):
+        yield entry["label"], entry["set"]
+    for value in axis.get("values", ()):
+        number = isinstance(value, int | float)
+        fields = axis["fields"].items()
+        yield value, {name: value * factor if number else value for name, factor in fields}
 
 
 def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> tuple[Scene, ...]:
@@ -186,9 +138,8 @@ def run(out: Path, *, workers: int) -> Finished:
     maps = load_all()
 
     def make(runs: Runs) -> tuple[Tables, Callable[[], list[Section]]]:
-        judged = [judge(one, runs) for one in maps]
-        table = pd.concat([one.table for one in judged], ignore_index=True)
-        return {"maps": table}, lambda: _sections(judged)
+        tables = [judge(one, runs) for one in maps]
+        return {"maps": pd.concat(tables, ignore_index=True)}, lambda: _sections(maps, tables)
 
     finished = experiment.run(
         "stability",
@@ -206,42 +157,47 @@ def run(out: Path, *, workers: int) -> Finished:
 
 def planned_for(maps: Sequence[Map]) -> Plan:
     """The runs of some maps, those that they share once."""
-    scenes = (
-        scene
+    scenes = {
+        scene.id: as_asked(scene)
         for one in maps
-        for run in one.runs
-        for scene in (*run.scenes, *(run.references if one.judge == "pile" else ()))
-    )
-    return plan.of({scene.id: as_asked(scene) for scene in scenes}, "stability")
+        for place in one.places
+        for scene in (*place.scenes, *(place.references if one.data["judge"] == "pile" else ()))
+    }
+    return plan.of(scenes, "stability")
 
 
-def judge(one: Map, runs: Runs) -> Judged:
-    """Judge every run of a map."""
-    rows = []
-    for run in one.runs:
-        places = [place.label for place in one.x.places] if one.x.is_fraction else [run.x.label]
-        failed = next((end for scene in run.scenes if (end := _failure(scene, runs))), None)
-        for x in places:
-            row: Row = {"map": one.name, "x": x, "y": run.y.label}
+def judge(one: Map, runs: Runs) -> pd.DataFrame:
+    """Judge every run of a map.
+
+    Returns
+    -------
+    DataFrame
+        A row for each place: map; x and y, numbers or texts; verdict, "good", "wrong" or one of
+        `NOTICED`; caught, whether the run itself noticed; error, relative and signed, or NaN; note,
+        the cause.
+    """
+    rows: list[Row] = []
+    for place in one.places:
+        failed = next((end for scene in place.scenes if (end := _failure(scene, runs))), None)
+        fractions: Sequence[float | None] = one.fractions or [None]
+        for at in fractions:
+            row: Row = {"map": one.name, "x": place.x if at is None else at, "y": place.y}
             if failed:
                 row |= {"verdict": failed[0], "caught": True, "error": math.nan, "note": failed[1]}
             else:
-                error = _error(one, run, runs, float(x) if one.x.is_fraction else None)
-                verdict = "good" if abs(error) <= WRONG else "wrong"
+                error = max(_errors(one, place, runs, at), key=abs, default=math.nan)
+                row |= {"verdict": "good" if abs(error) <= WRONG else "wrong", "caught": False}
                 note = "its reference failed" if math.isnan(error) else ""
-                row |= {"verdict": verdict, "caught": False, "error": error, "note": note}
+                row |= {"error": error, "note": note}
             rows.append(row)
-    return Judged(one, pd.DataFrame(rows))
+    return pd.DataFrame(rows)
 
 
 def _failure(scene: Scene, runs: Runs) -> tuple[str, str] | None:
     """How a run that the scene needs failed, and why; None where all of them are done."""
-    planned = runs.planned
-    if scene.id in planned.piles:
-        names = [run.name for run in planned.piles[scene.id].runs]
-    else:
-        names = [cells.name for cells in planned.cells if scene in cells.scenes]
-    lost = next((name for name in names if name not in runs.done), None)
+    pile = runs.planned.piles.get(scene.id)
+    needed = pile.runs if pile else [one for one in runs.planned.cells if scene in one.scenes]
+    lost = next((run.name for run in needed if run.name not in runs.done), None)
     if lost is None:
         return None
     verdict, why = case.ended(runs.cases / lost)
@@ -249,16 +205,15 @@ def _failure(scene: Scene, runs: Runs) -> tuple[str, str] | None:
     return verdict if verdict in NOTICED else "stalled", why
 
 
-def _error(one: Map, run: Run, runs: Runs, fraction: float | None) -> float:
-    """The signed relative error of tau_c that is largest; infinite where one was not reached."""
-    errors = []
-    for scene, reference in zip(run.scenes, run.references, strict=True):
-        if one.judge == "grain":
+def _errors(one: Map, place: Place, runs: Runs, fraction: float | None) -> Iterator[float]:
+    """The signed relative errors of tau_c; infinite where only one of two was reached."""
+    for scene, reference in zip(place.scenes, place.references, strict=True):
+        if one.data["judge"] == "grain":  # against the closed form
             cells = next(cells for cells in runs.planned.cells if scene in cells.scenes)
             found = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
-            errors.append(float(found.value[cells.scenes.index(scene)]) ** 2 - 1)
+            yield float(found.value[cells.scenes.index(scene)]) ** 2 - 1
         elif _failure(reference, runs):
-            errors.append(math.nan)
+            yield math.nan
         else:
             fractions = scene.protocol.fractions if fraction is None else (fraction,)
             piles = (runs.planned.piles[asked.id] for asked in (scene, reference))
@@ -266,21 +221,17 @@ def _error(one: Map, run: Run, runs: Runs, fraction: float | None) -> float:
             for answer, other in zip(*answers, strict=True):
                 if not (math.isnan(answer.tau) and math.isnan(other.tau)):
                     error = answer.tau / other.tau - 1
-                    errors.append(math.inf if math.isnan(error) else error)
-    return max(errors, key=abs, default=math.nan)
+                    yield math.inf if math.isnan(error) else error
 
 
-TITLE = "Where each method fails"
-
-
-def _sections(judged: Sequence[Judged]) -> list[Section]:
+def _sections(maps: Sequence[Map], tables: Sequence[pd.DataFrame]) -> list[Section]:
     """The page: the sheet of all maps, then each by itself."""
     from orchestrator.experiments import stability_figures as figures
 
-    sheet = experiment.figure("maps", TITLE, "", figures.sheet(judged))
+    sheet = experiment.figure("maps", TITLE, "", figures.sheet(maps, tables))
     sections = [Section("All maps", experiment.texts("stability")["maps"], (sheet,))]
-    for one in judged:
-        shown = one.map
-        drawn = experiment.figure(f"map-{shown.name}", shown.title, "", figures.draw(one))
-        sections.append(Section(shown.title, shown.question, (drawn,), limits=shown.limits))
+    for one, table in zip(maps, tables, strict=True):
+        title, question = one.data["title"], one.data["question"]
+        drawn = experiment.figure(f"map-{one.name}", title, "", figures.draw(one, table))
+        sections.append(Section(title, question, (drawn,), limits=one.limits))
     return sections

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from orchestrator import pipeline
 from orchestrator.experiments import stability, stability_figures
 from orchestrator.experiments.experiment import Runs
-from orchestrator.experiments.stability import NOTICED, Axis, Judged, Map
+from orchestrator.experiments.stability import NOTICED, Map
 from orchestrator.fidelity import calibration, limits
 from orchestrator.runs.workspace import EXPERIMENT, Workspace
 
@@ -35,11 +35,12 @@ forces = { law = "high" }
 
 @pytest.mark.parametrize("one", ALL, ids=lambda one: one.name)
 def test_a_maps_file_spans_its_axes(one: Map) -> None:
-    across = 1 if one.x.is_fraction else len(one.x.places)
-    assert len(one.runs) == across * len(one.y.places)
-    assert all(run.scenes for run in one.runs)
-    if one.judge == "pile":
-        assert all(len(run.scenes) == len(run.references) for run in one.runs)
+    across, down = ({place[axis] for place in one.places} for axis in (0, 1))
+    assert len(one.places) == len(across) * len(down)
+    assert (across == {None}) == bool(one.fractions)
+    assert all(place.scenes for place in one.places)
+    if one.data["judge"] == "pile":
+        assert all(len(place.scenes) == len(place.references) for place in one.places)
 
 
 def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
@@ -51,7 +52,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     with space.held(EXPERIMENT, "stability"):
         pipeline.complete(pipeline.missing(planned, space), space, workers=2, limit_s=120)
     runs = Runs(planned, space.cases, planned.done(space.cases), {})
-    good, bad = stability.judge(one, runs).table.sort_values("x").to_dict("records")
+    good, bad = stability.judge(one, runs).sort_values("x").to_dict("records")
     assert good["verdict"] == "good"
     assert abs(good["error"]) < 0.05
     assert bad["verdict"] in ("exploded", "noisy")
@@ -82,10 +83,14 @@ def test_the_limits_were_read_off_the_maps() -> None:
     assert (pockets[~touching]["verdict"] != "good").mean() > 0.5
 
 
+Judged = tuple[Map, pd.DataFrame]
+
+
 def _made(rows: Sequence[tuple[object, ...]], title: str = "T", name: str = "none") -> Judged:
-    one = Map(name, title, "How far?", "pile", Axis("x", ()), Axis("y", ()), ())
+    axes = {"x": {"label": "x"}, "y": {"label": "y"}}
+    one = Map(name, {"title": title, "question": "How far?", "judge": "pile", **axes}, ())
     columns = ["x", "y", "verdict", "caught", "error", "note"]
-    return Judged(one, pd.DataFrame(rows, columns=columns))
+    return one, pd.DataFrame(rows, columns=columns)
 
 
 @pytest.fixture
@@ -117,7 +122,7 @@ def _edges(ax: Axes, *looks: str) -> set[tuple[tuple[float, ...], ...]]:
 
 
 def test_each_cell_shows_its_run(small: Judged) -> None:
-    (ax,) = stability_figures.draw(small).axes
+    (ax,) = stability_figures.draw(*small).axes
     expected = {(0, 0): "good", (0, 1): "good", (1, 1): "good", (2, 0): "exploded", (2, 1): "wrong"}
     assert _cells(ax) == expected
     errors = {text.get_text() for text in ax.texts if text.get_gid() == "error"}
@@ -137,15 +142,15 @@ def test_each_cell_shows_its_run(small: Judged) -> None:
 def test_a_sheet_holds_all_maps_and_the_worst_run_of_a_place(small: Judged) -> None:
     rows = [("a", 1.0, verdict, False, 0.1, "") for verdict in ("wrong", "exploded", "good")]
     worst, empty = _made([*rows, (None, 1.0, "good", False, 0.1, "")]), _made([], title="empty")
-    figure = stability_figures.sheet([small, empty, worst])
+    figure = stability_figures.sheet([small[0], empty[0], worst[0]], [small[1], empty[1], worst[1]])
     shown = [ax for ax in figure.axes if ax.axison]
     assert [ax.get_title("left") for ax in shown] == ["T", "empty", "T"]
-    assert _cells(shown[0]) == _cells(stability_figures.draw(small).axes[0])
+    assert _cells(shown[0]) == _cells(stability_figures.draw(*small).axes[0])
     assert "nothing was run" in [text.get_text() for text in shown[1].texts]
     assert _cells(shown[2]) == {(0, 0): "exploded"}
     letters = {letter for *_, letter in stability_figures.VERDICTS.values()}
     assert len(letters) == len(stability_figures.VERDICTS) == 5  # it reads without colour
-    assert not [ax for ax in stability_figures.sheet([]).axes if ax.axison]
+    assert not [ax for ax in stability_figures.sheet([], []).axes if ax.axison]
 
 
 @pytest.mark.parametrize(
