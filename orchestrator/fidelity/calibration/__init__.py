@@ -6,9 +6,9 @@ the choices that all levels share, ``maps.csv`` what ``orchestrator stability`` 
 """
 
 import math
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,8 +47,7 @@ SAME_CELL = 0.02
 """Relative difference from the default height of the first cell that changes no known error."""
 
 
-@dataclass(frozen=True)
-class Known:
+class Known(NamedTuple):
     """Known error of a level, or of a pair of levels, on a scene.
 
     Attributes
@@ -74,16 +73,10 @@ class Known:
 UNKNOWN = Known(math.inf, 0.0, math.inf)
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Effect of the choices that all levels share on a threshold.
+class Spread(NamedTuple):
+    """How far the choices of all levels lower and raise a Shields number, and the widest of them.
 
-    Attributes
-    ----------
-    low, high : float
-        How far they lower and raise the Shields number, relative; NaN where nothing is known.
-    dominant : str
-        The choice with the widest share; empty where nothing is known.
+    Relative; NaN and an empty name where nothing is known.
     """
 
     low: float
@@ -154,7 +147,7 @@ def unmeasured(scene: Scene) -> str:
 
     A known error holds for the settings at which it was measured.
     """
-    if lifts_off(scene):
+    if float(closed_form(scene).lift) >= LIFT_OFF * scene.weight:
         return "lift that carries grains off before they roll"
     solved = scene.flow.model == "solve"
     for name, default in DEFAULTS.items():
@@ -174,11 +167,6 @@ def unmeasured(scene: Scene) -> str:
     return ""
 
 
-def lifts_off(scene: Scene) -> bool:
-    """Whether the lift carries a grain off before it rolls, which DEM alone shows."""
-    return float(closed_form(scene).lift) >= LIFT_OFF * scene.weight
-
-
 def known(pair: Pair, scene: Scene) -> Known:
     """Known error of a pair of levels on a pile, at the fraction where it is largest.
 
@@ -193,20 +181,12 @@ def known(pair: Pair, scene: Scene) -> Known:
     """
     if unmeasured(scene):
         return UNKNOWN
-    return known_of_classes(
-        *(
-            _nearest(level, levels, scene)
-            for level, levels in zip(pair, LEVELS.values(), strict=True)
-        ),
-        *scene_classes(scene),
-    )
-
-
-def _nearest(level: Level, levels: tuple[Level, ...], scene: Scene) -> Level:
-    if level is not AS_ASKED:
-        return level
-    bounds = (other for other in reversed(levels) if other.same_model and other.bounds(scene))
-    return next(bounds, AS_ASKED)
+    levels = list(pair)
+    for place, part in enumerate(LEVELS.values()):
+        if levels[place] is AS_ASKED:
+            bounds = (one for one in reversed(part) if one.same_model and one.bounds(scene))
+            levels[place] = next(bounds, AS_ASKED)
+    return known_of_classes(*levels, *scene_classes(scene))
 
 
 def scene_classes(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -249,8 +229,7 @@ def model_class(scene: Scene) -> str:
     """The class of scenes that share what the choices common to all levels do to a threshold."""
     assert isinstance(scene.bed, PileBed)
     reynolds = float(closed_form(scene).reynolds)
-    names = {VISCOUS: "viscous", ROUGH: "transitional", math.inf: "rough"}
-    regime = next(name for end, name in names.items() if reynolds < end)
+    regime = "viscous" if reynolds < VISCOUS else "transitional" if reynolds < ROUGH else "rough"
     bed = scene.bed
     shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
     return f"{bed.packing}, {regime}{shape}"
