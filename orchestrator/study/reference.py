@@ -44,12 +44,11 @@ the field and the remedy. The [glossary](glossary.md) explains the words.
 | `group` | one group | the experiments |
 
 The *scope* of a field says for which scenes it has an effect; for all others its column in the
-tables is empty. A field *about* the answer says how a scene is answered, not what is asked: with a
-tolerance it may be changed. The column `answered_…` of the table of scenes has the value that was
-run, also of what a study file leaves open.
+tables is empty. A tolerance may change a field marked *answer*, which says how a scene is answered.
+The column `answered_...` of the table of scenes has the value that was run.
 """
 SIGNS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
-COLUMNS = "| field | symbol | unit | range | default | meaning | scope | about | column |"
+COLUMNS = "| field | symbol, unit | range | default | meaning | scope | column |"
 
 
 def text() -> str:
@@ -61,10 +60,10 @@ def _part(part: str) -> Iterator[str]:
     about = (fields.PARTS[part].__doc__ or "").partition("\n")[0]
     if part == "bed":
         about = "One grain on two others, or a pile of grains."
-    yield f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 9}|"
+    yield f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 7}|"
     for one in fields.FIELDS:
         if one.name.startswith(f"{part}."):
-            yield f"| {' | '.join(_row(one))} |".replace("*", r"\*")
+            yield f"| {' | '.join(_row(one))} |"
     yield ""
 
 
@@ -79,15 +78,15 @@ def _row(one: Quantity) -> list[str]:
         default = "none: required"
     elif value is None:
         default = "worked out"
+    scope = "" if info.scope == "every scene" else info.scope
+    role = "" if info.about == "question" else f"*{info.about}*"
     return [
         f"`{name}`",
-        info.symbol,
-        info.unit,
+        ", ".join(filter(None, (info.symbol, info.unit))).replace("*", r"\*"),
         ", ".join(bounds(field)),
         default,
-        "<br>".join([one.meaning, *listed]),
-        "" if info.scope == "every scene" else info.scope,
-        "" if info.about == "question" else info.about,
+        "<br>".join([one.meaning, *listed]).replace("*", r"\*"),
+        ", ".join(filter(None, (scope, role))),
         f"`{one.column}`" if one.column in fields.COLUMNS else "",
     ]
 
