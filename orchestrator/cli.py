@@ -211,6 +211,6 @@ def _prune(options: argparse.Namespace) -> int:
 def _doctor(options: argparse.Namespace) -> int:
     from orchestrator.solvers import doctor
 
-    findings = doctor.examine()
+    findings = list(doctor.examine())
     print(doctor.text(findings))
     return 0 if all(finding.good for finding in findings) else 1

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,10 +14,11 @@ from orchestrator.errors import OrchestratorError
 from orchestrator.runs import process
 from orchestrator.solvers import liggghts, openfoam
 
-LIBRARIES = (
-    *("numpy", "scipy", "pandas", "pydantic"),
-    *("gmsh", "meshio", "pyvista", "matplotlib"),
-)
+SOLVERS: dict[str, Callable[[], str]] = {
+    "OpenFOAM": openfoam.version,
+    "LIGGGHTS": liggghts.version,
+}
+LIBRARIES = ("numpy", "scipy", "pandas", "pydantic", "gmsh", "meshio", "pyvista", "matplotlib")
 TOOLS = ("stdbuf", "sha256sum", "setpriv")
 _NEEDS = {"gmsh": "apt-get install libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"}
 """Packages that a library needs beside itself."""
@@ -26,7 +27,7 @@ FREE_GIB = 1.0
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at.
+    """One item that was examined.
 
     Attributes
     ----------
@@ -34,41 +35,35 @@ class Finding:
         Its name.
     good : bool
         Whether a study can run with it.
-    said : str
+    text : str
         Version, or what is wrong and what to do.
     """
 
     what: str
     good: bool
-    said: str
+    text: str
 
 
-def examine() -> list[Finding]:
-    """Look at the solvers, the libraries, the tools and the disk."""
-    return [
-        Finding("Python", sys.version_info >= (3, 11), sys.version.split()[0]),
-        *(_solver(name, ask) for name, ask in _SOLVERS.items()),
-        *(_library(name) for name in LIBRARIES),
-        *(_tool(name) for name in TOOLS),
-        _limits(),
-        _disk(Path.cwd()),
-    ]
-
-
-_SOLVERS: dict[str, Callable[[], str]] = {
-    "OpenFOAM": openfoam.version,
-    "LIGGGHTS": liggghts.version,
-}
-
-
-def _solver(name: str, ask: Callable[[], str]) -> Finding:
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        try:
-            said = ask()
-        except OrchestratorError as error:
-            return Finding(name, False, str(error))
-    return Finding(name, True, " ".join([said, *(f"(warning: {w.message})" for w in caught)]))
+def examine() -> Iterator[Finding]:
+    """Examine the solvers, the libraries, the tools, the limits of the shell and the disk."""
+    yield Finding("Python", sys.version_info >= (3, 11), sys.version.split()[0])
+    for name, version in SOLVERS.items():
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                words = [version(), *(f"(warning: {each.message})" for each in caught)]
+                yield Finding(name, True, " ".join(words))
+            except OrchestratorError as error:
+                yield Finding(name, False, str(error))
+    for name in LIBRARIES:
+        yield _library(name)
+    for name in TOOLS:
+        path = shutil.which(name)
+        yield Finding(name, bool(path), path or "missing: install coreutils and util-linux")
+    low = process.shortage()
+    yield Finding("limits", not low, low or "enough memory and open files")
+    free = shutil.disk_usage(Path.cwd()).free / 2**30
+    yield Finding("disk", free >= FREE_GIB, f"{free:.1f} GiB free here")
 
 
 def _library(name: str) -> Finding:
@@ -86,27 +81,11 @@ def _library(name: str) -> Finding:
     )
     if loaded.returncode == 0:
         return Finding(name, True, version)
-    said = (loaded.stderr.strip().splitlines() or [f"it ended with {loaded.returncode}"])[-1]
+    error = [f"it ended with {loaded.returncode}", *loaded.stderr.strip().splitlines()][-1]
     remedy = _NEEDS.get(name, f"pip install --force-reinstall {name}")
-    return Finding(name, False, f"does not load: {said}: {remedy}")
-
-
-def _tool(name: str) -> Finding:
-    path = shutil.which(name)
-    return Finding(name, path is not None, path or "missing: install coreutils and util-linux")
-
-
-def _limits() -> Finding:
-    low = process.shortage()
-    return Finding("limits", not low, low or "enough memory and open files")
-
-
-def _disk(folder: Path) -> Finding:
-    free = shutil.disk_usage(folder).free / 2**30
-    return Finding("disk", free >= FREE_GIB, f"{free:.1f} GiB free here")
+    return Finding(name, False, f"does not load: {error}: {remedy}")
 
 
 def text(findings: list[Finding]) -> str:
     """The findings for people."""
-    rows = (f"{'ok ' if f.good else 'NOT'}  {f.what:<12} {f.said}" for f in findings)
-    return "\n".join(rows)
+    return "\n".join(f"{'ok ' if f.good else 'NOT'}  {f.what:<12} {f.text}" for f in findings)

@@ -36,28 +36,20 @@ def version() -> str:
     """
     path = process.find(PROGRAM, remedy=INSTALL)
     # without the option it leaves a log wherever the user happens to be
-    said = process.ask(path, "-h", "-log", "none", env=ENVIRONMENT)
-    found = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", said.text)
-    if not found:
+    reply = process.ask(path, "-h", "-log", "none", env=ENVIRONMENT)
+    match = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", reply.text)
+    if not match:
         raise SolverError(
-            f"{path} does not say that it is a LIGGGHTS: {said.gist}",
+            f"{path} does not say that it is a LIGGGHTS: {reply.gist}",
             remedy=f"try `{path} -h` by hand; if it is broken, install it anew",
         )
-    _judge((int(found[1]), int(found[2])), path)
-    return ".".join(found.groups())
-
-
-def _judge(number: tuple[int, int], path: str) -> None:
+    what = f"{path} is version {match[1]}.{match[2]}"
+    number = (int(match[1]), int(match[2]))
     if number < TRIED:
-        raise SolverError(
-            f"{path} is version {number[0]}.{number[1]}, older than the decks need",
-            remedy="install LIGGGHTS 3.8",
-        )
+        raise SolverError(f"{what}, older than the decks need", remedy="install LIGGGHTS 3.8")
     if number > TRIED:
-        warnings.warn(
-            f"{path} is version {number[0]}.{number[1]}; the decks were tried with 3.8",
-            stacklevel=3,
-        )
+        warnings.warn(f"{what}; the decks were tried with 3.8", stacklevel=2)
+    return ".".join(match.groups())
 
 
 def ranks(grains: float) -> int:

@@ -61,4 +61,4 @@ def disk(tmp_path: Path) -> Iterator[Mount]:
 
     yield mount
     if folder.exists():
-        subprocess.run(["umount", str(folder)], check=True)
+        subprocess.run(["umount", "-l", str(folder)], check=True)

@@ -106,7 +106,7 @@ def test_the_version_that_is_here() -> None:
     [
         ("Using: OpenFOAM-v1812 (see www.OpenFOAM.com)", "OpenFOAM 1812 is older than 1912"),
         ("Using: OpenFOAM-10 (see https://openfoam.org)", "not of the openfoam.com line: .*-10"),
-        ("foo", "not of the openfoam.com line: it ended with 0 and said “foo”"),
+        ("foo", "not of the openfoam.com line: it ended with 0 and printed “foo”"),
     ],
 )
 def test_versions_that_are_refused(

@@ -87,7 +87,7 @@ def test_a_program_that_goes_on_while_the_disk_is_full_is_ended(
         script = "head -c 10000000 /dev/zero >file; while :; do sleep 0.1; done"
         assert _sh(folder, script).over == "disk"
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
+        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def test_a_stop_ends_the_program(tmp_path: Path) -> None:
@@ -222,6 +222,6 @@ def test_the_doctor_names_a_solver_that_is_broken(put: Callable[..., Path], name
     put("exit 1")
     openfoam.version.cache_clear()
     liggghts.version.cache_clear()
-    findings = doctor.examine()
+    findings = list(doctor.examine())
     assert sum(not finding.good for finding in findings) == 1
     assert len(doctor.text(findings).splitlines()) == len(findings)
