@@ -122,15 +122,15 @@ def _of_flow(pile: Pile) -> Row:
         "alpha_deg": case.slope_deg,
         "h_m": case.height_m,
         "z0_m": case.roughness_m,
-        "u_e_m_s": case.speed_m_s,
+        "u_e_m_s": case.settings.speed,
         "ustar0_m_s": case.ustar0_m_s,
         "u_e_height_m": SPEED_HEIGHT * case.height_m,
         "lid_height_m": case.lid * case.height_m,
         "solve_nu_m2_s": case.viscosity_m2_s,
         "rho_f_kg_m3": pile.scene.fluid.density,
         "first_cell_m": case.first_cell_m,
-        "cells_per_face": case.cells_per_face,
-        "turbulence_model": case.turbulence_model,
+        "cells_per_face": case.settings.cells_per_face,
+        "turbulence_model": case.settings.turbulence_model,
     }
 
 

@@ -14,10 +14,10 @@ from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import model
-from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.flow.theory import half_length, seen_by_the_flow
 from orchestrator.grains.loaded_bed import LoadedBed
 from orchestrator.physics.constants import KARMAN
+from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import MOST_GRAINS, Scene
 from orchestrator.study.study import Study
@@ -250,7 +250,7 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Fault]:
         )
         remedy = "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound"
         yield Fault("first-cell", "bed.roughness", what, remedy)
-    ustar0 = undisturbed_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0)
+    ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
         what = (

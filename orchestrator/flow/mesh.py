@@ -1,68 +1,198 @@
-"""The mesh of a flow case: made by gmsh from the case's own `pile.geo`, and checked."""
+"""The mesh of a flow case: its grid lines along the bed, and the hexahedra that gmsh makes of them.
 
-import re
+The grid lines are vertical. Each corner of the bed line is one of them; between two corners the
+cells are a geometric series. They are shortest at sharp tops, where the stress has its peaks.
+"""
+
 import threading
-from dataclasses import dataclass
-from math import cos, radians
+from dataclasses import dataclass, replace
+from math import ceil, expm1, inf, log, radians, tan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import brentq
 
+from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
-from orchestrator.flow.grid import Grid
+from orchestrator.types import FloatArray
 
+SHARP_DEG = 8.0
+"""Least bend of the bed that is a corner, not a part of a curve."""
+CELLS_ON_OBSTACLE = 8
+"""Cells in the height of an obstacle, along the bed beside it."""
+TOP = 0.35
+"""Length of the cells at sharp tops over the mean of a face: a grain's stress is averaged over h/40
+there."""
+NEAR = 4.0
+"""Beyond this, h before and behind the forms and above the bed, cells grow by `FAR`."""
+FAR = 1.3
+"""Ratio of neighbouring cells there, with 40 cells on a face."""
+LEVEL_CELLS = 8
+"""A level piece of this many cells at least is divided in the middle: cells grow towards it."""
 GROUPS = frozenset({"air", "bed", "lid", "inlet", "outlet", "sides"})
 """Physical groups of the mesh; all but `air` become patches."""
-
 ARGUMENTS = ["gmsh", "-v", "0", "-no_signal_handler"]
-"""The last is for PETSc, a part of gmsh that would take all signals: a hang-up would end this
-process, even under nohup. The one before keeps gmsh quiet about it."""
-
-_GMSH = threading.Lock()  # gmsh has one global state
-_TOLERANCE = 0.01
-_QUAD, _HEXAHEDRON = 3, 5  # gmsh's element types
-
+"""PETSc, a part of gmsh, would take all signals: a hang-up would end this process."""
 LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each corner, m;
 // cells from it to the next one, and the ratio of each of these to the one upstream of it.
 """
-
-Points = NDArray[np.float64]
-Cells = NDArray[np.int64]
+_GMSH = threading.Lock()  # gmsh has one global state
+_HEXAHEDRON = 5  # gmsh's element type
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """The mesh of a pile.
+class Grid:
+    """The pieces between n corners of a bed line.
 
     Attributes
     ----------
-    points : (P, 3) array
-        Nodes, m.
-    cells : (C, 8) array
-        Nodes of each hexahedron, in the order of VTK.
-    bed : (F, 4) array
-        Nodes of the faces of the bed.
+    line : BedLine
+        The bed line, m, with a corner more where a piece was divided.
+    cells : tuple of int, n - 1
+        Cells of each piece.
+    ratio : tuple of float, n - 1
+        Length of a cell over that of the one upstream of it.
     """
 
-    points: Points
-    cells: Cells
-    bed: Cells
+    line: BedLine
+    cells: tuple[int, ...]
+    ratio: tuple[float, ...]
+
+    @property
+    def shortest(self) -> tuple[float, float, float]:
+        """Length of the shortest cell and the two ends of its piece, m."""
+        pieces = zip(self.cells, self.ratio, np.diff(self.line.x).tolist(), strict=True)
+        shorter = [_first((n, max(ratio, 1 / ratio)), length) for n, ratio, length in pieces]
+        piece = int(np.argmin(shorter))
+        return shorter[piece], self.line.x[piece], self.line.x[piece + 1]
+
+    def write(self, path: Path) -> None:
+        """Write the bed line and the cells along it as `pile.geo` includes them."""
+        rows = zip(self.line.x, self.line.z, (*self.cells, 0), (*self.ratio, 1.0), strict=True)
+        lines = ",\n".join(f"  {x!r}, {z!r}, {cells}, {ratio!r}" for x, z, cells, ratio in rows)
+        path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
 
 
-def write_line(grid: Grid, path: Path) -> None:
-    """Write the bed line and the cells along it as `pile.geo` includes them."""
-    rows = zip(grid.line.x, grid.line.z, (*grid.cells, 0), (*grid.ratio, 1.0), strict=True)
-    lines = ",\n".join(f"  {x!r}, {z!r}, {cells}, {ratio!r}" for x, z, cells, ratio in rows)
-    path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
+def growth_far(growth: float, cells_per_face: int) -> float:
+    """Ratio of neighbouring cells far from the forms."""
+    return max(growth, float(FAR ** (40 / cells_per_face)))
+
+
+def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
+    """A line with flat bed of some lengths, m, before and behind it in place of its own."""
+    x = (line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream)
+    return replace(line, x=x)
+
+
+def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
+    """The grid along a bed line that begins and ends with flat bed.
+
+    Parameters
+    ----------
+    line : BedLine
+        m.
+    slope_deg : float
+        Slope of the face that has `cells_per_face` cells if it is as high as the form; 0: none.
+    cells_per_face : int
+        Their number.
+    growth : float
+        Ratio of neighbouring cells beside the form.
+    """
+    face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
+    cell = face / cells_per_face
+    # a face has a short cell at its sharp top, and this at its foot
+    face_ratio = ratio_of(cells_per_face, TOP * cell, face)
+    foot = TOP * cell * face_ratio ** (cells_per_face - 1) if slope_deg else cell
+    ends = (line.x[1] - NEAR * line.h, line.x[-2] + NEAR * line.h)
+    inside = [x for x in ends if line.x[0] + cell < x < line.x[-1] - cell]
+    line = _divided(line.with_corners(inside), cell)
+    sizes = _sizes(line, cell, foot, max(growth, face_ratio))
+    lengths = np.diff(line.x)
+    inner = [_piece(*one) for one in zip(lengths[1:-1], sizes[1:-2], sizes[2:-1], strict=True)]
+    far = growth_far(growth, cells_per_face)
+    up, ratio_up = _away(lengths[0], _first(inner[0], lengths[1]), far)
+    last, ratio_last = inner[-1]
+    down = _away(lengths[-1], _first((last, 1 / ratio_last), lengths[-2]), far)
+    pieces = [(up, 1 / ratio_up), *inner, down]
+    return Grid(line, tuple(n for n, _ in pieces), tuple(r for _, r in pieces))
+
+
+def ratio_of(cells: int, first: float, length: float) -> float:
+    """The ratio, at least 1, at which `cells` cells that begin with `first` fill a length."""
+    if cells < 2 or first * cells >= length:
+        return 1.0
+
+    def beyond(ratio: float) -> float:
+        return first * float(expm1(cells * log(ratio))) / (ratio - 1) - length
+
+    # the last cell alone would fill the length at the upper end
+    return float(brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15))
+
+
+def _divided(line: BedLine, cell: float) -> BedLine:
+    """The line with a corner in the middle of pieces whose cells shall grow from both ends."""
+    lengths, bends = np.diff(line.x), line.bends_deg
+    level = np.abs(np.diff(line.z)) < 1e-9 * line.h
+    level &= lengths > LEVEL_CELLS * cell
+    ridge = (bends[:-1] > SHARP_DEG) & (bends[1:] > SHARP_DEG)
+    chosen = np.flatnonzero((level | ridge)[1:-1]) + 1
+    return line.with_corners([(line.x[i] + line.x[i + 1]) / 2 for i in chosen])
+
+
+def _sizes(line: BedLine, cell: float, foot: float, growth: float) -> FloatArray:
+    """Length of the cells at each corner, m; the ends of the line have none of their own."""
+    x, z, bends, lengths = np.array(line.x), np.array(line.z), line.bends_deg, np.diff(line.x)
+    sizes = np.full(len(x), cell)
+    sizes[bends > SHARP_DEG] = TOP * cell
+    sizes[bends < -SHARP_DEG] = foot
+    # in the middle of level bed, and at the ends, as long as the growth allows
+    level = np.abs(np.diff(z)) < 1e-9 * line.h
+    sizes[1:-1][(np.abs(bends[1:-1]) < 1e-9) & level[1:] & level[:-1]] = inf
+    sizes[[0, -1]] = inf
+    for start, end in line.bare:
+        on_it = (x >= start - 1e-12) & (x <= end + 1e-12)
+        sizes[on_it] = np.minimum(sizes[on_it], np.ptp(z[on_it]) / CELLS_ON_OBSTACLE)
+    sizes[1:-1] = np.minimum(sizes[1:-1], np.minimum(lengths[:-1], lengths[1:]))
+    for i in range(1, len(sizes)):
+        sizes[i] = min(sizes[i], sizes[i - 1] + (growth - 1) * lengths[i - 1])
+    for i in range(len(sizes) - 2, -1, -1):
+        sizes[i] = min(sizes[i], sizes[i + 1] + (growth - 1) * lengths[i])
+    return sizes
+
+
+def _piece(length: float, start: float, end: float) -> tuple[int, float]:
+    """Cells, and their ratio, of a piece whose first and last cells are about `start` and `end`."""
+    first, last = min(start, end), max(start, end)
+    if last >= length:
+        return 1, 1.0
+    ratio = (length - first) / (length - last)
+    count = length / first if ratio - 1 < 1e-9 else 1 + log(last / first) / log(ratio)
+    cells = max(ceil(count - 1e-6), 1)
+    if cells < 3 or ratio - 1 < 1e-6 or first * cells >= length:
+        return cells, 1.0
+    ratio = ratio_of(cells, first, length)
+    return cells, ratio if start <= end else 1 / ratio
+
+
+def _away(length: float, first: float, growth: float) -> tuple[int, float]:
+    """Cells that begin with `first` and grow until they fill a length."""
+    cells = ceil(log(1 + length * (growth - 1) / first) / log(growth))
+    return cells, ratio_of(cells, first, length)
+
+
+def _first(piece: tuple[int, float], length: float) -> float:
+    """Length of the first cell of a piece; its cells are a geometric series."""
+    cells, ratio = piece
+    if ratio < 1:
+        return _first((cells, 1 / ratio), length) * ratio ** (1 - cells)
+    return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
 def write_mesh(directory: Path) -> None:
-    """Mesh a case: `pile.geo` with what it includes becomes `pile.msh`, ASCII 2.2.
+    """Mesh a case: `pile.geo` with the files that it includes becomes `pile.msh`, ASCII 2.2.
 
-    The mesh must hold hexahedra only, none of them inverted, the physical groups in `GROUPS`, and
-    first cells of the height `first_cell` (normal to the windward faces) within 1 %.
+    The mesh must hold hexahedra only, none of them inverted, and the physical groups in `GROUPS`.
 
     Parameters
     ----------
@@ -72,20 +202,8 @@ def write_mesh(directory: Path) -> None:
     Raises
     ------
     SolverError
-        If gmsh fails, or the mesh is not the one asked for.
+        If gmsh fails, or the mesh is not such a one.
     """
-    gmsh = _gmsh()
-    with _GMSH:
-        # the default installs a signal handler, which only the main thread may
-        gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
-        try:
-            _check(_generated(gmsh, directory), directory)
-            gmsh.write(str(directory / "pile.msh"))
-        finally:
-            gmsh.finalize()
-
-
-def _gmsh() -> Any:
     try:
         import gmsh
     except OSError as error:
@@ -93,95 +211,34 @@ def _gmsh() -> Any:
             f"gmsh does not load: {error}",
             remedy="install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1",
         ) from error
-    return gmsh
+    with _GMSH:
+        # the default installs a signal handler, which only the main thread may
+        gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
+        try:
+            if fault := _meshed(gmsh, directory):
+                raise SolverError(
+                    f"no usable mesh: {fault}",
+                    where=str(directory / "pile.msh"),
+                    remedy="check the slope, the height and the first cell in parameters.geo",
+                )
+            gmsh.write(str(directory / "pile.msh"))
+        finally:
+            gmsh.finalize()
 
 
-def _generated(gmsh: Any, directory: Path) -> Mesh:
+def _meshed(gmsh: Any, directory: Path) -> str:
+    """Mesh a case in gmsh's memory; the fault of the mesh, empty if there is none."""
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(directory / "pile.geo"))
         gmsh.model.mesh.generate(3)
     except Exception as error:  # gmsh raises nothing narrower
-        raise _unusable(f"gmsh failed: {error}", directory) from error
-    groups = {gmsh.model.getPhysicalName(*group): group for group in gmsh.model.getPhysicalGroups()}
-    missing = GROUPS - groups.keys()
-    if missing:
-        raise _unusable(f"without the physical groups {sorted(missing)}", directory)
+        return f"gmsh failed: {error}"
+    names = {gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()}
+    if missing := GROUPS - names:
+        return f"without the physical groups {sorted(missing)}"
     if list(gmsh.model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
-        raise _unusable("not of hexahedra only", directory)
-    return _arrays(gmsh, groups["bed"])
-
-
-def _arrays(gmsh: Any, bed: tuple[int, int]) -> Mesh:
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    place[tags] = np.arange(len(tags))
-    surfaces = gmsh.model.getEntitiesForPhysicalGroup(*bed)
-    quads = [gmsh.model.mesh.getElementsByType(_QUAD, int(surface))[1] for surface in surfaces]
-    return Mesh(
-        points=coordinates.reshape(-1, 3),
-        cells=place[gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[1]].reshape(-1, 8),
-        bed=place[np.concatenate(quads)].reshape(-1, 4),
-    )
-
-
-def _check(mesh: Mesh, directory: Path) -> None:
-    inverted = int(np.count_nonzero(smallest_jacobian(mesh.points, mesh.cells) <= 0.0))
-    if inverted:
-        raise _unusable(f"with {inverted} inverted cells", directory)
-    _check_first_cells(first_cell_heights(mesh), directory)
-
-
-def smallest_jacobian(points: Points, cells: Cells) -> NDArray[np.float64]:
-    """Smallest determinant of the edges that meet at a corner, for each hexahedron.
-
-    Parameters
-    ----------
-    points : (P, 3) array
-        Nodes, m.
-    cells : (C, 8) array
-        Nodes of each cell, in the order of VTK.
-
-    Returns
-    -------
-    (C,) array
-        m3; positive where the cell is convex and not inverted.
-    """
-    ahead = [1, 2, 3, 0, 7, 4, 5, 6]
-    behind = [3, 0, 1, 2, 5, 6, 7, 4]
-    across = [4, 5, 6, 7, 0, 1, 2, 3]
-    corners = points[cells]
-    edges = [corners[:, to] - corners for to in (ahead, behind, across)]
-    determinants = np.einsum("cij,cij->ci", np.cross(edges[0], edges[1]), edges[2])
-    return np.asarray(determinants.min(axis=1), dtype=np.float64)
-
-
-def first_cell_heights(mesh: Mesh) -> NDArray[np.float64]:
-    """Vertical extent of the cells on the bed, m; shape (faces of the bed,)."""
-    on_bed = np.zeros(len(mesh.points), dtype=bool)
-    on_bed[mesh.bed] = True
-    below = on_bed[mesh.cells]
-    lowest = below.sum(axis=1) == 4
-    heights = np.where(below[lowest], -1.0, 1.0) * mesh.points[mesh.cells[lowest], 2]
-    return np.asarray(heights.sum(axis=1) / 4.0, dtype=np.float64)
-
-
-def _check_first_cells(heights: NDArray[np.float64], directory: Path) -> None:
-    asked = _shape(directory)
-    vertical = asked["first_cell"] / cos(radians(asked["slope_deg"]))
-    off = float(np.abs(heights / vertical - 1.0).max(initial=0.0))
-    if not heights.size or off > _TOLERANCE:
-        raise _unusable(f"with first cells {off:.0%} off the height asked for", directory)
-
-
-def _shape(directory: Path) -> dict[str, float]:
-    text = (directory / "parameters.geo").read_text(encoding="utf-8")
-    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+) = ([^;]+);", text)}
-
-
-def _unusable(how: str, directory: Path) -> SolverError:
-    return SolverError(
-        f"no usable mesh: {how}",
-        where=str(directory / "pile.msh"),
-        remedy="check the slope, the height and the first cell in parameters.geo",
-    )
+        return "not of hexahedra only"
+    tags = gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[0]
+    inverted = np.count_nonzero(gmsh.model.mesh.getElementQualities(tags, "minDetJac") <= 0)
+    return f"with {inverted} inverted cells" if inverted else ""

@@ -4,31 +4,15 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
 
 from orchestrator.bed.line import BedLine, of_bed
-from orchestrator.errors import InputError
 from orchestrator.flow import theory
 from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
-from orchestrator.flow.channel import ChannelFlow
-from orchestrator.flow.stress import WallStress, undisturbed_ustar
-from orchestrator.study.parts import PileBed
+from orchestrator.flow.stress import WallStress
+from orchestrator.physics.velocity import log_law_speed
+from orchestrator.study.parts import Flow, PileBed
+from orchestrator.study.profile import Profile
 from orchestrator.study.scene import BUILDABLE_DEG, Scene
-
-FIELD_OF = {
-    "height_m": "bed.height",
-    "roughness_m": "bed.roughness",
-    "speed_m_s": "flow.speed",
-    "viscosity_m2_s": "flow.viscosity",
-    "first_cell_m": "flow.first_cell_height",
-    "cells_per_face": "flow.cells_per_face",
-    "expansion_ratio": "flow.expansion_ratio",
-    "lid": "flow.lid",
-    "upstream": "flow.upstream",
-    "downstream": "flow.downstream",
-    "non_orthogonal_correctors": "flow.non_orthogonal_correctors",
-}
-"""Names in a study file of the parameters of a flow case."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +36,17 @@ class FlowModel(ABC):
     @property
     def lid_speed_ratio(self) -> float:
         """U_e over u*_0: the approaching flow's speed at 10 h over its friction velocity."""
-        height = SPEED_HEIGHT * self.line.h
-        return 1 / undisturbed_ustar(1.0, height, self.scene.solve_roughness)
+        return float(log_law_speed(1.0, SPEED_HEIGHT * self.line.h, self.scene.solve_roughness))
 
     @property
     def cases(self) -> tuple[FlowCase, ...]:
-        """The runs that it needs."""
+        """The runs that it needs.
+
+        Raises
+        ------
+        InputError
+            If one cannot be meshed, naming the field of the study file.
+        """
         return ()
 
     @abstractmethod
@@ -93,52 +82,26 @@ class Solved(FlowModel):
     """Steady turbulent flow by OpenFOAM; scenes that differ in their grains alone share it."""
 
     @property
-    def case(self) -> FlowCase:
-        """The run.
-
-        Raises
-        ------
-        InputError
-            If it cannot be built, naming the field of the study file.
-        """
-        bed, flow = self.scene.bed, self.scene.flow
-        assert isinstance(bed, PileBed)
-        channel = {} if flow.depth is None else {"closed": flow.top == "closed channel"}
-        try:
-            return _shared(
-                **channel,
-                line=self.line,
-                profile=bed.profile,
-                lid=flow.depth / bed.relief if flow.depth else flow.lid,
-                upstream=flow.upstream,
-                downstream=flow.downstream,
-                # on a gentler profile cells are as fine as on flat bed
-                slope_deg=bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0,
-                height_m=bed.relief,
-                roughness_m=self.scene.solve_roughness,
-                speed_m_s=flow.speed,
-                viscosity_m2_s=self.scene.solve_viscosity,
-                first_cell_m=self.scene.first_cell_height,
-                cells_per_face=flow.cells_per_face,
-                expansion_ratio=flow.expansion_ratio,
-                turbulence_model=flow.turbulence_model,
-                convection_scheme=flow.convection_scheme,
-                non_orthogonal_correctors=flow.non_orthogonal_correctors,
-            )
-        except InputError as error:
-            field = FIELD_OF.get(error.where, error.where)
-            raise InputError(error.what, where=field, remedy=error.remedy) from None
-
-    @property
     def cases(self) -> tuple[FlowCase, ...]:
         """The run."""
-        return (self.case,)
+        scene, bed = self.scene, self.scene.bed
+        assert isinstance(bed, PileBed)
+        settings = scene.flow.model_copy(
+            update={
+                "roughness": scene.solve_roughness,
+                "viscosity": scene.solve_viscosity,
+                "first_cell_height": scene.first_cell_height,
+            }
+        )
+        # on a gentler profile cells are as fine as on flat bed
+        slope = bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0
+        return (_shared(bed.relief, slope, settings, self.line, bed.profile),)
 
     def stress(self, cases: Path) -> WallStress:
         """The stress that the finished run left."""
-        path = cases / self.case.name / WALL_STRESS
-        found = path.stat()
-        return _read(path, found.st_size, found.st_mtime_ns)
+        path = cases / self.cases[0].name / WALL_STRESS
+        file = path.stat()
+        return _read(path, file.st_size, file.st_mtime_ns)
 
 
 @lru_cache(maxsize=256)
@@ -148,10 +111,12 @@ def _read(path: Path, size: int, changed_ns: int) -> WallStress:
 
 
 @cache
-def _shared(**fields: Any) -> FlowCase:
+def _shared(
+    height: float, slope_deg: float, settings: Flow, line: BedLine, profile: Profile | None
+) -> FlowCase:
     """One case for all scenes that share it, checked and digested once."""
-    case = ChannelFlow(**fields) if "closed" in fields else FlowCase(**fields)
-    case.check_grid()
+    case = FlowCase(height, slope_deg, settings, line, profile)
+    case.check_mesh()
     return case
 
 
@@ -161,7 +126,7 @@ MODELS: dict[str, type[FlowModel]] = {
     "waves": Waves,
     "solve": Solved,
 }
-"""The models by what a study file calls them, cheap to dear."""
+"""The models by their names in a study file, cheap to dear."""
 
 
 def model(scene: Scene) -> FlowModel:

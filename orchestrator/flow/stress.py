@@ -1,32 +1,32 @@
-"""The stress that the flow puts on the bed, along the whole of it."""
+"""The stress that the flow puts on the bed, along the whole of it, and whether it can be right."""
 
-import csv
-import io
 from dataclasses import dataclass, fields
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import pandas as pd
+from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
-from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.physics.constants import KARMAN
 from orchestrator.runs.files import write_durably
+from orchestrator.types import FloatArray
 
 _DERIVED = "ustar_over_ustar0_wall"
-
 BEND = 1e-3
 """Two faces are in one plane if their middles are as far apart as the bed between them is long,
 within this part of it: seven digits of the places make 1e-5 of it, a bend of 10 degrees 4e-3."""
-
-Array = NDArray[np.float64]
+APPROACH_ERROR = 0.08
+"""Largest relative difference of u* in the column before the inlet from the log law's: k-epsilon is
+within 0.02, other models, whose log law is another, are within 0.07."""
+SEPARATES_FROM_DEG = 15.0
+"""Slope from which the flow always separates behind the crest, and reattaches 5 to 9 h from it."""
+SHORTEST_BUBBLE = 5.0
+"""Least of these lengths, h; upwind convection gives 3.6 to 4.6 and a part of a cell of h/3."""
 Measure = Literal["wall", "eq10"]
-
-
-def undisturbed_ustar(speed_m_s: float, height_m: float, roughness_m: float) -> float:
-    """Friction velocity of the log law with a speed U at a height z: 0.41 U / ln((z + z0)/z0)."""
-    return float(log_law_ustar(speed_m_s, height_m, roughness_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,33 +54,35 @@ class WallStress:
         Eq. 10 as the paper prints it: 0.41 u_t / ln(z_e/z0).
     """
 
-    s_m: Array
-    x_m: Array
-    z_m: Array
-    length_m: Array
-    z_e_m: Array
-    tau_wall: Array
-    ustar_over_ustar0_eq10: Array
-    ustar_over_ustar0_eq10_printed: Array
+    s_m: FloatArray
+    x_m: FloatArray
+    z_m: FloatArray
+    length_m: FloatArray
+    z_e_m: FloatArray
+    tau_wall: FloatArray
+    ustar_over_ustar0_eq10: FloatArray
+    ustar_over_ustar0_eq10_printed: FloatArray
 
     @cached_property
-    def ustar_over_ustar0_wall(self) -> Array:
+    def ustar_over_ustar0_wall(self) -> FloatArray:
         """Friction velocity of the stress on the wall: sign(tau) sqrt(|tau|)."""
         return np.sign(self.tau_wall) * np.sqrt(np.abs(self.tau_wall))
 
     @cached_property
-    def tau_eq10(self) -> Array:
+    def tau_eq10(self) -> FloatArray:
         """Stress of Eq. 10's friction velocity: sign(u*) u*^2."""
         ustar = self.ustar_over_ustar0_eq10
         return ustar * np.abs(ustar)
 
     @cached_property
-    def edges_m(self) -> Array:
+    def edges_m(self) -> FloatArray:
         """Ends of the faces along the bed, m; shape (F + 1,)."""
         first = self.s_m[0] - self.length_m[0] / 2.0
         return np.concatenate([[first], first + np.cumsum(self.length_m)])
 
-    def mean_over(self, s_m: ArrayLike, length_m: ArrayLike, measure: Measure = "wall") -> Array:
+    def mean_over(
+        self, s_m: ArrayLike, length_m: ArrayLike, measure: Measure = "wall"
+    ) -> FloatArray:
         """Mean signed stress over a length of bed centred on each place.
 
         The integral is exact: over each face the stress is linear, with the face's value as its
@@ -112,7 +114,7 @@ class WallStress:
         gained = self._integral(tau, high) - self._integral(tau, low)
         return np.asarray(gained / length)
 
-    def _integral(self, tau: Array, s_m: Array) -> Array:
+    def _integral(self, tau: FloatArray, s_m: FloatArray) -> FloatArray:
         """The integral of the stress from the start of the bed, kinematic and in u*_0^2 m."""
         edges, slope = self.edges_m, self._slopes(tau)
         face = np.clip(np.searchsorted(edges, s_m, side="right") - 1, 0, len(tau) - 1)
@@ -121,7 +123,7 @@ class WallStress:
         tilt = slope[face] * (into - self.length_m[face]) / 2.0
         return np.asarray(before + into * (tau[face] + tilt))
 
-    def _slopes(self, tau: Array) -> Array:
+    def _slopes(self, tau: FloatArray) -> FloatArray:
         """Change of the stress along each face, 1/m: the mean of those to its two neighbours.
 
         It is limited so that no face reaches beyond its neighbours' values, none where the stress
@@ -142,7 +144,7 @@ class WallStress:
         most = 2.0 * np.minimum(np.abs(behind), np.abs(ahead))
         return np.asarray(np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most)))
 
-    def _check_reach(self, low: Array, high: Array) -> None:
+    def _check_reach(self, low: FloatArray, high: FloatArray) -> None:
         start, end = self.edges_m[0], self.edges_m[-1]
         if not (np.all(low < high) and np.all(low >= start) and np.all(high <= end)):
             raise InputError(
@@ -152,26 +154,102 @@ class WallStress:
 
     def to_csv(self, path: Path) -> None:
         """Write a table with all digits: `from_csv` gives the same numbers back."""
-        names = [field.name for field in fields(self)]
-        columns = [getattr(self, name).tolist() for name in names]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([*names, _DERIVED])
-        writer.writerows(zip(*columns, self.ustar_over_ustar0_wall.tolist(), strict=True))
-        write_durably(path, text.getvalue())
+        columns = {one.name: getattr(self, one.name) for one in fields(self)}
+        table = pd.DataFrame({**columns, _DERIVED: self.ustar_over_ustar0_wall})
+        write_durably(path, table.to_csv(index=False, lineterminator="\n"))
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
-        """Read what `to_csv` wrote.
+        """Read a table of `to_csv`.
 
         Raises
         ------
         InputError
             If the file is not such a table.
         """
-        names = [field.name for field in fields(cls)]
-        lines = path.read_text(encoding="utf-8").splitlines()
-        if len(lines) < 2 or lines[0].split(",") != [*names, _DERIVED]:
+        names = [one.name for one in fields(cls)]
+        try:
+            table = pd.read_csv(path, dtype=str).astype(float)  # to the last digit
+        except ValueError:  # no numbers, or nothing at all
+            table = pd.DataFrame()
+        if table.empty or list(table) != [*names, _DERIVED]:
             raise InputError("not a table of the stress on a bed", where=str(path))
-        table = np.loadtxt(lines[1:], delimiter=",", ndmin=2)
-        return cls(**dict(zip(names, table.T[: len(names)].copy(), strict=True)))
+        return cls(**{name: table[name].to_numpy() for name in names})
+
+
+def diagnostics(
+    stress: WallStress,
+    *,
+    approach: float,
+    slope_deg: float,
+    height: float,
+    roughness: float,
+    reynolds: float,
+) -> pd.DataFrame:
+    """A few numbers of a solved flow beside the ranges in which sound flows have them.
+
+    Parameters
+    ----------
+    stress : WallStress
+        The stress of the solved flow.
+    approach : float
+        Friction velocity before the inlet over that of the log law.
+    slope_deg, height, roughness : float
+        Slope of the pile, degrees; its height and roughness length, m.
+    reynolds : float
+        u*_0 over the solve's nu, 1/m.
+
+    Returns
+    -------
+    DataFrame
+        With ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no, for each
+        ``quantity`` of the index.
+    """
+    centre = float(np.median(stress.z_e_m))
+    shortest = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0
+    rows = {
+        # y+: the eddy viscosity is kappa y+ times the molecular one
+        "y_plus": (reynolds * centre, 1 / KARMAN, inf),
+        "z_e_over_z0": (centre / roughness, 0.5, inf),
+        "approach_ustar_over_log_law": (approach, 1 - APPROACH_ERROR, 1 + APPROACH_ERROR),
+        "reattachment_over_h": (reattachment(stress, height), shortest, inf),
+    }
+    return judged(pd.DataFrame.from_dict(rows, orient="index", columns=RANGE))
+
+
+RANGE = ["value", "sound_from", "sound_to"]
+
+
+def judged(table: pd.DataFrame) -> pd.DataFrame:
+    """Diagnostics with the column ``sound``: whether the value is in its range; NaN is not."""
+    sound = table["value"].between(table["sound_from"], table["sound_to"])
+    return table.assign(sound=np.where(sound, "yes", "no")).rename_axis("quantity")
+
+
+def reattachment(stress: WallStress, height: float) -> float:
+    """Where the reversed flow behind the top ends, h downstream of it; 0 where there is none."""
+    ends = bubble(stress, height)
+    return ends[1] if ends else 0.0
+
+
+def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
+    """Where the reversed flow behind the top begins and ends, h downstream of it.
+
+    A stretch of less than h that runs forward within it is a corner's eddy. None where no flow is
+    reversed.
+    """
+    top = stress.x_m[int(np.argmax(stress.z_m))]
+    faces = np.flatnonzero((stress.x_m > top) & (stress.tau_wall < 0))
+    if not faces.size:
+        return None
+    ends = np.flatnonzero(np.diff(stress.x_m[faces]) > height)
+    first, last = faces[0], faces[ends[0]] if ends.size else faces[-1]
+    begins = _without_stress(stress, first, first - 1)
+    stops = _without_stress(stress, last, min(last + 1, len(stress.x_m) - 1))
+    return (begins - top) / height, (stops - top) / height
+
+
+def _without_stress(stress: WallStress, backward: int, forward: int) -> float:
+    """Place between two faces where the stress changes its sign, m: cells of h/3 lie there."""
+    pair = [backward, forward]
+    return float(np.interp(0.0, stress.tau_wall[pair], stress.x_m[pair]))

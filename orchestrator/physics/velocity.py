@@ -53,13 +53,16 @@ def log_law_speed(ustar: ArrayLike, height: ArrayLike, roughness: ArrayLike) -> 
     return np.asarray(np.asarray(ustar, float) / KARMAN * np.log1p(over))
 
 
-def depth_mean_speed(ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike) -> FloatArray:
+def depth_mean_speed(
+    ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike, *, closed: bool = False
+) -> FloatArray:
     """Depth-averaged speed (m/s) of wide open water of a depth (m) with that profile up to its top.
 
     The mean of ``ln((z + z0)/z0)`` from 0 to h is ``(1 + z0/h) ln(1 + h/z0) - 1``. For a river
-    u* = sqrt(g h S) belongs to it, S the slope of its surface.
+    u* = sqrt(g h S) belongs to it, S the slope of its surface. A closed channel has the profile of
+    half its depth on each wall.
     """
-    part = np.asarray(roughness, float) / np.asarray(depth, float)
+    part = np.asarray(roughness, float) / (np.asarray(depth, float) / (2 if closed else 1))
     mean = (1 + part) * np.log1p(1 / part) - 1
     return np.asarray(np.asarray(ustar, float) / KARMAN * mean)
 

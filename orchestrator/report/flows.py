@@ -364,7 +364,7 @@ def mesh(results: Results) -> Iterator[Figure]:
         axes[1].set_xlabel(_x_label(pile))
         text = caption(
             "mesh",
-            cells=pile.flow.cells_per_face,
+            cells=pile.flow.settings.cells_per_face,
             first=f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}",
             lid=not pile.scene.flow.depth,
         )

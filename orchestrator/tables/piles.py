@@ -11,13 +11,12 @@ import numpy as np
 from orchestrator.fidelity import calibration, decision, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
-from orchestrator.flow.channel import mean_speed
-from orchestrator.flow.stress import undisturbed_ustar
 from orchestrator.grains import classes, threshold
 from orchestrator.grains.loaded_bed import Face
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
+from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
@@ -167,9 +166,10 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
         }
         # a field user measures the wind at 1 m, or the mean speed of a channel
         if depth is None:
-            row["u_1m_m_s"] = found.ustar0 / undisturbed_ustar(1.0, 1.0, z0)
+            row["u_1m_m_s"] = float(log_law_speed(found.ustar0, 1.0, z0))
         else:
-            mean = mean_speed(found.ustar0, depth, z0, closed=top == "closed channel")
+            closed = top == "closed channel"
+            mean = float(depth_mean_speed(found.ustar0, depth, z0, closed=closed))
             row |= {"mean_speed_m_s": mean, "discharge_m2_s": mean * depth}
         yield row | {
             "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.flow import diagnostics
+from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
 from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.motion import Motion
@@ -118,7 +118,7 @@ def wall_stress(pile: Pile, cases: Path) -> Mapping[str, Any]:
 def flow(pile: Pile, cases: Path) -> Row:
     """The solved flow of a pile: its settings, its separation and its speed-up."""
     case, stress, line = pile.flow, pile.stress(cases), pile.model.line
-    separation, reattachment = diagnostics.bubble(stress, line.h) or (np.nan, np.nan)
+    separation, reattachment = bubble(stress, line.h) or (np.nan, np.nan)
     ustar = stress.ustar_over_ustar0_wall
     windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
     length, hill = stress.length_m[windward], measured_hill(pile)
@@ -128,11 +128,11 @@ def flow(pile: Pile, cases: Path) -> Row:
         "alpha_deg": pile.bed.slope_deg,
         "h_m": case.height_m,
         "z0_m": case.roughness_m,
-        "turbulence_model": case.turbulence_model,
+        "turbulence_model": case.settings.turbulence_model,
         "first_cell_m": case.first_cell_m,
         "lid_over_h": case.lid,
-        "upstream_over_h": case.upstream,
-        "downstream_over_h": case.downstream,
+        "upstream_over_h": case.settings.upstream,
+        "downstream_over_h": case.settings.downstream,
         "separation_over_h": separation,
         "reattachment_over_h": reattachment,
         **{
@@ -143,7 +143,7 @@ def flow(pile: Pile, cases: Path) -> Row:
         "ustar_largest": float(ustar.max()),
     }
     if hill is not None:
-        row["measured_reattachment_over_h"] = hill.reattachment
+        row["measured_reattachment_over_h"] = hill.reattachment or np.nan
         row["measured_verified"] = hill.verified
         row["measured_source"] = hill.source
     return row

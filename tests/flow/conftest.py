@@ -1,28 +1,40 @@
-"""What the tests of the flow share: cases on a coarse mesh, run by the real solver."""
+"""Cases on a coarse mesh, run by the real solver, that the tests of the flow share."""
 
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from orchestrator.flow.case import FlowCase
 from orchestrator.runs import case, process
 from orchestrator.runs.case import templates
+from orchestrator.study.parts import Flow
 from tests.conftest import Shared
 
 PILE = FlowCase(
-    slope_deg=15.0,
-    height_m=0.02,
-    roughness_m=1e-4 / 3.0,
-    speed_m_s=10.0,
-    viscosity_m2_s=1e-5,
-    first_cell_m=5e-4,
-    cells_per_face=16,
+    0.02,
+    15.0,
+    Flow(
+        speed=10.0,
+        roughness=1e-4 / 3.0,
+        viscosity=1e-5,
+        first_cell_height=5e-4,
+        cells_per_face=16,
+    ),
 )
-SLOW = replace(PILE, slope_deg=30.0, cells_per_face=80)
+
+
+def changed(flow: FlowCase, **settings: Any) -> FlowCase:
+    """A case with other settings of the solve."""
+    return replace(flow, settings=flow.settings.model_copy(update=settings))
+
+
+SLOW = replace(changed(PILE, cells_per_face=80), slope_deg=30.0)
 """A case that runs for many seconds: long enough to be interrupted."""
+OPEN = changed(PILE, top="open water", depth=6.0 * PILE.height_m)
 
 Solve = Callable[[FlowCase], Path]
 
@@ -30,6 +42,12 @@ Solve = Callable[[FlowCase], Path]
 def allrun(directory: Path, *, limit_s: float = 120.0, **env: str) -> process.Ended:
     log = directory / "log.Allrun"
     return process.run(["./Allrun"], cwd=directory, log=log, limit_s=limit_s, env=env)
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
 
 
 @pytest.fixture(scope="session")

@@ -15,17 +15,13 @@ import numpy as np
 import pytest
 
 from orchestrator.bed.line import between_flats
-from orchestrator.errors import Exploded, InputError, SolverError, Stalled
-from orchestrator.flow import diagnostics
-from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase
-from orchestrator.flow.solved import SolvedFlow
-from orchestrator.flow.stress import WallStress
+from orchestrator.errors import Exploded, SolverError, Stalled
+from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase, SolvedFlow, set_values
+from orchestrator.flow.stress import APPROACH_ERROR, WallStress, reattachment
 from orchestrator.runs import case, process
 from orchestrator.solvers import openfoam
-from orchestrator.study.parts import Turbulence
 from orchestrator.study.scene import default_first_cell_height
-from tests.flow.conftest import PILE, SLOW, Solve, allrun
-from tests.flow.test_mesh import edit
+from tests.flow.conftest import OPEN, PILE, SLOW, Solve, allrun, changed, edit
 
 MESH_FILES = ("points", "faces", "owner", "neighbour", "boundary")
 FACE = PILE.height_m / np.sin(np.radians(PILE.slope_deg))
@@ -57,7 +53,7 @@ def test_the_geometry_of_the_bed(solve: Solve) -> None:
     bed = np.maximum(0.0, np.tan(np.radians(15.0)) * np.minimum(stress.x_m, 2 * crest - stress.x_m))
     np.testing.assert_allclose(stress.z_m, bed, atol=1e-7)
     windward = (stress.x_m > 0.0) & (stress.x_m < crest)
-    assert np.count_nonzero(windward) == PILE.cells_per_face
+    assert np.count_nonzero(windward) == PILE.settings.cells_per_face
     np.testing.assert_allclose(
         stress.s_m[windward], stress.x_m[windward] / np.cos(np.radians(15.0)), rtol=1e-5
     )
@@ -78,76 +74,6 @@ def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -
     start, end = stress.edges_m[[0, -1]]
     assert stress.mean_over(start + 0.02, 0.02) == pytest.approx(1.0, abs=0.01)
     assert 0.8 < stress.mean_over(end - 0.02, 0.02) < 1.0
-
-
-def solved_flat(flow: FlowCase, tmp_path: Path) -> Path:
-    """A flat bed after 300 iterations: what is left is noise, and its residuals do not fall."""
-    directory = case.prepare(flow, tmp_path)
-    for old, new in (
-        ("endTime             1000;", "endTime 300;"),
-        ("Interval       1000", "Interval 300"),
-    ):
-        edit(directory / "system" / "controlDict", old, new)
-    allrun(directory)
-    return directory
-
-
-@pytest.mark.parametrize(
-    ("roughness", "first_cell"), [(3.3e-6, 2.5e-4), (3.3e-5, 2.5e-4), (1e-4, 5e-4), (1e-4, 2e-3)]
-)
-def test_a_flat_bed_keeps_the_friction_velocity(
-    tmp_path: Path, roughness: float, first_cell: float
-) -> None:
-    """Along 60 h the flow does not change, and the log law of the wall holds from U_e to z_e."""
-    flow = replace(
-        PILE, slope_deg=0.0, roughness_m=roughness, first_cell_m=first_cell, cells_per_face=40
-    )
-    directory = solved_flat(flow, tmp_path)
-    stress = SolvedFlow(directory).stress()
-    assert np.ptp(stress.x_m[np.abs(stress.x_m) < 0.8]) > 60 * flow.height_m
-    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.002)
-    assert SolvedFlow(directory).approach_ustar() == pytest.approx(1, abs=0.015)
-    np.testing.assert_allclose(stress.ustar_over_ustar0_eq10, 1.0, atol=0.02)
-    printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
-    z_over_z0 = first_cell / 2.0 / roughness
-    np.testing.assert_allclose(printed, np.log(z_over_z0 + 1.0) / np.log(z_over_z0), rtol=1e-4)
-
-
-@pytest.mark.parametrize("slope", [15.0, 30.0])
-def test_a_domain_twice_as_large_gives_the_same_stress(solve: Solve, slope: float) -> None:
-    flow = replace(PILE, slope_deg=slope)
-    larger = replace(flow, lid=2 * flow.lid, upstream=2 * flow.upstream, downstream=200.0)
-    ratio = windward_mean(solve(larger), larger) / windward_mean(solve(flow), flow)
-    assert ratio**2 == pytest.approx(1, abs=0.01)
-    small = replace(flow, lid=10.0, upstream=10.0, downstream=20.0)
-    assert windward_mean(solve(small), small) > 1.02 * windward_mean(solve(flow), flow)
-
-
-@pytest.mark.parametrize("slope", [15.0, 30.0])
-def test_a_finer_mesh_gives_the_same_mean(solve: Solve, slope: float) -> None:
-    coarse = replace(PILE, slope_deg=slope)
-    fine = replace(coarse, cells_per_face=32)
-    means = [windward_mean(solve(flow), flow) for flow in (coarse, fine)]
-    assert means[0] == pytest.approx(means[1], rel=0.02)
-
-
-@pytest.mark.parametrize(("speed", "tolerance"), [(5.0, 0.01), (20.0, 0.005)])
-def test_the_stress_scales_with_the_speed(solve: Solve, speed: float, tolerance: float) -> None:
-    other = replace(PILE, speed_m_s=speed)
-    expected = windward_mean(solve(PILE), PILE)
-    assert windward_mean(solve(other), other) == pytest.approx(expected, rel=tolerance)
-
-
-def test_the_stress_scales_with_the_size(solve: Solve) -> None:
-    larger = replace(
-        PILE,
-        height_m=10 * PILE.height_m,
-        roughness_m=10 * PILE.roughness_m,
-        first_cell_m=10 * PILE.first_cell_m,
-        viscosity_m2_s=10 * PILE.viscosity_m2_s,
-    )
-    expected = windward_mean(solve(PILE), PILE)
-    assert windward_mean(solve(larger), larger) == pytest.approx(expected, rel=1e-4)
 
 
 def test_a_copy_run_by_hand_gives_the_same_bytes(solve: Solve, tmp_path: Path) -> None:
@@ -248,9 +174,10 @@ def test_short_chords_do_not_end_the_iterations_early(solve: Solve) -> None:
         length = np.pi * PILE.height_m / np.tan(np.radians(26))
         wave = np.column_stack([length * t, PILE.height_m / 2 * (1 - np.cos(2 * np.pi * t))])
         line = between_flats(wave, PILE.height_m)
-        hill = replace(PILE, slope_deg=26.0, line=line, lid=30.0, upstream=10.0, downstream=40.0)
+        domain = changed(PILE, lid=30.0, upstream=10.0, downstream=40.0)
+        hill = replace(domain, slope_deg=26.0, line=line)
         stress = WallStress.from_csv(solve(hill) / WALL_STRESS)
-        ends.append(diagnostics.reattachment(stress, PILE.height_m))
+        ends.append(reattachment(stress, PILE.height_m))
     assert ends[1] == pytest.approx(ends[0], rel=0.05)
 
 
@@ -266,16 +193,6 @@ def test_a_diverged_run(tmp_path: Path, trap: str, cause: str) -> None:
         PILE.collect(directory)
 
 
-def test_a_run_that_needs_more_iterations(tmp_path: Path) -> None:
-    directory = case.prepare(PILE, tmp_path)
-    edit(
-        directory / "system" / "controlDict", "endTime             1000;", "endTime             30;"
-    )
-    assert allrun(directory).returncode == 1
-    with pytest.raises(Stalled, match=r"did not converge: .* after iteration 30"):
-        PILE.collect(directory)
-
-
 @pytest.mark.parametrize("name", ["wallShearStress", "U", "../constant/polyMesh/points"])
 def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) -> None:
     copy = Path(shutil.copytree(solve(PILE), tmp_path / "copy"))
@@ -283,91 +200,6 @@ def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) 
     os.truncate(file, file.stat().st_size * 9 // 10)
     with pytest.raises(SolverError, match="the results are not whole"):
         PILE.collect(copy)
-
-
-def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
-    with pytest.raises(SolverError, match=r"z_e is 0.5 to 0.5 of what the first"):
-        replace(PILE, first_cell_m=1e-3).collect(solve(PILE))
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("slope_deg", 1.0),
-        ("slope_deg", -15.0),
-        ("slope_deg", 70.0),
-        ("slope_deg", float("nan")),
-        ("height_m", 0.0),
-        ("roughness_m", -1e-5),
-        ("speed_m_s", float("inf")),
-        ("viscosity_m2_s", 0.0),
-        ("first_cell_m", 1e-2),
-        ("cells_per_face", 2),
-        ("non_orthogonal_correctors", -1),
-        ("expansion_ratio", 1.0),
-    ],
-)
-def test_an_unusable_field_is_named(field: str, value: Any) -> None:
-    with pytest.raises(InputError) as raised:
-        replace(PILE, **{field: value})
-    assert raised.value.where == field
-
-
-@pytest.mark.parametrize("model", ["RNGkEpsilon", "realizableKE", "kOmegaSST"])
-def test_other_models_of_turbulence_keep_a_flat_beds_friction_velocity(
-    tmp_path: Path, model: Turbulence
-) -> None:
-    """Their log law is another than k-epsilon's, whose constants are those of the lid."""
-    flat = replace(PILE, slope_deg=0.0, turbulence_model=model)
-    directory = solved_flat(flat, tmp_path)
-    stress = SolvedFlow(directory).stress()
-    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.01)
-    assert 0.01 < abs(SolvedFlow(directory).approach_ustar() - 1) < diagnostics.APPROACH_ERROR
-
-
-def test_upwind_convection_gives_a_windward_stress_that_is_too_high(solve: Solve) -> None:
-    upwind = replace(PILE, convection_scheme="upwind")
-    means = [windward_mean(solve(flow), flow) for flow in (PILE, upwind)]
-    assert 1.05 < means[1] / means[0] < 1.15
-
-
-def test_more_correctors_give_the_same_stress(solve: Solve) -> None:
-    more = replace(PILE, non_orthogonal_correctors=2)
-    assert windward_mean(solve(more), more) == pytest.approx(
-        windward_mean(solve(PILE), PILE), rel=1e-3
-    )
-
-
-def test_a_sound_run_says_so(solve: Solve) -> None:
-    rows = (solve(PILE) / DIAGNOSTICS).read_text().splitlines()
-    assert len(rows) == 5
-    assert all(row.endswith(",yes") for row in rows[1:])
-
-
-def test_upwind_convection_reattaches_too_early(solve: Solve) -> None:
-    upwind = replace(PILE, convection_scheme="upwind", cells_per_face=40)
-    assert "reattachment_over_h,4." in (solve(upwind) / DIAGNOSTICS).read_text()
-    assert (solve(upwind) / DIAGNOSTICS).read_text().splitlines()[-1].endswith(",no")
-
-
-def test_a_flow_that_is_not_turbulent_at_the_bed_has_no_answer(tmp_path: Path) -> None:
-    beyond = replace(PILE, viscosity_m2_s=1e-3)
-    directory = case.prepare(beyond, tmp_path)
-    assert allrun(directory).returncode == 0
-    with pytest.raises(SolverError, match="the wall function fails"):
-        beyond.collect(directory)
-
-
-def test_who_a_case_is() -> None:
-    assert replace(PILE, slope_deg=15, speed_m_s=10).id == PILE.id
-    assert replace(PILE, roughness_m=3.4e-5).id != PILE.id
-    assert replace(PILE, turbulence_model="kOmegaSST").id != PILE.id
-    assert PILE.name.startswith("flow-")
-    assert set(PILE.versions()) == {"gmsh", "openfoam"}
-
-
-def test_finer_and_steeper_cases_cost_more() -> None:
-    assert PILE.cost_s < replace(PILE, slope_deg=35.0).cost_s < SLOW.cost_s
 
 
 def test_the_default_first_cell() -> None:
@@ -395,3 +227,126 @@ def test_a_mesh_that_a_full_disk_cuts_is_not_solved_on(template: Path, tmp_path:
             assert whole or not (copy / "log.setExprFields").exists()
         finally:
             subprocess.run(["umount", str(small)], check=True)
+
+
+@pytest.mark.parametrize(
+    ("settings", "within"),
+    [
+        ({"roughness": 3.3e-6, "first_cell_height": 2.5e-4}, 0.015),
+        ({"roughness": 1e-4, "first_cell_height": 2e-3}, 0.015),
+        # the log law of other models is another than that of k-epsilon, whose constants the lid has
+        ({"turbulence_model": "RNGkEpsilon", "cells_per_face": 16}, APPROACH_ERROR),
+        ({"turbulence_model": "realizableKE", "cells_per_face": 16}, APPROACH_ERROR),
+        ({"turbulence_model": "kOmegaSST", "cells_per_face": 16}, APPROACH_ERROR),
+        ({"top": "open water", "depth": 0.12, "upstream": 20.0, "downstream": 20.0}, 2e-3),
+        ({"top": "closed channel", "depth": 0.12, "upstream": 20.0, "downstream": 20.0}, 2e-3),
+    ],
+)
+def test_a_flat_bed_keeps_the_friction_velocity(
+    tmp_path: Path, settings: dict[str, Any], within: float
+) -> None:
+    """Along 40 h the flow does not change; the log law, or the slope of a channel, gives u*_0."""
+    channel, other = "depth" in settings, "turbulence_model" in settings
+    cells = 16 if channel else 40
+    flow = replace(changed(PILE, **{"cells_per_face": cells, **settings}), slope_deg=0.0)
+    directory = case.prepare(flow, tmp_path)
+    if not channel:  # the residuals of a flat bed do not fall: only noise is left
+        edit(directory / "system/controlDict", "endTime             1000;", "endTime 300;")
+        edit(directory / "system/controlDict", "Interval       1000", "Interval 300")
+    allrun(directory)
+    solved = SolvedFlow(directory)
+    stress = solved.stress()
+    np.testing.assert_allclose(stress.ustar_over_ustar0_wall, 1.0, atol=0.01 if other else 0.002)
+    assert solved.approach_ustar() == pytest.approx(1, abs=within)
+    if channel:
+        # k-epsilon is slow to mix below a surface: above the log law
+        assert 1 < flow.mean_speed_over_log_law(solved) < 1.1
+    elif not other:
+        assert np.ptp(stress.x_m[np.abs(stress.x_m) < 0.8]) > 60 * flow.height_m
+        np.testing.assert_allclose(stress.ustar_over_ustar0_eq10, 1.0, atol=0.02)
+        printed = stress.ustar_over_ustar0_eq10_printed / stress.ustar_over_ustar0_eq10
+        over = flow.first_cell_m / 2.0 / flow.roughness_m
+        np.testing.assert_allclose(printed, np.log(over + 1.0) / np.log(over), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "ratio", "within"),
+    [
+        ({"speed": 5.0}, 1.0, 0.01),
+        ({"speed": 20.0}, 1.0, 0.005),
+        ({"cells_per_face": 32}, 1.0, 0.02),
+        ({"non_orthogonal_correctors": 2}, 1.0, 1e-3),
+        ({"lid": 200.0, "upstream": 160.0, "downstream": 200.0}, 1.0, 0.005),
+        ({"lid": 10.0, "upstream": 10.0, "downstream": 20.0}, 1.08, 0.05),  # too small a domain
+        ({"convection_scheme": "upwind"}, 1.1, 0.045),  # too much diffusion
+    ],
+)
+def test_the_windward_stress_under_other_settings(
+    solve: Solve, settings: dict[str, Any], ratio: float, within: float
+) -> None:
+    other = changed(PILE, **settings)
+    over = windward_mean(solve(other), other) / windward_mean(solve(PILE), PILE)
+    assert over == pytest.approx(ratio, rel=within)
+
+
+def test_the_stress_scales_with_the_size(solve: Solve) -> None:
+    lengths = ("roughness", "first_cell_height", "viscosity")
+    settings = {name: 10 * getattr(PILE.settings, name) for name in lengths}
+    larger = replace(changed(PILE, **settings), height_m=10 * PILE.height_m)
+    expected = windward_mean(solve(PILE), PILE)
+    assert windward_mean(solve(larger), larger) == pytest.approx(expected, rel=1e-4)
+
+
+def test_shallow_water_is_faster_over_a_form(solve: Solve) -> None:
+    """The water that passes the form has less than the depth."""
+    shallow = changed(OPEN, depth=3.0 * PILE.height_m)
+    deep, six, three = (windward_mean(solve(flow), flow) for flow in (PILE, OPEN, shallow))
+    assert deep < 0.95 * six < 0.9 * three
+
+
+def test_diagnostics_tell_a_sound_run_from_others(solve: Solve) -> None:
+    def verdicts(flow: FlowCase) -> dict[str, str]:
+        rows = (solve(flow) / DIAGNOSTICS).read_text().splitlines()[1:]
+        return {row.split(",")[0]: row.rsplit(",", 1)[1] for row in rows}
+
+    assert set(verdicts(PILE).values()) == {"yes"}
+    assert verdicts(OPEN)["mean_speed_over_log_law"] == "yes"
+    upwind = changed(PILE, convection_scheme="upwind", cells_per_face=40)
+    assert verdicts(upwind)["reattachment_over_h"] == "no"  # too early
+
+
+def test_the_template_runs_as_a_channel(template: Path) -> None:
+    set_values(template / "parameters", top="open")
+    assert allrun(template).returncode == 0
+    assert SolvedFlow(template).approach_ustar() == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("settings", "last", "error", "cause"),
+    [
+        ({}, "30", Stalled, "did not converge: .* after iteration 30"),
+        ({"viscosity": 1e-3}, "1000", SolverError, "the wall function fails"),
+    ],
+)
+def test_runs_without_an_answer(
+    tmp_path: Path, settings: dict[str, Any], last: str, error: type[SolverError], cause: str
+) -> None:
+    flow = changed(PILE, **settings)
+    directory = case.prepare(flow, tmp_path)
+    edit(directory / "system/controlDict", "endTime             1000;", f"endTime {last};")
+    allrun(directory)
+    with pytest.raises(error, match=cause):
+        flow.collect(directory)
+
+
+def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
+    with pytest.raises(SolverError, match=r"z_e is 0.5 to 0.5 of that of the first cells"):
+        changed(PILE, first_cell_height=1e-3).collect(solve(PILE))
+
+
+def test_the_identity_of_a_case_and_its_cost() -> None:
+    assert replace(PILE, slope_deg=15).id == changed(PILE, speed=10.0).id == PILE.id
+    others = (changed(PILE, roughness=3.4e-5), changed(PILE, turbulence_model="kOmegaSST"), OPEN)
+    assert len({PILE.id, *(one.id for one in others)}) == 4
+    assert set(PILE.versions()) == {"gmsh", "openfoam"}
+    assert PILE.cost_s < replace(PILE, slope_deg=35.0).cost_s < SLOW.cost_s

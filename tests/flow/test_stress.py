@@ -3,18 +3,20 @@
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from orchestrator.bed.line import triangle
 from orchestrator.errors import InputError, SolverError
-from orchestrator.flow.solved import SolvedFlow
-from orchestrator.flow.stress import WallStress, undisturbed_ustar
+from orchestrator.flow import theory
+from orchestrator.flow.case import SolvedFlow
+from orchestrator.flow.stress import WallStress, bubble, diagnostics, reattachment
+from orchestrator.types import FloatArray
 
-FloatArray = NDArray[np.float64]
+HEIGHT = 0.02
 
 
 @pytest.fixture
@@ -129,11 +131,6 @@ def test_another_table_is_refused(tmp_path: Path, text: str) -> None:
         WallStress.from_csv(tmp_path / "other.csv")
 
 
-def test_undisturbed_friction_velocity_gives_the_speed_at_the_lid() -> None:
-    ustar0 = undisturbed_ustar(10.0, 0.2, 1e-4)
-    assert ustar0 / 0.41 * np.log((0.2 + 1e-4) / 1e-4) == pytest.approx(10.0)
-
-
 def test_a_case_that_has_not_run_has_no_stress(template: Path) -> None:
     with pytest.raises(SolverError, match=r"no results \(run \./Allrun there\)"):
         SolvedFlow(template).stress()
@@ -143,3 +140,55 @@ def test_vtk_is_not_loaded_before_it_is_needed() -> None:
     heavy = "{'gmsh', 'meshio', 'pyvista', 'vtkmodules'}"
     code = f"import sys, orchestrator.flow.case; sys.exit(bool({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.fixture
+def sound() -> WallStress:
+    """The undisturbed stress with cells 1 mm high and reversed flow up to 6 h behind the crest."""
+    stress = theory.flat(triangle(15.0, HEIGHT))
+    crest = HEIGHT / np.tan(np.radians(15.0))
+    behind = (stress.x_m > crest + 1e-3) & (stress.x_m < crest + 6 * HEIGHT)
+    return replace(
+        stress,
+        z_e_m=np.full_like(stress.s_m, 5e-4),
+        tau_wall=np.where(behind, -0.1, stress.tau_wall),
+    )
+
+
+def unsound(
+    stress: WallStress, roughness: float = 3e-5, reynolds: float = 5e4, approach: float = 1.0
+) -> set[str]:
+    table = diagnostics(
+        stress,
+        approach=approach,
+        slope_deg=15.0,
+        height=HEIGHT,
+        roughness=roughness,
+        reynolds=reynolds,
+    )
+    return set(table.index[table["sound"] == "no"])
+
+
+def test_each_flaw_is_named(sound: WallStress) -> None:
+    assert unsound(sound) == set()
+    assert unsound(sound, roughness=1.1e-3) == {"z_e_over_z0"}
+    assert unsound(sound, reynolds=4e3) == {"y_plus"}
+    assert unsound(replace(sound, tau_wall=np.abs(sound.tau_wall))) == {"reattachment_over_h"}
+    for approach in (0.9, 1.09, np.nan):
+        assert unsound(sound, approach=approach) == {"approach_ustar_over_log_law"}
+
+
+def test_the_end_of_the_reversed_flow(sound: WallStress) -> None:
+    assert reattachment(sound, HEIGHT) == pytest.approx(6, abs=0.02)
+    assert reattachment(theory.flat(triangle(15.0, HEIGHT)), HEIGHT) == 0
+
+
+def test_a_corners_eddy_does_not_end_the_reversed_flow(sound: WallStress) -> None:
+    crest = HEIGHT / np.tan(np.radians(15.0))
+    eddy = np.abs(sound.x_m - crest - 2 * HEIGHT) < 0.3 * HEIGHT
+    stress = replace(sound, tau_wall=np.where(eddy, 0.1, sound.tau_wall))
+    found = bubble(stress, HEIGHT)
+    assert found is not None
+    assert found == pytest.approx((0.05, 6), abs=0.03)
+    again = np.abs(sound.x_m - crest - 12 * HEIGHT) < HEIGHT
+    assert bubble(replace(stress, tau_wall=np.where(again, -1, stress.tau_wall)), HEIGHT) == found

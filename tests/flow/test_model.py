@@ -1,15 +1,16 @@
-"""What a scene's table `flow` does to the stress that its grains feel; no solver is run."""
+"""Fields of a scene's flow: the stress that its grains feel and the case; no solver is run."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator import plan
+from orchestrator import plan, tables
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.flow.model import model
 from orchestrator.grains.pile import Pile
+from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import study
 
 TEXT = """
@@ -21,6 +22,7 @@ slope_deg = 15.0
 roughness = "d/30"
 [flow]
 """
+WATER = 'model = "flat"\ntop = "open water"\ndepth = 0.3\n'
 
 
 def piles(flow: str) -> list[Pile]:
@@ -77,20 +79,10 @@ def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
     assert len({pile.case.name for pile in shared}) == 2
 
 
-def test_the_solvers_knobs_reach_its_case() -> None:
-    (pile,) = piles(
-        'turbulence_model = "kOmegaSST"\nconvection_scheme = "upwind"\n'
-        "non_orthogonal_correctors = 0\n"
-    )
-    assert (
-        pile.flow.turbulence_model,
-        pile.flow.convection_scheme,
-        pile.flow.non_orthogonal_correctors,
-    ) == (
-        "kOmegaSST",
-        "upwind",
-        0,
-    )
+def test_the_settings_of_the_solver_reach_its_case() -> None:
+    given = {"turbulence_model": "kOmegaSST", "convection_scheme": "upwind", "lid": 50.0}
+    (pile,) = piles("".join(f"{name} = {value!r}\n" for name, value in given.items()))
+    assert {name: getattr(pile.flow.settings, name) for name in given} == given
 
 
 def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
@@ -115,3 +107,27 @@ def test_a_slow_solve_keeps_its_first_cells(speed: float) -> None:
     (given,) = study.parse(f"{TEXT}speed = {speed}\nviscosity = 1e-4\n", name="t", where="t").scenes
     assert given.solve_viscosity == 1e-4
     assert given.first_cell_height > 0.02 / 40
+
+
+def test_tables_have_the_discharge(tmp_path: Path) -> None:
+    asked = study.parse(TEXT + WATER, name="t", where="t")
+    planned = plan.make(asked)
+    rows = tables.make(asked, planned, tmp_path, ())["pile_threshold"]
+    speed = float(depth_mean_speed(1.0, 0.3, 1e-3 / 30)) * rows["ustar0_m_s"]
+    np.testing.assert_allclose(rows["mean_speed_m_s"], speed)
+    np.testing.assert_allclose(rows["discharge_m2_s"], 0.3 * speed)
+    assert "u_1m_m_s" not in rows
+
+
+@pytest.mark.parametrize(
+    ("flow", "what"),
+    [
+        ("depth = 1.0", "flow.depth: a boundary layer has none"),
+        ('top = "open water"', "flow.depth: the depth of open water is missing"),
+        ('top = "open water"\ndepth = 0.05', "less than 3 heights of the forms"),
+        ('top = "open water"\ndepth = 1.0\nmodel = "hill"', "the theory hill is of a flow without"),
+    ],
+)
+def test_a_channel_has_a_depth_that_forms_do_not_fill(flow: str, what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        study.parse(TEXT + flow, name="t", where="t")
