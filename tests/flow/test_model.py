@@ -22,7 +22,7 @@ slope_deg = 15.0
 roughness = "d/30"
 [flow]
 """
-WATER = 'model = "flat"\ntop = "open water"\ndepth = 0.3\n'
+WATER = 'model = "flat"\ntop = "open water"\ndepth = 0.3\n[protocol]\nmethod = "pivot"\n'
 
 
 def piles(flow: str) -> list[Pile]:
