@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.bed.line import BedLine, triangle
-from orchestrator.flow import diagnostics, theory
+from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
-from orchestrator.flow.stress import Array, Measure, WallStress
+from orchestrator.flow.stress import Measure, WallStress, reattachment
 from orchestrator.runs import case, engine
+from orchestrator.study.parts import Flow
 from orchestrator.study.scene import default_first_cell_height
+from orchestrator.types import FloatArray
 
 HEIGHT = 0.02
 ROUGHNESS = (3.3e-6, 3.333e-5, 1e-4)
@@ -43,7 +45,13 @@ MODELS = (
 def flow(slope: float, roughness: float) -> FlowCase:
     """The standard case of a slope and a roughness."""
     first = default_first_cell_height(HEIGHT, roughness)
-    return FlowCase(slope, HEIGHT, roughness, 10.0, 1e-5, first)
+    settings = Flow(roughness=roughness, viscosity=1e-5, first_cell_height=first)
+    return FlowCase(HEIGHT, slope, settings)
+
+
+def other(one: FlowCase, **settings: object) -> FlowCase:
+    """A case with other settings."""
+    return replace(one, settings=one.settings.model_copy(update=settings))
 
 
 def solved(one: FlowCase, cases: Path) -> WallStress:
@@ -73,8 +81,8 @@ def meshes(cases: Path) -> None:
     for slope in SLOPES:
         for roughness in ROUGHNESS:
             one = flow(slope, roughness)
-            fine = replace(one, cells_per_face=2 * one.cells_per_face)
-            low = replace(one, first_cell_m=one.first_cell_m / 2)
+            fine = other(one, cells_per_face=2 * one.settings.cells_per_face)
+            low = other(one, first_cell_height=one.first_cell_m / 2)
             mean, eq10 = (windward_mean(one, solved(one, cases), m) for m in ("wall", "eq10"))
             cells = [
                 change(windward_mean(fine, solved(fine, cases)), mean),
@@ -94,10 +102,10 @@ def similarity(cases: Path) -> None:
         face = HEIGHT / np.sin(np.radians(slope))
         on = (stress.s_m > 0) & (stress.s_m < face)
         for speed in (5.0, 20.0):
-            other_case = replace(one, speed_m_s=speed)
-            other = solved(other_case, cases)
-            ratio = other.ustar_over_ustar0_wall[on] / stress.ustar_over_ustar0_wall[on]
-            mean = change(windward_mean(other_case, other), windward_mean(one, stress))
+            other_case = other(one, speed=speed)
+            faster = solved(other_case, cases)
+            ratio = faster.ustar_over_ustar0_wall[on] / stress.ustar_over_ustar0_wall[on]
+            mean = change(windward_mean(other_case, faster), windward_mean(one, stress))
             most = f"{100 * np.abs(ratio - 1).max():.2f} %"
             print(f"| {slope:g} | {roughness:g} | {speed:g} | {mean} | {most} |", flush=True)
 
@@ -110,7 +118,7 @@ def levels(cases: Path) -> None:
         for slope in (15.0, 30.0):
             for roughness in ROUGHNESS:
                 standard = flow(slope, roughness)
-                one = replace(standard, **change_of)
+                one = other(standard, **change_of)
                 new, old = (on_grains(each, solved(each, cases)) for each in (one, standard))
                 worst = f"{100 * np.abs(new / old - 1).max():.1f} %"
                 cost = " | ".join(spent(cases / one.name))
@@ -118,7 +126,7 @@ def levels(cases: Path) -> None:
                 print(f"| {name} | {slope:g} | {roughness:g} | {cost} | {mean} | {worst} |")
 
 
-def on_grains(one: FlowCase, stress: WallStress) -> Array:
+def on_grains(one: FlowCase, stress: WallStress) -> FloatArray:
     """Stress on touching grains of 1 mm along the windward face."""
     face = one.height_m / np.sin(np.radians(one.slope_deg))
     return stress.mean_over(np.arange(GRAIN / 2, face, GRAIN), GRAIN)
@@ -140,9 +148,9 @@ def models(cases: Path) -> None:
     """What turbulence models and schemes give."""
     print("\n| changed | 15 deg | 30 deg | separated, 15 and 30 deg, h |\n|---|---|---|---|")
     for changed in MODELS:
-        piles = [replace(flow(slope, 3.333e-5), **changed) for slope in (15.0, 30.0)]
+        piles = [other(flow(slope, 3.333e-5), **changed) for slope in (15.0, 30.0)]
         means = " | ".join(f"{windward_mean(one, solved(one, cases)):.3f}" for one in piles)
-        lengths = (diagnostics.reattachment(solved(one, cases), HEIGHT) for one in piles)
+        lengths = (reattachment(solved(one, cases), HEIGHT) for one in piles)
         name = ", ".join(f"{key} = {value}" for key, value in changed.items()) or "nothing"
         print(f"| {name} | {means} | {', '.join(f'{x:.1f}' for x in lengths)} |")
 
@@ -197,8 +205,9 @@ def wavy(slope: float, roughness: float) -> FlowCase:
     z = height / 2 * (1 - np.cos(2 * np.pi * x))
     line = BedLine((-10.0, *x.tolist(), 13.0), (0.0, *z.tolist(), 0.0), height)
     first = max(1 / 2000, 2.5 * roughness)
-    one = FlowCase(slope, height, roughness, 10.0, 1e-5, first, line=line)
-    return replace(one, lid=5 / height, upstream=3 / height, downstream=3 / height)
+    settings = Flow(roughness=roughness, viscosity=1e-5, first_cell_height=first)
+    domain = {"lid": 5 / height, "upstream": 3 / height, "downstream": 3 / height}
+    return FlowCase(height, slope, settings.model_copy(update=domain), line=line)
 
 
 def phases(one: FlowCase, stress: WallStress) -> tuple[float, float]:
