@@ -9,7 +9,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator.parameters import PARAMETERS, QUANTITIES
+from orchestrator.calculator.parameters import (
+    GAS_BELOW,
+    MOST_POINTS,
+    PARAMETERS,
+    QUANTITIES,
+)
 from orchestrator.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +23,6 @@ if TYPE_CHECKING:
 Value = float | str
 """A number, or a part of the diameter such as ``d/30``."""
 OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
-MOST_POINTS = 100_000
 FORM = "write FIRST:LAST:COUNT, such as 1e-4:2e-3:20"
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
@@ -36,8 +40,6 @@ UNITS = (
     ("gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
 )
 """Ranges in which a number is likelier in another unit, the question, and the factor to SI."""
-GAS_BELOW = 100.0
-"""Density that tells gases from liquids, kg/m3."""
 COHESIVE_BELOW = {"gas": 1e-4, "liquid": 6e-5}
 """Diameter below which cohesion is no longer small against the weight, m."""
 USUAL_PA_S = {"gas": (3e-6, 1e-4), "liquid": (1e-4, 0.1)}
@@ -57,15 +59,15 @@ def add(commands: Any) -> None:
     command = commands.add_parser(
         "threshold", help="when one grain starts to move, closed form, at once", epilog=RANGES
     )
-    for name, one in PARAMETERS.items():
-        default = f"{one.default:g}" if isinstance(one.default, float) else one.default
+    for name, each in PARAMETERS.items():
+        default = f"{each.default:g}" if isinstance(each.default, float) else each.default
         command.add_argument(
             OPTIONS[name],
             dest=name,
             default=default,
             required=name == "diameter",
             metavar="X",
-            help="; ".join(filter(None, (one.label, one.note, default and f"default {default}"))),
+            help="; ".join(filter(None, (each.label, each.note, default and f"default {default}"))),
         )
     command.add_argument(
         "--law",
@@ -223,7 +225,7 @@ def _fluid(rho: float, nu: float) -> str:
 
 def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
     """A refusal with options for the fields of a study file; questions are its remedy."""
-    options = {one.field: OPTIONS[name] for name, one in PARAMETERS.items()}
+    options = {each.field: OPTIONS[name] for name, each in PARAMETERS.items()}
 
     def renamed(text: str) -> str:
         return re.sub(r"\b[a-z]+\.[a-z_]+\b", lambda field: options.get(field[0], field[0]), text)
@@ -247,7 +249,7 @@ def as_json(table: "pd.DataFrame") -> str:
     rows, laws = table.to_dict("records"), table["law"].nunique()
     records = [
         {
-            "input": {name: plain(point[0][one.column]) for name, one in PARAMETERS.items()},
+            "input": {name: plain(point[0][each.column]) for name, each in PARAMETERS.items()},
             "regime": point[0]["regime"],
             "paper": list(LAWS_OF[point[0]["regime"]]),
             "answer": [row["law"] for row in point if row["answer"]],
@@ -270,7 +272,7 @@ def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterat
     shown = {c: label for c, (_, label) in QUANTITIES.items() if table[c].notna().any()}
     if varied:
         yield name
-        first = {PARAMETERS[one].column: PARAMETERS[one].label for one in varied}
+        first = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
         first |= {"law": "force law"} if answer == "paper" else {}
         rows = chosen
     else:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from orchestrator.calculator.parameters import PARAMETERS
+from orchestrator.calculator.parameters import GAS_BELOW, MOST_POINTS, PARAMETERS
 from orchestrator.errors import InputError
 from orchestrator.fidelity import limits
 from orchestrator.physics.force_law import Exposure, ForceLaw
@@ -17,9 +17,6 @@ from orchestrator.study.closed_form import PAPER, SingleGrain, single_grain
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import make_scene
 
-MOST_POINTS = 100_000
-GAS_BELOW = 100.0
-"""Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
 DEEPEST = 2e4
 """Largest depth of a liquid, m: twice the deepest sea."""
 LAMINAR_BELOW = 2000.0
@@ -81,17 +78,17 @@ def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
     others = {name: grains[name].to_numpy() for name in SingleGrain._fields[5:]}
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
-        by_law = {name: threshold(one, exposure, **others) for name, one in LAWS.items()}
-        blocks = {name: _columns(LAWS[name], one, grains) for name, one in by_law.items()}
+        by_law = {name: threshold(each, exposure, **others) for name, each in LAWS.items()}
+        blocks = {name: _columns(LAWS[name], by_law[name], grains) for name in LAWS}
     regimes = regime(by_law["low"], by_law["high"])
-    given = pd.DataFrame({one.column: grains[name] for name, one in PARAMETERS.items()})
-    picked = {one: LAWS_OF[one] if answer == PAPER else (answer,) for one in LAWS_OF}
+    given = pd.DataFrame({each.column: grains[name] for name, each in PARAMETERS.items()})
+    picked = {key: laws if answer == PAPER else (answer,) for key, laws in LAWS_OF.items()}
     table = pd.concat(
         given.assign(
             law=name,
             **block,
             regime=regimes,
-            answer=[name in picked[one] for one in regimes.tolist()],
+            answer=[name in picked[key] for key in regimes.tolist()],
         )
         for name, block in blocks.items()
     ).sort_index(kind="stable", ignore_index=True)

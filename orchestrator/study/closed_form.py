@@ -67,13 +67,13 @@ def thresholds(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold
     keys = [(name, tuple(grain)) for grain in grains]
     if new := [key for key in dict.fromkeys(keys) if key not in _CACHE]:
         columns = np.array([grain for _, grain in new]).T
-        found = threshold(
+        columnwise = threshold(
             LAWS[name],
             Exposure(*columns[:5]),
             **dict(zip(SingleGrain._fields[5:], columns[5:], strict=True)),
         )
         values = zip(
-            *(getattr(found, field) for field in Threshold.__dataclass_fields__), strict=True
+            *(getattr(columnwise, field) for field in Threshold.__dataclass_fields__), strict=True
         )
         _CACHE.update(zip(new, (Threshold(*row) for row in values), strict=True))
     return [_CACHE[key] for key in keys]
@@ -92,7 +92,8 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
-    each = np.array([one.friction_velocity for one in thresholds(scene.forces.law, grains)], float)
+    answers = thresholds(scene.forces.law, grains)
+    each = np.array([answer.friction_velocity for answer in answers], float)
     return np.asarray(np.nan_to_num(each, nan=0.0, posinf=np.inf)[place])
 
 
@@ -142,7 +143,7 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     """Each scene with one force law; by the paper's rule a scene becomes two in the transition."""
     # many thresholds at once take a hundredth of the time that they take one after the other
     for name in {scene.forces.law for scene in scenes} - {PAPER}:
-        thresholds(name, [single_grain(one) for one in scenes if one.forces.law == name])
+        thresholds(name, [single_grain(each) for each in scenes if each.forces.law == name])
     for name in ("low", "high"):  # the tables have the regime of each scene, whatever its law
         thresholds(name, [single_grain(scene) for scene in scenes])
     for scene in scenes:

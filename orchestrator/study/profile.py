@@ -29,8 +29,8 @@ FEWEST = 3
 MOST_CORNERS = 3000
 """Most corners of a bed line, each of which is a grid line of the flow's mesh."""
 GAP = 20.0
-"""A step along x this many times the middle one is a gap, in a profile of `MANY` points."""
-MANY = 20
+"""A step along x this many times the middle one is a gap, in a profile of `DENSE` points."""
+DENSE = 20
 STEEPEST_DEG = 60.0
 """Slope beyond which no mesh of vertical grid lines follows the bed."""
 RESOLVED = 4
@@ -246,7 +246,7 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
             what = f"x = {x[point]:g} m again"
         refuse(what, "sort the lines by x, with one height for each place", point)
     widest, middle = int(np.argmax(steps)), float(np.median(steps))
-    if len(x) >= MANY and steps[widest] > GAP * middle:
+    if len(x) >= DENSE and steps[widest] > GAP * middle:
         what = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m; others are {middle:g} m"
         refuse(what, "fill it with points", widest + 1)
     more = "give bed.smoothing, a length in m"
@@ -281,7 +281,7 @@ def _smoothed(x: FloatArray, z: FloatArray, length: float) -> tuple[FloatArray, 
     heights = np.concatenate([2 * z[0] - z[:0:-1], z, 2 * z[-1] - z[-2::-1]])
     # each point stands for the bed half-way to its neighbours
     share = np.gradient(around)
-    count = max(int(np.ceil(np.ptp(x) / length * RESOLVED)), MANY)
+    count = max(int(np.ceil(np.ptp(x) / length * RESOLVED)), DENSE)
     places = np.linspace(x[0], x[-1], count + 1)
     first, last = np.searchsorted(around, [places - 2 * length, places + 2 * length])
     means = np.interp(places, x, z)

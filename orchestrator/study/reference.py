@@ -61,18 +61,18 @@ def _part(part: str) -> Iterator[str]:
     if part == "bed":
         about = "One grain on two others, or a pile of grains."
     yield f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 7}|"
-    for one in fields.FIELDS:
-        if one.name.startswith(f"{part}."):
-            yield f"| {' | '.join(_row(one))} |"
+    for quantity in fields.FIELDS:
+        if quantity.name.startswith(f"{part}."):
+            yield f"| {' | '.join(_row(quantity))} |"
     yield ""
 
 
-def _row(one: Quantity) -> list[str]:
-    field, info = fields.declared(one), one.info
+def _row(quantity: Quantity) -> list[str]:
+    field, info = fields.declared(quantity), quantity.info
     words = info.choices or {w: w for w in get_args(field.annotation) if isinstance(w, str)}
     listed = [f'`"{w}"`' + (f": {m}" if m.lower() != w else "") for w, m in words.items()]
-    name = one.name.partition(".")[2]
-    value = BED.get(name, field.default) if one.name.startswith("bed.") else field.default
+    part, _, name = quantity.name.partition(".")
+    value = BED.get(name, field.default) if part == "bed" else field.default
     default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace("'", '"')
     if value is PydanticUndefined:
         default = "none: required"
@@ -85,9 +85,9 @@ def _row(one: Quantity) -> list[str]:
         ", ".join(filter(None, (info.symbol, info.unit))).replace("*", r"\*"),
         ", ".join(bounds(field)),
         default,
-        "<br>".join([one.meaning, *listed]).replace("*", r"\*"),
+        "<br>".join([quantity.meaning, *listed]).replace("*", r"\*"),
         ", ".join(filter(None, (scope, role))),
-        f"`{one.column}`" if one.column in fields.COLUMNS else "",
+        f"`{quantity.column}`" if quantity.column in fields.COLUMNS else "",
     ]
 
 

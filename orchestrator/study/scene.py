@@ -164,9 +164,9 @@ class Scene(Part):
                 what = f"{what} {least:.2g} m"
                 more = "give" if lines else "raise"
                 yield "bed.profile", what, f"leave out one of the two, or {more} bed.smoothing"
-        for one, other in pairwise(sorted(bed.obstacles, key=lambda obstacle: obstacle.x)):
-            if other.x - one.x < one.reach + other.reach:
-                yield "bed.obstacles", f"{one} and {other} overlap", "move one of them"
+        for obstacle, other in pairwise(sorted(bed.obstacles, key=lambda each: each.x)):
+            if other.x - obstacle.x < obstacle.reach + other.reach:
+                yield "bed.obstacles", f"{obstacle} and {other} overlap", "move one of them"
         if bed.height < 5 * d:
             what = f"{bed.height:g} m is less than five grains of {d:g} m"
             remedy = "a pile needs some rows, and lengths on a flat bed are parts of it: raise"
@@ -327,5 +327,5 @@ def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) 
     if not match or float(match[2]) == 0:
         raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
     # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
-    of = percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
-    return float(f"{of / float(match[2]):.12g}")
+    size = percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
+    return float(f"{size / float(match[2]):.12g}")

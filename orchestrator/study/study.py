@@ -94,7 +94,7 @@ class Study:
     time_limit_s : float
         Wall time after which one solver run counts as hung, s.
     tolerance : float or None
-        Relative error that tau_c may have; 0: every scene as it is asked for; None: it is not said.
+        Relative error that tau_c may have; 0: every scene as it is asked for; None: not given.
     cluster : dict
         Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
     text : str

@@ -144,8 +144,8 @@ class Forces(Part):
     @classmethod
     def _is_in_registry(cls, value: str) -> str:
         if value not in ("paper", *LAWS):
-            known = ", ".join(("paper", *LAWS))
-            raise UnfitError("forces.law", f"unknown force law {value!r}", f"known: {known}")
+            laws = ", ".join(("paper", *LAWS))
+            raise UnfitError("forces.law", f"unknown force law {value!r}", f"known: {laws}")
         return value
 
 
