@@ -7,8 +7,9 @@ on the cheapest levels that feel it.
 import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -29,7 +30,6 @@ from orchestrator.fidelity.levels import (
     level,
     value_of,
 )
-from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.laws import LAWS
 from orchestrator.pipeline import Finished
@@ -144,9 +144,8 @@ CHOICES = tuple(_choices())
 """Every shared choice."""
 
 
-@dataclass(frozen=True)
-class Change:
-    """An alternative of a choice at a scene: the names of both piles in the plan."""
+class Change(NamedTuple):
+    """An alternative of a choice at a scene, with the names in the plan of both piles."""
 
     scene: Scene
     choice: Choice
@@ -158,18 +157,16 @@ class Change:
 def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     """The alternatives of each pile of a study, and the piles to be answered, by name."""
     listed, asked = [], {}
-
-    def key_of(scene: Scene, name: str, pile: Scene, levels: Pair) -> str:
-        key = f"{scene.id} | {levels.text} | {name}"
-        asked[key] = on_levels(pile, levels, "the budget changes one choice")
-        return key
-
     for scene in study.scenes:
         for choice in CHOICES if isinstance(scene.bed, PileBed) else ():
             levels = choice.levels(scene)
-            base = key_of(scene, BASE, scene, levels)
-            for name, other in choice.scenes(scene):
-                listed.append(Change(scene, choice, name, base, key_of(scene, name, other, levels)))
+            base, *others = (
+                (f"{scene.id} | {levels.text} | {name}", name, pile)
+                for name, pile in ((BASE, scene), *choice.scenes(scene))
+            )
+            for key, _, pile in (base, *others):
+                asked[key] = on_levels(pile, levels, "the budget changes one choice")
+            listed += [Change(scene, choice, name, base[0], key) for key, name, _ in others]
     return listed, asked
 
 
@@ -189,11 +186,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
     limits.check_study(study)
     listed, asked = changes(study)
     if not asked:
-        raise InputError(
-            "there is no pile in this study",
-            where=study.name,
-            remedy='give a group `bed.kind = "pile"`',
-        )
+        remedy = 'give a group `bed.kind = "pile"`'
+        raise InputError("there is no pile in this study", where=study.name, remedy=remedy)
     planned = plan.of(asked, study.name, cases=out.absolute() / "cases")
 
     def make(runs: Runs) -> tuple[Tables, Callable[[], list[Section]]]:
@@ -204,14 +198,9 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         tables = {"changes": moved, "shares": shared, "budget": known(shared)}
         return tables, lambda: _sections(listed, tables, runs)
 
+    limit_s = study.time_limit_s
     finished = experiment.run(
-        "budget",
-        "What a threshold is worth",
-        planned,
-        out,
-        make,
-        workers=workers,
-        limit_s=study.time_limit_s,
+        "budget", "What a threshold is worth", planned, out, make, workers=workers, limit_s=limit_s
     )
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
     needed = {run.name for change in listed for run in planned.piles[change.base].runs}
@@ -221,15 +210,11 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
     """A row for each scene, alternative and fraction: how far the threshold moved, relative."""
-    piles = runs.planned.piles
-    ready = {key for key, pile in piles.items() if pile.is_run(runs.done)}
-    found: dict[str, list[PileThreshold]] = {}
 
+    @cache
     def thresholds(key: str) -> list[PileThreshold]:
-        if key not in found:
-            pile = piles[key]
-            found[key] = pile.thresholds(runs.cases, pile.scene.protocol.fractions)
-        return found[key]
+        pile = runs.planned.piles[key]
+        return pile.thresholds(runs.cases, pile.scene.protocol.fractions)
 
     return pd.DataFrame(
         {
@@ -243,7 +228,7 @@ def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
             "ustar0": after.ustar0 / before.ustar0 - 1,
         }
         for change in listed
-        if {change.base, change.other} <= ready
+        if runs.are_done(change.base, change.other)
         for before, after in zip(thresholds(change.base), thresholds(change.other), strict=True)
     )
 
@@ -272,77 +257,64 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
     from orchestrator.experiments import budget_figures as figures
 
-    words = experiment.texts("budget")
+    words, figure, sheet = experiment.texts("budget"), experiment.figure, document.sheet
     moved, shared = tables["changes"], tables["shares"]
+    title, all_scenes = "All choices together", _together(shared)
+    sections = [Section(title, words["together"], (), [sheet(all_scenes)], [words["limit"]])]
     piles = runs.planned.piles
-    worn: list[tuple[Pile, Pile]] = [
+    worn = [
         (piles[change.base], piles[change.other])
         for change in listed
-        if change.choice.name == FROZEN
-        and all(piles[key].is_run(runs.done) for key in (change.base, change.other))
+        if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
     ]
-    title, sheets = "All choices together", [document.sheet(_all(shared))]
-    sections = [Section(title, words["together"], (), sheets, [words["limit"]])]
     if worn:
         rows = moved[moved["choice"] == FROZEN]
         table = rows[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
         table = table.assign(**{"θ, %": 100 * rows["shields"], "u*₀, %": 100 * rows["ustar0"]})
         drawn = figures.curves(worn, runs.cases)
-        figure = experiment.figure("wear", "Frozen bed and bed that changes", words["wear"], drawn)
+        chart = figure("wear", "Frozen bed and bed that changes", words["wear"], drawn)
         title = "The bed that changes"
-        sections.append(Section(title, words["changing"], (figure,), (document.sheet(table),)))
+        sections.append(Section(title, words["changing"], (chart,), [sheet(table)]))
     for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
         name, drawn = str(scene["scene"].iloc[0]), figures.tornado(scene)
-        figure = experiment.figure(f"tornado-{number}", name, words["scene"], drawn)
-        sections.append(Section(name, "", (figure,), (document.sheet(_by_fraction(scene)),)))
+        chart = figure(f"tornado-{number}", name, words["scene"], drawn)
+        ends = zip(100 * scene["shields_low"], 100 * scene["shields_high"], strict=True)
+        share = [f"−{low:.1f} … +{high:.1f}" for low, high in ends]
+        heads = [f"change of θ at {fraction:.0%}, %" for fraction in scene["fraction"]]
+        table = scene.assign(share=share, head=heads)
+        wide = table.pivot_table("share", "choice", "head", aggfunc="first", sort=False)
+        sections.append(Section(name, "", (chart,), [sheet(wide.reset_index())]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     choices = pd.DataFrame(kept, columns=["choice", "alternatives", "why"])
     lost = _lost(listed, runs)
     text = "" if lost.empty else "The alternatives of the second table have no answer."
-    sheets = [document.sheet(table) for table in (choices, lost) if len(table)]
+    sheets = [sheet(table) for table in (choices, lost) if len(table)]
     return [*sections, Section("The choices and their alternatives", text, tables=sheets)]
 
 
-def _lost(listed: list[Change], runs: Runs) -> pd.DataFrame:
-    """The alternatives that have no answer, and why: a flow model may refuse a bed."""
-    names = {change.other: change for change in listed}
-    names |= {change.base: change for change in listed}
-    rows = [
-        {
-            "scene": label(change.scene),
-            "alternative": key.rpartition(" | ")[2],
-            "why": "; ".join(
-                runs.failures[run.name].what for run in pile.runs if run.name in runs.failures
-            ),
-        }
-        for key, change in names.items()
-        for pile in (runs.planned.piles[key],)
-        if not pile.is_run(runs.done)
-    ]
-    return pd.DataFrame(rows).drop_duplicates() if rows else pd.DataFrame()
-
-
-def _all(shared: pd.DataFrame) -> pd.DataFrame:
-    """A row for each scene: the shares of all choices together."""
+def _together(shared: pd.DataFrame) -> pd.DataFrame:
+    """A row for each scene: the shares of all choices together, and the largest of them."""
     rows = []
     for _, scene in shared.groupby("scene_id", sort=False):
-        largest = scene.groupby("choice")[ENDS].max()
+        largest = scene.groupby("choice", sort=False)[ENDS].max()
         row = {"scene": scene["scene"].iloc[0]}
         for name, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
             low, high = calibration.together(largest, name)
-            widest = (largest[f"{name}_low"] + largest[f"{name}_high"]).idxmax()
             row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
-            row[f"{symbol}: largest share"] = widest
+            widths = largest[f"{name}_low"] + largest[f"{name}_high"]
+            row[f"{symbol}: largest share"] = str(widths.idxmax())
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def _by_fraction(rows: pd.DataFrame) -> pd.DataFrame:
-    """A row for each choice, a column for each fraction: the share of the Shields number."""
-    low, high = 100 * rows["shields_low"], 100 * rows["shields_high"]
-    share = [f"−{a:.1f} … +{b:.1f}" for a, b in zip(low, high, strict=True)]
-    heads = [f"change of θ at {fraction:.0%}, %" for fraction in rows["fraction"]]
-    table = rows.assign(share=share, head=heads)
-    wide = table.pivot_table("share", "choice", "head", aggfunc="first", sort=False)
-    return wide.reset_index()
+def _lost(listed: list[Change], runs: Runs) -> pd.DataFrame:
+    """The alternatives that have no answer, and why: a flow model may refuse a bed."""
+    scenes = {key: change.scene for change in listed for key in (change.base, change.other)}
+    rows = []
+    for key, scene in scenes.items():
+        if not runs.are_done(key):
+            failed = (runs.failures.get(run.name) for run in runs.planned.piles[key].runs)
+            why = "; ".join(error.what for error in failed if error)
+            rows.append((label(scene), key.rpartition(" | ")[2], why))
+    return pd.DataFrame(rows, columns=["scene", "alternative", "why"]).drop_duplicates()

@@ -51,6 +51,10 @@ class Runs:
         """Processor seconds of the finished runs, by name."""
         return {name: state["cpu_s"] for name, state in self.done.items()}
 
+    def are_done(self, *piles: str) -> bool:
+        """Whether all runs of some piles of the plan are done, by their names."""
+        return all(self.planned.piles[key].is_run(self.done) for key in piles)
+
 
 def run(
     name: str,
