@@ -62,16 +62,14 @@ REFERENCES = ((REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), (FLOW_REFERENC
 """The reference of a scene is the first of these that it has; beside it one that is as good."""
 FAST = level("grains", "1 layer, fast")
 USED = tuple(
-    Pair(level("flow", flow), level("grains", grains))
-    for flow, grains in (
-        ("hill", "pivot"),
-        ("hill", "peeling"),
-        ("shared", "peeling"),
-        ("coarse", "1 layer, coarse"),
-        ("coarse", "1 layer, fast"),
-        ("standard", "1 layer, fast"),
-        ("standard", "1 layer, slow"),
-    )
+    Pair(level("flow", flow), level("grains", name))
+    for flow, names in {
+        "hill": ("pivot", "peeling"),
+        "shared": ("peeling",),
+        "coarse": ("1 layer, coarse", "1 layer, fast"),
+        "standard": ("1 layer, fast", "1 layer, slow"),
+    }.items()
+    for name in names
 )
 """Pairs as they are used together."""
 CURVE = np.arange(0.05, 0.86, 0.05)
@@ -114,15 +112,8 @@ def run(study: Study, out: Path, *, workers: int) -> Finished:
         }
         return tables, lambda: _sections(tables)
 
-    return experiment.run(
-        "ladder",
-        "Speed against accuracy",
-        planned,
-        out,
-        make,
-        workers=workers,
-        limit_s=study.time_limit_s,
-    )
+    title, limit_s = "Speed against accuracy", study.time_limit_s
+    return experiment.run("ladder", title, planned, out, make, workers=workers, limit_s=limit_s)
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -136,27 +127,20 @@ def decisions(study: Study) -> dict[str, Decision]:
 
 
 def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
-    by_dem = scene.protocol.method == "dem"
-    flows, grains = (_affordable(levels, scene, bed) for levels in (FLOW, GRAINS))
+    line, by_dem = of_bed(bed), scene.protocol.method == "dem"
+    exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
+    flows, grains = (
+        [one for one in levels if one.takes(scene) and exposed <= (one.most_grains or math.inf)]
+        for levels in (FLOW, GRAINS)
+    )
     # neither over a level bed nor on a bed in space can the levels of the flow be measured
     if bed.is_level or bed.width:
-        flow = FLAT if bed.is_level else FINE
-        yield from (Pair(flow, one) for one in grains if by_dem)
+        yield from (Pair(FLAT if bed.is_level else FINE, one) for one in grains if by_dem)
         return
     yield from (Pair(one, PEELING) for one in flows)
     if by_dem:
         yield from (Pair(FINE, one) for one in grains)
         yield from (pair for pair in USED if pair.flow in flows)
-
-
-def _affordable(levels: Sequence[Level], scene: Scene, bed: PileBed) -> list[Level]:
-    line = of_bed(bed)
-    exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter
-    return [
-        one
-        for one in levels
-        if one.takes(scene) and (one.most_grains is None or exposed <= one.most_grains * (1 + 1e-9))
-    ]
 
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
@@ -169,43 +153,35 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
     runs : Runs
         Of the same scenes.
     """
-    return pd.DataFrame(
-        _point(decision, runs.planned.piles[key], runs)
-        for key, decision in pairs.items()
-        if runs.planned.piles[key].is_run(runs.done)
-    )
-
-
-def _point(decision: Decision, pile: Pile, runs: Runs) -> Row:
-    scene, pair = decision.asked, decision.levels
-    assert isinstance(scene.bed, PileBed)
-    assert pair
-    started = time.process_time()
-    motion = pile.motion(runs.cases)
-    here_s = time.process_time() - started if pair.grains.name in ("pivot", "peeling") else 0.0
-    speed, density = pile.face(runs.cases).speed, scene.fluid.density
-
-    def taus(start: str, fractions: Sequence[float], form: str) -> Row:
-        found = (of_pile(motion, speed, at, density).tau for at in fractions)
-        return {f"{start}_{at:{form}}": tau for at, tau in zip(fractions, found, strict=True)}
-
-    return {
-        "scene_id": scene.id,
-        "scene": experiment.label(scene),
-        **point(scene),
-        "packing": packing(scene) + (", level bed" if scene.bed.is_level else ""),
-        "asked": scene.protocol.method,
-        **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
-        "count": motion.count,
-        "flow_level": pair.flow.name,
-        "grain_level": pair.grains.name,
-        "same_model": pair.flow.same_model and pair.grains.same_model,
-        "model_floor": calibration.floor(calibration.model_class(scene)),
-        "flow_s": sum(runs.cpu_s[run.name] for run in pile.model.cases),
-        "grains_s": here_s + sum(runs.cpu_s[run.name] for run in pile.method.cases),
-        **taus("tau", scene.protocol.fractions, "g"),
-        **taus("curve", CURVE.tolist(), ".2f"),
-    }
+    rows = []
+    for key, decision in pairs.items():
+        pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
+        if not pair or not runs.are_done(key):
+            continue
+        started = time.process_time()
+        motion = pile.motion(runs.cases)
+        here_s = time.process_time() - started if pair.grains.name in ("pivot", "peeling") else 0.0
+        names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
+        names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
+        speed, density = pile.face(runs.cases).speed, scene.fluid.density
+        row: Row = {
+            "scene_id": scene.id,
+            "scene": experiment.label(scene),
+            **point(scene),
+            "packing": packing(scene) + (", level bed" if pile.bed.is_level else ""),
+            "asked": scene.protocol.method,
+            **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
+            "count": motion.count,
+            "flow_level": pair.flow.name,
+            "grain_level": pair.grains.name,
+            "same_model": pair.flow.same_model and pair.grains.same_model,
+            "model_floor": calibration.floor(calibration.model_class(scene)),
+            "flow_s": sum(runs.cpu_s[run.name] for run in pile.model.cases),
+            "grains_s": here_s + sum(runs.cpu_s[run.name] for run in pile.method.cases),
+        }
+        taus = {name: of_pile(motion, speed, at, density).tau for name, at in names.items()}
+        rows.append({**row, **taus})
+    return pd.DataFrame(rows)
 
 
 def errors(found: pd.DataFrame) -> pd.DataFrame:
@@ -338,15 +314,15 @@ def small_pile(study: Study) -> Scene:
     InputError
         If it has none.
     """
-    piles = [
-        (scene.bed.height / scene.grain.diameter, scene.id, scene)
+    heights = {
+        scene: scene.bed.height / scene.grain.diameter
         for scene in study.scenes
         if isinstance(scene.bed, PileBed) and scene.protocol.method == "dem" and not scene.is_poured
-    ]
-    if not piles:
+    }
+    if not heights:
         what = "it has no pile that is answered by DEM and is not poured"
         raise InputError(what, where=study.name, remedy="add one: the naive route is run on it")
-    return min(piles, key=lambda pile: pile[0])[2]
+    return min(heights, key=lambda scene: heights[scene])
 
 
 def naive_routes(scene: Scene) -> dict[str, Decision]:
