@@ -1,4 +1,4 @@
-"""Single grains on their two fixed neighbours: many cells, one case of LIGGGHTS.
+"""Cases of LIGGGHTS on grains; single grains on their two fixed neighbours, many cells in a case.
 
 In units of d, W and sqrt(d/g') a bed knows no scale, so the cells are models of one size: every
 grain has the reference diameter, its forces are those of its own scene times the ratio of the
@@ -11,21 +11,20 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orchestrator.grains import deck, motion, protocol, rest
-from orchestrator.grains.case import GrainCase
+from orchestrator.grains import deck, motion
+from orchestrator.runs import process
+from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json
+from orchestrator.solvers import liggghts
 from orchestrator.study.closed_form import closed_form, forces
+from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
+from orchestrator.types import FloatArray
 
-FloatArray = NDArray[np.float64]
-
-DIAMETER = 1e-3
-DENSITY = 2500.0
-GRAVITY = 9.81
-WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
+DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
 """The reference grain of a deck, SI; GRAVITY is its g'."""
+WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
 LAST = 1.2
 """Flow of the last load step: a grain that still lies then contradicts the closed form by 20 %."""
 SPACING = 3.0
@@ -34,9 +33,31 @@ never meet."""
 UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
 SCALED = {"diameter", "density", "sizes"}
-"""Fields of the grain that a cell, whose grain is that of the deck, knows by its forces alone."""
+"""Fields of the grain that change the forces of a cell alone; all others change its contacts."""
 BLOCK = 512
 """Most cells of a deck."""
+
+
+class GrainCase(Case):
+    """A case that runs the deck ``in.bed``."""
+
+    template: ClassVar[str] = "liggghts/bed"
+    results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", "passage.dump", "bed.dump")
+    derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
+    bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
+
+    def versions(self) -> dict[str, str]:
+        """The programs that run the case, with their versions."""
+        return liggghts.programs(self.ranks)
+
+    def share(self, directory: Path) -> float:
+        """Load steps that have begun over those that there may be."""
+        step, *_ = process.last_words(directory / "samples.csv").split(",")
+        if not step.isdecimal():
+            return 0.0
+        steps = len((directory / "load_steps.txt").read_text(encoding="ascii").split())
+        return min(int(step) / steps, 1.0)
 
 
 @dataclass(frozen=True)
@@ -54,15 +75,16 @@ class SingleGrainCase(GrainCase):
         return {"scenes": [scene.model_dump(mode="json", exclude=hidden) for scene in self.scenes]}
 
     @property
+    def grain(self) -> Grain:
+        """The grain whose contact law all cells have."""
+        return self.scenes[0].grain
+
+    @property
     def cost_s(self) -> float:
         """Expected time of one core, s."""
         rules = self.scenes[0].protocol
-        load_steps = np.log(1.02 / protocol.START) / np.log1p(rules.load_increment)
-        return protocol.run_cost_s(load_steps, 3 * len(self.scenes), rules, self._grain.stiffness)
-
-    @property
-    def _grain(self) -> Any:
-        return self.scenes[0].grain
+        load_steps = np.log(1.02 / deck.START) / np.log1p(rules.load_increment)
+        return deck.cost_s(load_steps, 3 * len(self.scenes), rules, self.grain)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
@@ -72,8 +94,8 @@ class SingleGrainCase(GrainCase):
             "smallest": 1.0,
             "density": DENSITY,
             "gravity": GRAVITY,
-            **protocol.contact(self._grain, rules),
-            **protocol.raising(rules, enough=0),
+            **deck.Contact.of(self.grain, rules).variables,
+            **deck.raising(rules, enough=0),
             # no face, no ceiling, no crest: the planes lie far outside the box
             "slope": 0.0,
             "ceiling_x": 0.0,
@@ -81,38 +103,32 @@ class SingleGrainCase(GrainCase):
             "behind": 1e3 * DIAMETER,
         }
         rising = flows(self.scenes[0])
-        force = self._forces(rising)
-        deck.write(directory, self._grains(), parameters, rising, force, margin=4 * DIAMETER)
-
-    def collect(self, directory: Path) -> None:
-        """Check the run and write what each grain did to ``motion.csv``."""
-        self.check(directory)
-        grains = self._grains()
-        marker = self.scenes[0].protocol.displacement_criterion
-        rest.check(directory, grains, WEIGHT, self._grain.stiffness, all_rest=False)
-        found = motion.read(directory, grains, marker, falls_out=True)
-        found.to_csv(directory, grains)
-
-    def _grains(self) -> deck.GrainTable:
-        cells = [cell(scene) for scene in self.scenes]
-        centres = np.concatenate([one[0] for one in cells]) * DIAMETER
-        sizes = np.concatenate([one[2] for one in cells])
-        across = np.repeat(np.arange(len(cells)) * SPACING * sizes.max() * DIAMETER, 3)
-        return deck.GrainTable(
-            position=np.column_stack([centres[:, 0], across, centres[:, 1]]),
-            kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(cells)),
-            along=np.repeat([one[1] for one in cells], 3, axis=0),
-            sizes=sizes,
-            diameter=DIAMETER,
-            density=DENSITY,
-        )
-
-    def _forces(self, rising: FloatArray) -> FloatArray:
-        """Force on each grain at each flow, shape (flows, 3 cells, 2); on neighbours none."""
         pushes = np.zeros((len(rising), 3 * len(self.scenes), 2))
         for place, scene in enumerate(self.scenes):
             pushes[:, 3 * place + 2] = force(scene, rising) * WEIGHT / scene.weight
-        return pushes
+        deck.write(directory, self._grains(), parameters, rising, pushes, margin=4 * DIAMETER)
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write what each grain did to ``motion.csv``."""
+        liggghts.check_log(directory)
+        grains = self._grains()
+        motion.check_rest(directory, grains, WEIGHT, self.grain.stiffness, all_rest=False)
+        criterion = self.scenes[0].protocol.displacement_criterion
+        motion.read(directory, grains, criterion, falls_out=True).to_csv(directory, grains)
+
+    def _grains(self) -> deck.GrainTable:
+        centres, along, sizes = zip(*(cell(scene) for scene in self.scenes), strict=True)
+        x, z = np.concatenate(centres).T * DIAMETER
+        largest = np.concatenate(sizes).max()
+        across = np.repeat(np.arange(len(centres)) * SPACING * largest * DIAMETER, 3)
+        return deck.GrainTable(
+            position=np.column_stack([x, across, z]),
+            kind=np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(centres)),
+            along=np.repeat(along, 3, axis=0),
+            sizes=np.concatenate(sizes),
+            diameter=DIAMETER,
+            density=DENSITY,
+        )
 
 
 def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -133,14 +149,14 @@ def cell(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def flows(scene: Scene) -> FloatArray:
     """Friction velocity of the settling and of each load step, over that of the closed form."""
-    return protocol.flows(protocol.START, LAST, scene.protocol.load_increment)
+    return deck.flows(deck.START, LAST, scene.protocol.load_increment)
 
 
 def force(scene: Scene, rising: FloatArray) -> FloatArray:
     """Force of the flow on the scene's grain at such flows, N, shape (flows, 2)."""
     _, along, _ = cell(scene)
     ustar = rising * float(closed_form(scene).friction_velocity)
-    drag, lift = (one(ustar) for one in forces(scene))
+    drag, lift = (law(ustar) for law in forces(scene))
     return np.outer(drag, along) + np.outer(lift, [-along[1], along[0]])
 
 
@@ -152,14 +168,10 @@ def batches(scenes: Iterable[Scene]) -> Iterator[SingleGrainCase]:
     """
     groups: dict[str, list[Scene]] = {}
     for scene in scenes:
-        groups.setdefault(_shared_key(scene), []).append(scene)
-    for key in sorted(groups):
-        members = sorted(groups[key], key=lambda scene: scene.id)
+        contact = scene.grain.model_dump(mode="json", exclude=SCALED)
+        rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
+        groups.setdefault(canonical_json([contact, rules]), []).append(scene)
+    for _, group in sorted(groups.items()):
+        members = sorted(group, key=lambda scene: scene.id)
         for start in range(0, len(members), BLOCK):
             yield SingleGrainCase(tuple(members[start : start + BLOCK]))
-
-
-def _shared_key(scene: Scene) -> str:
-    contact = scene.grain.model_dump(mode="json", exclude=SCALED)
-    rules = scene.protocol.model_dump(mode="json", exclude=UNUSED)
-    return canonical_json([contact, rules])

@@ -1,28 +1,27 @@
-"""Motion of the counted grains of a deck: which moved, at which flow, and how."""
+"""Motion of the counted grains of a deck: which moved, at which flow, and how.
+
+The counting rule is described in docs/benchmark.md, "The counting rule". The deck in.bed has the
+same criterion to know when a load step may end, and its counts are compared with those here.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from io import StringIO
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from orchestrator.errors import SolverError
-from orchestrator.grains import counting
-from orchestrator.grains.counting import Count
-from orchestrator.grains.deck import GrainTable
-from orchestrator.grains.dump import Track, read_track
-from orchestrator.grains.protocol import SETTLE_FLOW
+from orchestrator.bed.deck import read_dump, read_table
+from orchestrator.bed.packing import across
+from orchestrator.errors import Exploded, Noisy, SolverError
+from orchestrator.grains.deck import SETTLE_FLOW, GrainTable
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-
-SAMPLES = "samples.csv"
-LOAD_STEPS = "load_steps.csv"
-MOTION = "motion.csv"
+SETTLING, SAMPLES = "settling.csv", "samples.csv"
+LOAD_STEPS, MOTION = "load_steps.csv", "motion.csv"
+PASSAGE, BED = "passage.dump", "bed.dump"
+PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay", "y")
+BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
 MODES = ("none", "rolled", "slid", "lifted")
 """How a grain moved."""
 LIFTED = 0.3
@@ -32,6 +31,16 @@ ROLLED = 0.5
 """A grain rolls when its spin makes at least this part of its speed, else it slides."""
 WINDOW = 5
 """Samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')."""
+NOISE = 0.01
+"""Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its weight stores
+in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time step gave other
+thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
+DECAY = 0.5
+"""The energy still falls when the last quarter of the settling has less than this part of the
+second quarter's, and grows when it has more than 1/DECAY of it."""
+BURST = 10.0
+"""Kinetic energy per grain, over W d, that no fall of a grain can give it."""
+REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 
 
 @dataclass(frozen=True)
@@ -43,8 +52,7 @@ class Motion:
     flow : ndarray, shape (levels + 1,)
         The flow of each load step, never falling, in the deck's unit; first that of the settling.
     level : ndarray of int, shape (N,)
-        Load step (index into `flow`) in which a grain moved by the rule of `counting`; 0 for
-        never.
+        Load step (index into `flow`) in which a grain moved by the counting rule; 0 for never.
     fallen : ndarray of int, shape (N,)
         Load step in which a grain was first the criterion upstream of its place; 0 for never.
     carried : ndarray of bool, shape (N,)
@@ -66,27 +74,20 @@ class Motion:
 
     @classmethod
     def of_flows(cls, flows: FloatArray) -> "Motion":
-        """The motion of grains that roll at known flows, shape (N,); infinite for never."""
+        """The motion of grains that roll at given flows, shape (N,); infinite for never."""
         moves = np.isfinite(flows)
         levels = np.unique(flows[moves])
         # before the first level nothing moves
         flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
         level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
-        none, rolled = MODES.index("none"), MODES.index("rolled")
-        return cls(
-            flow=flow,
-            level=level,
-            fallen=np.zeros_like(level),
-            carried=np.zeros_like(moves),
-            mode=np.where(moves, rolled, none),
-            exact=True,
-        )
+        mode = np.where(moves, MODES.index("rolled"), MODES.index("none"))
+        return cls(flow, level, np.zeros_like(level), np.zeros_like(moves), mode, exact=True)
 
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":
         """The motion in runs that go on from one another: of each which of the N it counts."""
-        found = cls.of_flows(np.full(len(runs[0][0]), np.inf))
-        level, fallen, carried, mode = found.level, found.fallen, found.carried, found.mode
+        whole = cls.of_flows(np.full(len(runs[0][0]), np.inf))
+        level, fallen, carried, mode = whole.level, whole.fallen, whole.carried, whole.mode
         flow, before = [runs[0][1].flow[:1]], 0
         for counted, run in runs:
             level[counted] = np.where(run.level > 0, run.level + before, 0)
@@ -96,6 +97,11 @@ class Motion:
             flow.append(run.flow[1:])
             before += len(run.flow) - 1
         return cls(np.concatenate(flow), level, fallen, carried, mode)
+
+    def of(self, chosen: BoolArray) -> "Motion":
+        """The motion of some of the counted grains under the same flows."""
+        parts = ("level", "fallen", "carried", "mode")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in parts})
 
     @property
     def low(self) -> FloatArray:
@@ -140,23 +146,24 @@ class Motion:
         return np.cumsum(counts)
 
     def to_csv(self, directory: Path, grains: GrainTable) -> None:
-        """Write ``load_steps.csv`` and ``motion.csv``: the same, for people and for `from_csv`."""
-        load_steps = pd.DataFrame({"load_step": np.arange(len(self.flow)), "flow": self.flow})
-        load_steps = load_steps.assign(
-            moved=self.moved,
-            not_moved=self.count - self.moved,
-            carried_off=self.carried_off,
-            fallen_upstream=self.fallen_upstream,
-        )
-        load_steps.to_csv(directory / LOAD_STEPS, index=False)
-        columns = {
+        """Write ``load_steps.csv`` and ``motion.csv``, which `from_csv` reads."""
+        load_steps = {
+            "load_step": np.arange(len(self.flow)),
+            "flow": self.flow,
+            "moved": self.moved,
+            "not_moved": self.count - self.moved,
+            "carried_off": self.carried_off,
+            "fallen_upstream": self.fallen_upstream,
+        }
+        pd.DataFrame(load_steps).to_csv(directory / LOAD_STEPS, index=False)
+        moved = {
             "id": grains.counted_ids,
             "moved_in": self.level,
             "fallen_in": self.fallen,
             "carried_off": self.carried.astype(int),
             "mode": [MODES[mode] for mode in self.mode],
         }
-        pd.DataFrame(columns).to_csv(directory / MOTION, index=False)
+        pd.DataFrame(moved).to_csv(directory / MOTION, index=False)
 
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
@@ -172,7 +179,85 @@ class Motion:
         )
 
 
-def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool) -> Motion:
+@dataclass(frozen=True)
+class Track:
+    """The counted grains at each sample; arrays of shape (T, N), NaN for a grain that is gone.
+
+    Attributes
+    ----------
+    travel, rise : ndarray
+        Displacement since the settling, along the bed as the flow goes and normal to it, in the
+        grain's own diameter.
+    aside : ndarray
+        The same across the flow, to either side.
+    roll : ndarray
+        Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
+    """
+
+    travel: FloatArray
+    rise: FloatArray
+    aside: FloatArray
+    roll: FloatArray
+
+
+@dataclass(frozen=True)
+class Count:
+    """Motion of N counted grains by each of T samples. A grain that has moved stays so.
+
+    Attributes
+    ----------
+    moved : ndarray of bool, shape (T, N)
+        Displaced downstream or aside by the criterion at a sample, or carried off.
+    fallen : ndarray of bool, shape (T, N)
+        Displaced upstream by the criterion at a sample. Such a grain has not moved, but may yet.
+    carried : ndarray of bool, shape (T, N)
+        Gone without having been seen beyond the criterion: the flow lifted it off the pile.
+    """
+
+    moved: BoolArray
+    fallen: BoolArray
+    carried: BoolArray
+
+
+def count(
+    travel: FloatArray, criterion: float, *, falls_out: bool, aside: FloatArray | float = 0.0
+) -> Count:
+    """Apply the counting rule to the tracks of grains.
+
+    Parameters
+    ----------
+    travel : ndarray, shape (T, N)
+        Displacement along the bed since the settling, downstream positive, d; NaN for a grain
+        that is gone.
+    criterion : float
+        Displacement that counts as motion, d.
+    falls_out : bool
+        Whether a grain that is gone and was not seen beyond the criterion fell upstream: from the
+        two neighbours of a single grain it did, for no bed is behind them; only lift can have
+        taken it from a pile.
+    aside : ndarray, shape (T, N), or 0
+        Displacement across the flow, d; 0 of grains in one plane.
+    """
+    ahead, back = _ever((travel >= criterion) | (aside >= criterion)), _ever(travel <= -criterion)
+    vanished = _ever(np.isnan(travel) & ~ahead)
+    if falls_out:
+        return Count(ahead, back | vanished, np.zeros_like(vanished))
+    return Count(ahead | vanished, back, vanished)
+
+
+def deck_counts(
+    travel: FloatArray, criterion: float, aside: FloatArray | float = 0.0
+) -> tuple[IntArray, IntArray]:
+    """Counts of the deck at each sample, shape (T,): grains that have not moved; fallen ones."""
+    passed = _ever((travel >= criterion) | (aside >= criterion))
+    return (~np.isnan(travel) & ~passed).sum(axis=1), (travel <= -criterion).sum(axis=1)
+
+
+def _ever(happened: BoolArray) -> BoolArray:
+    return np.logical_or.accumulate(happened, axis=0)
+
+
+def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool) -> Motion:
     """Read the deck's tables of a finished run.
 
     Parameters
@@ -181,36 +266,40 @@ def read(directory: Path, grains: GrainTable, marker: float, *, falls_out: bool)
         The case.
     grains : GrainTable
         As the deck was given them.
-    marker, falls_out
-        As `counting.count` takes them.
+    criterion, falls_out
+        As `count` takes them.
 
     Raises
     ------
     SolverError
         If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
+    Exploded
+        If every counted grain was lost.
     """
-    samples = _samples(directory)
+    samples = read_table(directory / SAMPLES)
     track = read_track(directory, grains, samples)
-    _reconcile(directory, samples, track, marker)
-    found = counting.count(track.travel, marker, falls_out=falls_out, aside=track.aside)
+    lying, fallen = deck_counts(track.travel, criterion, track.aside)
+    agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
+    if not agree.all():
+        raise SolverError(
+            f"the counts do not reconcile at sample {int(agree.argmin()) + 1}",
+            where=str(directory / SAMPLES),
+            remedy="grains were lost, or the tables are of different runs",
+        )
+    counts = count(track.travel, criterion, falls_out=falls_out, aside=track.aside)
     load_step = samples["load_step"].to_numpy(np.int64)
     flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
-    return Motion(
-        flow=np.concatenate([[SETTLE_FLOW * flow[0]], flow]),
-        level=_first(found.moved, load_step),
-        fallen=_first(found.fallen, load_step),
-        carried=found.carried[-1],
-        mode=_mode(track, found),
+    level, fallen = (
+        np.where(happened.any(axis=0), load_step[happened.argmax(axis=0)], 0)
+        for happened in (counts.moved, counts.fallen)
     )
+    whole = np.concatenate([[SETTLE_FLOW * flow[0]], flow])
+    return Motion(whole, level, fallen, counts.carried[-1], _mode(track, counts))
 
 
-def _first(happened: BoolArray, load_step: IntArray) -> IntArray:
-    return np.where(happened.any(axis=0), load_step[happened.argmax(axis=0)], 0)
-
-
-def _mode(track: Track, found: Count) -> IntArray:
+def _mode(track: Track, counts: Count) -> IntArray:
     """How each grain moved, from its track around the sample at which it had moved."""
-    passed = found.moved
+    passed = counts.moved
     samples = np.arange(len(passed))[:, None]
     first = np.where(passed.any(axis=0), passed.argmax(axis=0), -1)
     present = ~np.isnan(track.travel)
@@ -221,39 +310,141 @@ def _mode(track: Track, found: Count) -> IntArray:
     roll = np.take_along_axis(track.roll, last_seen[None], axis=0)[0]
     none, rolled, slid, lifted = range(len(MODES))
     return np.select(
-        [first < 0, found.carried[-1] | (rise > LIFTED), roll >= ROLLED],
+        [first < 0, counts.carried[-1] | (rise > LIFTED), roll >= ROLLED],
         [none, lifted, rolled],
         slid,
     )
 
 
-def _samples(directory: Path) -> pd.DataFrame:
-    path = directory / SAMPLES
-    try:
-        text = path.read_text(encoding="ascii")
-        samples = pd.read_csv(StringIO(text))
-        if (
-            samples.empty
-            or not text.endswith("\n")
-            or not np.isfinite(samples.to_numpy(float)).all()
-        ):
-            raise ValueError("it holds no whole line")
-        return samples
-    except (OSError, ValueError) as error:
-        raise SolverError(
-            f"the table of load steps cannot be read: {error}",
-            where=str(path),
-            remedy="run the same command again",
-        ) from None
+def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Track:
+    """Read what the counted grains did at each sample, from ``passage.dump`` and ``bed.dump``.
+
+    A counted grain that the first does not list, and that the second has at the end of the load
+    step, is at rest where it had settled.
+
+    Parameters
+    ----------
+    directory : Path
+        The case.
+    grains : GrainTable
+        As the deck was given them.
+    samples : DataFrame
+        The deck's table of samples, T rows.
+
+    Raises
+    ------
+    SolverError
+        If a dump is not one of these grains and samples.
+    Exploded
+        If no counted grain is left.
+    """
+    ids, path = grains.counted_ids, directory / PASSAGE
+    steps, rows = read_dump(path, PASSAGE_COLUMNS)
+    if rows.empty:
+        remedy = "a smaller protocol.time_step, or look for grains that overlap"
+        raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
+    if not np.array_equal(steps[1:], samples["step"]):
+        _other(path, "its samples are not those of samples.csv")
+    if not rows["id"].isin(ids).all():
+        _other(path, "it lists grains that are not counted")
+    state = np.full((len(PASSAGE_COLUMNS) - 1, len(steps), len(ids)), np.nan)
+    row, column = np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])
+    for values, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
+        values[row, column] = rows[name]
+    listed = ~np.isnan(state[0, 1:])
+    resting = ~listed & _present(listed, directory, ids, samples)
+    for values, still in zip(state, (*state[:2, 0], 0.0, 0.0, 0.0, state[5, 0]), strict=True):
+        np.copyto(values[1:], still, where=resting)
+    diameter, along = grains.diameter * grains.sizes[ids - 1], grains.along[ids - 1].T
+    right, up = (state[:2, 1:] - state[:2, :1]) / diameter
+    vx, vz, spin, y = state[2:, 1:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        roll = np.abs(spin) * diameter / 2 / np.hypot(vx, vz)
+    return Track(
+        travel=right * along[0] + up * along[1],
+        # out of the bed, whichever way is along it
+        rise=np.sign(along[0]) * (up * along[0] - right * along[1]),
+        aside=np.abs(across(y - state[5, :1], grains.diameter * grains.width)) / diameter,
+        roll=roll,
+    )
 
 
-def _reconcile(directory: Path, samples: pd.DataFrame, track: Track, marker: float) -> None:
-    """Lying, fallen and gone make N at each sample, by the deck's own count and by the places."""
-    lying, fallen = counting.deck_counts(track.travel, marker, track.aside)
-    agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
-    if not agree.all():
-        raise SolverError(
-            f"the counts do not reconcile at sample {int(agree.argmin()) + 1}",
-            where=str(directory / SAMPLES),
-            remedy="grains were lost, or the tables are of different runs",
-        )
+def _present(
+    listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
+) -> BoolArray:
+    """Which grains were there at each sample: listed ones, or seen later in the load step."""
+    steps, rows = read_dump(directory / BED, BED_COLUMNS)
+    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
+    if not np.array_equal(steps, ends):
+        _other(directory / BED, "its frames are not the ends of the load steps")
+    rows = rows[rows["id"].isin(ids)]
+    left = np.zeros((len(ends), len(ids)), bool)
+    left[np.searchsorted(ends, rows["step"]), np.searchsorted(ids, rows["id"])] = True
+    present = np.empty_like(listed)
+    groups = samples.reset_index(drop=True).groupby("load_step")
+    for at_the_end, (_, group) in zip(left, groups, strict=True):
+        own = group.index
+        present[own] = np.logical_or.accumulate(listed[own][::-1])[::-1] | at_the_end
+    return present
+
+
+def _other(path: Path, what: str) -> None:
+    raise SolverError(what, where=str(path), remedy="run the case again")
+
+
+def last_places(directory: Path) -> pd.DataFrame:
+    """X and z (m) of the mobile grains that are there at the end of a run, by their ids."""
+    steps, rows = read_dump(directory / BED, BED_COLUMNS)
+    last: pd.DataFrame = rows[rows["step"] == steps[-1]].set_index("id")[["x", "z"]]
+    return last
+
+
+def check_rest(
+    directory: Path, grains: GrainTable, weight: float, stiffness: float, *, all_rest: bool
+) -> None:
+    """See that a bed of grains came to rest before the flow rose, judged by their energy.
+
+    Parameters
+    ----------
+    directory : Path
+        The case.
+    grains : GrainTable
+        As the deck was given them.
+    weight : float
+        Submerged weight W of a grain, N.
+    stiffness : float
+        K d/W.
+    all_rest : bool
+        Whether every grain must come to rest: those of a pile must, cells are each a bed of their
+        own and may be one whose grain falls out.
+
+    Raises
+    ------
+    Exploded
+        If the energy is no number, grows, or has driven grains away.
+    Noisy
+        If the grains keep moving.
+    SolverError
+        If the table cannot be read.
+    """
+    settling, where = read_table(directory / SETTLING, rows=4), str(directory / SETTLING)
+    energy = settling["ke"].to_numpy(float) / grains.mobile_count / (weight * grains.diameter)
+    if not energy.max() < BURST:
+        what = f"the bed burst as it settled: {energy.max():.2g} W d of kinetic energy per grain"
+        raise Exploded(what, where=where, remedy=REMEDY)
+    if not all_rest:
+        return
+    lost = grains.mobile_count - int(settling["grains"].iloc[-1])
+    if lost:
+        what = f"{lost} of {grains.mobile_count} grains were lost before the flow rose"
+        raise Exploded(what, where=where, remedy=REMEDY)
+    quarters = np.array_split(energy * stiffness, 4)
+    before, last = float(quarters[1].mean()), float(quarters[3].mean())
+    if last < NOISE or last < DECAY * before:
+        return
+    text = f"{last:.2g} W^2/K of kinetic energy per grain after settling"
+    if last > before / DECAY:
+        what = f"the energy of the bed at rest grows: {text}, {last / before:.1f} times the earlier"
+        raise Exploded(what, where=where, remedy=REMEDY)
+    what = f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
+    raise Noisy(what, where=where, remedy=REMEDY)

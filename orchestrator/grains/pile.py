@@ -1,27 +1,645 @@
-"""A pile of grains and its answer: the bed under its flow, with the scene's threshold method."""
+"""A pile of grains and its answer: threshold methods, their runs, and the bed that changes.
+
+Without `protocol.update` the flow of the whole pile acts until the last grain has gone, as in the
+paper. With it the grains leave in rounds. After each, the bed line sinks by as much as the upper
+sides of the grains have, and the flow is solved over it; what is left goes on under its forces.
+"""
 
 from collections.abc import Container, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import ceil
 from pathlib import Path
+from typing import Any, ClassVar
 
-from orchestrator.grains.loaded_bed import Face, LoadedBed
-from orchestrator.grains.method import METHODS, Dem, Method
+import numpy as np
+import pandas as pd
+
+from orchestrator.bed.line import BedLine
+from orchestrator.bed.packing import Packing
+from orchestrator.bed.poured import PouredBed
+from orchestrator.errors import InputError
+from orchestrator.flow.case import WALL_STRESS, FlowCase
+from orchestrator.flow.model import FlowModel
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains import deck, motion
+from orchestrator.grains.cells import GrainCase
+from orchestrator.grains.deck import GrainTable
+from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile_case import PileCase
 from orchestrator.grains.threshold import PileThreshold, of_pile
-from orchestrator.grains.wear import Flow, WornFlow
 from orchestrator.runs.case import Case
+from orchestrator.solvers import liggghts
+from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
+from orchestrator.types import BoolArray, FloatArray, IntArray
+
+MARGIN = 3.0
+"""From the outermost grains to the walls of the box, and from a face to the height at which a
+grain in flight is gone, diameters."""
+EARLY = 0.01
+"""Part of the grains of a poured bed that may go before the first load step: a few of many hundred
+hardly lie, and load steps from their flow on would take most of the time."""
+IN_SPACE = 5.0
+"""Cost of a grain in space over that of one in a plane: of contacts, and of fixed grains around."""
+GRAINS = "grains.csv"
+"""The grains when a bed line was drawn, in the case of the flow over it; at the end of a run of
+LIGGGHTS, in its case."""
+EDGE = 2.0
+"""Length over which the edge of a bared part is rounded, d."""
+SPACING = 0.25
+"""Spacing of the places at which the height of the grains is taken, d."""
+NEAREST = 0.25
+"""Least distance along x of a new corner from those of the bed line, d: corners that nearly
+coincide make cells that are far too short."""
+LEVEL = 1e-6
+"""A bed that is less above the flat bed lies on it, d."""
+FAR = 1e9
 
 
 @dataclass(frozen=True)
-class Pile(LoadedBed):
-    """The pile of a scene."""
+class Worn:
+    """The n grains of a pile that wears, at one time.
+
+    Attributes
+    ----------
+    places : ndarray, shape (n, 2)
+        x and z of the centres, d; NaN for a grain that has gone.
+    left : ndarray, shape (n,)
+        Undisturbed friction velocity at which a counted grain has moved, m/s; else infinite.
+    speed : ndarray, shape (n,)
+        Signed local friction velocity over the undisturbed one, at that time; else the last known.
+    """
+
+    places: FloatArray
+    left: FloatArray
+    speed: FloatArray
+
+    @classmethod
+    def whole(cls, packing: Packing) -> "Worn":
+        """The grains as they were packed."""
+        count = len(packing.centres)
+        return cls(packing.centres, np.full(count, np.inf), np.zeros(count))
+
+    @property
+    def present(self) -> BoolArray:
+        """Which grains have not gone, shape (n,)."""
+        return ~np.isnan(self.places[:, 0])
+
+    @property
+    def moved(self) -> int:
+        """How many counted grains have moved."""
+        return int(np.isfinite(self.left).sum())
+
+    def without(self, chosen: BoolArray) -> FloatArray:
+        """The places, shape (n, 2), when some more grains have gone."""
+        return np.where(chosen[:, None], np.nan, self.places)
+
+    def to_csv(self, directory: Path) -> None:
+        """Write ``grains.csv``."""
+        table = pd.DataFrame(self.places, columns=["x_d", "z_d"])
+        table = table.assign(moved_at_m_s=self.left, ustar_over_ustar0=self.speed)
+        table.index = pd.RangeIndex(1, len(table) + 1, name="id")
+        table.to_csv(directory / GRAINS)
+
+    @classmethod
+    def from_csv(cls, directory: Path) -> "Worn":
+        """Read what `to_csv` wrote."""
+        values = pd.read_csv(directory / GRAINS, index_col="id").to_numpy(float)
+        return cls(values[:, :2], values[:, 2], values[:, 3])
+
+
+@dataclass(frozen=True)
+class WornFlow(Case):
+    """The flow over the bed of a pile that has worn for some rounds.
+
+    Attributes
+    ----------
+    scene : Scene
+        Scene of the pile.
+    before : FlowCase or WornFlow
+        The flow of the round before.
+    run : Case or None
+        The run of LIGGGHTS of that round; None: its grains leave by peeling.
+    """
+
+    scene: Scene
+    before: "FlowCase | WornFlow"
+    run: Case | None
+    kind: ClassVar[str] = "worn"
+    template: ClassVar[str] = FlowCase.template
+    recipe: ClassVar[int] = FlowCase.recipe
+    results: ClassVar[tuple[str, ...]] = FlowCase.results
+    derived: ClassVar[tuple[str, ...]] = FlowCase.derived
+    bulky: ClassVar[tuple[str, ...]] = FlowCase.bulky
+    made: ClassVar[tuple[str, ...]] = FlowCase.made
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """The bed of the pile."""
+        return Geometry(self.scene)
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        """The flow and the run of the round before, and the run that poured the bed."""
+        runs = () if self.run is None else (self.run,)
+        return (self.before, *runs, *self.geometry.pouring)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The scene, but for what only the reading of the results depends on."""
+        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+
+    @property
+    def cost_s(self) -> float:
+        """Expected time of one core, s: that of the whole pile."""
+        return self.geometry.flow.cost_s
+
+    def versions(self) -> dict[str, str]:
+        """The programs that mesh and solve."""
+        return self.geometry.flow.versions()
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Draw the bed line through the grains that are there, and mesh it."""
+        if self.run is None:
+            worn = peeled(Geometry(self.scene, cases), self.before, cases)
+        else:
+            worn = Worn.from_csv(cases / self.run.name)
+        worn.to_csv(directory)
+        self._over(worn, cases).write(directory, cases)
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write the stress and the diagnostics, as any flow's."""
+        self._over(Worn.from_csv(directory), directory.parent).collect(directory)
+
+    def _over(self, worn: Worn, cases: Path) -> FlowCase:
+        """The flow over what is left of the bed."""
+        line = sunk(Geometry(self.scene, cases), worn).scaled(self.scene.grain.diameter)
+        return replace(self.geometry.flow, line=line)
+
+
+Flow = FlowCase | WornFlow
+
+
+def rounds(scene: Scene) -> int:
+    """How many flows act on a pile one after another until the last of its fractions has moved."""
+    update = scene.protocol.update
+    return ceil(max(scene.protocol.fractions) / update - 1e-9) if update else 1
+
+
+def goal(geometry: Geometry, flow: Flow | None) -> int:
+    """How many counted grains have moved when the round of a flow ends."""
+    number = 1
+    while isinstance(flow, WornFlow):
+        flow, number = flow.before, number + 1
+    return ceil(number * geometry.scene.protocol.update * geometry.packing.count - 1e-9)
+
+
+def grains(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
+    """The grains as they were when the round of a flow began."""
+    if isinstance(flow, WornFlow):
+        return Worn.from_csv(cases / flow.name)
+    return Worn.whole(geometry.packing)
+
+
+def line(geometry: Geometry, flow: Flow, cases: Path) -> BedLine:
+    """The bed line of the round of a flow, d."""
+    if isinstance(flow, WornFlow):
+        return sunk(geometry, grains(geometry, flow, cases))
+    return geometry.line
+
+
+def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
+    """The grains in the round of a flow."""
+    stress = WallStress.from_csv(cases / flow.name / WALL_STRESS)
+    worn = line(geometry, flow, cases) if isinstance(flow, WornFlow) else None
+    return geometry.loads(stress, worn)
+
+
+def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
+    """The grains at the end of a round in which they leave by peeling."""
+    worn, loads = grains(geometry, flow, cases), _loads(geometry, flow, cases)
+    windward = geometry.packing.windward
+    reached = worn.left[np.isfinite(worn.left)].max(initial=0.0)
+    flows = np.full(len(windward), np.inf)
+    flows[windward] = np.maximum(loads.leaving(worn.present), reached)
+    flows[~worn.present] = np.inf
+    least = goal(geometry, flow) - worn.moved
+    # those that one grain frees at its flow leave with it
+    last = np.sort(flows)[least - 1] if least > 0 else 0.0
+    leave = np.isfinite(flows) & (flows <= last)
+    speed = np.where(worn.present, loads.ratio, worn.speed)
+    return Worn(worn.without(leave), np.where(leave, flows, worn.left), speed)
+
+
+def sunk(geometry: Geometry, worn: Worn) -> BedLine:
+    """The bed line over worn grains, d: as much lower as their upper sides are.
+
+    The difference is averaged over `EDGE`, so that the lattice does not show in it. Corners, one
+    per diameter, are added where it changes.
+    """
+    line, packed, present = geometry.line, geometry.packing, worn.present
+    x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE, SPACING)
+    before = _tops(packed.centres, packed.sizes / 2, x)
+    depth = before - _tops(worn.places[present], packed.sizes[present] / 2, x)
+    window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
+    depth = np.convolve(depth, window, mode="same")
+    step = round(EDGE / 2 / SPACING)
+    changes = np.convolve(np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same") > 0
+    places = x[changes & (np.arange(len(x)) % step == 0)]
+    apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST
+    finer = line.with_corners(places[apart & (places > line.x[0]) & (places < line.x[-1])].tolist())
+    whole, ground = np.array(finer.z), min(line.z[0], line.z[-1])
+    z = whole - np.interp(finer.x, x, depth, left=0.0, right=0.0)
+    # a form wears down to the flat bed around it, unless counted grains lie as low as that
+    low = np.maximum(line.z[1:], line.z[:-1]) <= ground + LEVEL
+    if not (low & line.counted(geometry.counts)).any():
+        z = np.maximum(z, np.minimum(whole, ground))
+    inside = (np.array(finer.x) > line.x[1]) & (np.array(finer.x) < line.x[-2])
+    return replace(finer, z=tuple(np.where(inside, z, whole).tolist()))
+
+
+def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
+    """Height of the grains' upper sides at some places, d; far below where there are none."""
+    tops = np.full(len(x), -FAR)
+    for (xc, zc), radius in zip(centres.tolist(), radii.tolist(), strict=True):
+        # as wide as half the way to the next: the gaps of a row do not count
+        first, last = np.searchsorted(x, [xc - 2 * radius, xc + 2 * radius])
+        tops[first:last] = np.maximum(tops[first:last], zc + radius)
+    return tops
+
+
+@dataclass(frozen=True)
+class PileCase(GrainCase):
+    """The run of LIGGGHTS of the grains of one pile, or of those that are there in a round.
+
+    Attributes
+    ----------
+    scene : Scene
+        Scene of the pile.
+    flow : WornFlow or None
+        The flow of the round; None: that of the whole pile.
+    before : PileCase or None
+        The run that this one goes on from.
+    """
+
+    scene: Scene
+    flow: WornFlow | None = None
+    before: "PileCase | None" = None
+    kind: ClassVar[str] = "pile"
+    recipe: ClassVar[int] = 11
+    derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """Its bed, whose grains are not known before they are poured."""
+        return Geometry(self.scene)
+
+    @property
+    def needs(self) -> tuple[Case, ...]:
+        """The runs of its flow model, the one that it goes on from, and the one that pours."""
+        flows = self.geometry.model.cases if self.flow is None else (self.flow,)
+        return (*flows, *((self.before,) if self.before else ()), *self.geometry.pouring)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The scene, but for what only the reading of the results depends on."""
+        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+
+    @property
+    def cost_s(self) -> float:
+        """Expected time of one core, s."""
+        rules, grain, width = self.scene.protocol, self.scene.grain, self.geometry.bed.width
+        load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
+        if self.geometry.pouring:
+            size = self._size * (IN_SPACE if width else 1)
+            exposed = self._length * (width or 1)
+            return deck.poured_cost_s(load_steps, size, exposed, rules, grain)
+        return deck.cost_s(load_steps, self._size, rules, grain)
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with."""
+        return liggghts.ranks(self._size)
+
+    @property
+    def _size(self) -> int:
+        """About how many grains the deck has, from the lengths of the bed alone."""
+        bed = self.geometry.bed
+        # the whole pile is half its rows thick on average
+        most = bed.poured_depth if self.geometry.pouring else self.geometry.line.h / 2
+        return int(self._length * (min(bed.mobile_layers, most) + 3) * (bed.width or 1))
+
+    @property
+    def _length(self) -> float:
+        """Length of the bed whose grains may move, d."""
+        line = self.geometry.line
+        return line.crest_s if self.geometry.bed.is_wedge else float(line.x[-2] - line.x[1])
+
+    def write(self, directory: Path, cases: Path) -> None:
+        """Write the grains with their forces, and the load steps of the protocol."""
+        loads, worn, rules = *self._state(cases), self.scene.protocol
+        geometry, d = loads.geometry, self.scene.grain.diameter
+        if self.before is None:
+            rising = flows(loads)
+        else:
+            reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
+            rising = flows_from(reached, loads, worn.present)
+        packed = geometry.packing
+        enough = int((1 - rules.final_fraction) * packed.count + 1e-9)
+        if rules.update:
+            enough = packed.count - goal(geometry, self.flow)
+        grains, (slope, ridge) = table(loads, worn), geometry.line.roof(MARGIN + 0.5)
+        raising = deck.raising(
+            rules, enough, smallest=grains.smallest, is_poured=self.scene.is_poured
+        )
+        numbers = {
+            "diameter": d,
+            "smallest": grains.smallest,
+            "density": self.scene.grain.density,
+            "gravity": self.scene.reduced_gravity,
+            **deck.Contact.of(self.scene.grain, rules).variables,
+            **raising,
+            "slope": slope,
+            "ceiling_x": ridge[0] * d,
+            "ceiling_z": ridge[1] * d,
+            "behind": grains.last_mobile + deck.AWAY * d,
+        }
+        force = loads.loading.in_steps(rising.tolist())
+        deck.write(directory, grains, numbers, rising, force, margin=MARGIN * d, ranks=self.ranks)
+
+    def collect(self, directory: Path) -> None:
+        """Check the run and write what each counted grain did to ``motion.csv``."""
+        liggghts.check_log(directory)
+        scene, (loads, worn) = self.scene, self._state(directory.parent)
+        grains = table(loads, worn)
+        motion.check_rest(directory, grains, scene.weight, scene.grain.stiffness, all_rest=True)
+        criterion = scene.protocol.displacement_criterion
+        moved = motion.read(directory, grains, criterion, falls_out=False)
+        moved.to_csv(directory, grains)
+        if not scene.protocol.update:
+            return
+        # the grains when the run has ended; those that have moved are taken off the bed
+        left = worn.left.copy()
+        left[grains.counted_ids - 1] = np.where(moved.level > 0, moved.flow[moved.level], np.inf)
+        last = motion.last_places(directory) / scene.grain.diameter
+        places = np.where((grains.kind == deck.FIXED)[:, None], worn.places, np.nan)
+        places[last.index - 1] = last
+        places[np.isfinite(left)] = np.nan
+        speed = np.where(worn.present, loads.ratio, worn.speed)
+        Worn(places, left, speed).to_csv(directory)
+
+    def _state(self, cases: Path) -> tuple[Loads, Worn]:
+        """The grains under the flow when the run begins."""
+        geometry = Geometry(self.scene, cases)
+        if self.flow is None:
+            return geometry.loads(geometry.model.stress(cases)), Worn.whole(geometry.packing)
+        return _loads(geometry, self.flow, cases), grains(geometry, self.flow, cases)
+
+
+def flows(loads: Loads) -> FloatArray:
+    """The flow of the settling, then of each load step: from before the first grain goes.
+
+    Raises
+    ------
+    InputError
+        If no counted grain is held by its contacts and can leave them.
+    """
+    geometry, rules = loads.geometry, loads.geometry.scene.protocol
+    pivots = np.sort(loads.alone())
+    if geometry.packing.width:
+        # no peeling in space says which grain frees which
+        thresholds = pivots[(pivots > 0) & np.isfinite(pivots)]
+        first = _first(thresholds, geometry)
+        place = min(int(rules.final_fraction * len(pivots)), len(thresholds) - 1)
+    else:
+        thresholds = np.sort(loads.leaving())
+        first = _first(thresholds, geometry)
+        if not 0 < first < np.inf or geometry.scene.forces.loaded_grains != "exposed":
+            # a bed that rolls by itself, or is blocked until its grains push: DEM decides
+            thresholds, first = pivots, _first(pivots, geometry)
+        elif not geometry.bed.is_wedge:
+            # on a bed without a free end no grain can be peeled first
+            first = min(first, _first(pivots, geometry))
+        place = int(np.ceil(rules.final_fraction * geometry.packing.count)) - 1
+    if not 0 < first < np.inf:
+        raise InputError(
+            "no exposed grain lies in a pocket that lets it go",
+            where=f"scene {geometry.scene.id}: bed",
+            remedy="a longer or wider bed, or another bed.seed",
+        )
+    last = thresholds[place]
+    if not np.isfinite(last):
+        last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
+    return deck.flows(deck.START * first, deck.BEYOND * last, rules.load_increment)
+
+
+def _first(thresholds: FloatArray, geometry: Geometry) -> float:
+    """The first of sorted flows; of a poured bed that of the first grain but a few."""
+    held = thresholds[thresholds > 0]
+    if geometry.pouring and len(held):
+        return float(held[int(EARLY * len(held))])
+    return float(thresholds[0]) if len(thresholds) else 0.0
+
+
+def flows_from(reached: float, loads: Loads, present: BoolArray) -> FloatArray:
+    """The flows where a run goes on from that which the one before has reached."""
+    step = loads.geometry.scene.protocol.load_increment
+    thresholds = loads.leaving(present)
+    last = thresholds[np.isfinite(thresholds)].max(initial=reached)
+    return deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
+
+
+def table(loads: Loads, worn: Worn) -> GrainTable:
+    """The grains of the deck."""
+    geometry, packed = loads.geometry, loads.geometry.packing
+    grain = geometry.scene.grain
+    kind = np.select(
+        [~worn.present, ~packed.mobile, packed.windward, packed.lee],
+        [deck.GONE, deck.FIXED, deck.COUNTED, deck.PUSHED],
+        deck.MOBILE,
+    )
+    d, (x, z) = grain.diameter, worn.places.T
+    return GrainTable(
+        position=np.column_stack([x * d, packed.places.xyz[:, 1] * d, z * d]),
+        kind=kind,
+        along=loads.along,
+        sizes=packed.sizes,
+        diameter=d,
+        density=grain.density,
+        width=packed.width,
+    )
+
+
+@dataclass(frozen=True)
+class Face:
+    """The counted grains of a pile, N of them, along the bed.
+
+    Attributes
+    ----------
+    ids : ndarray of int, shape (N,)
+        Ids in the deck.
+    arc_length : ndarray, shape (N,)
+        Position along the bed line from the windward toe, m.
+    speed : ndarray, shape (N,)
+        Local friction velocity over the undisturbed one, signed.
+    x : ndarray, shape (N,)
+        Place downstream of the foot of the first form, m.
+    """
+
+    ids: IntArray
+    arc_length: FloatArray
+    speed: FloatArray
+    x: FloatArray
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to find out when the counted grains of a bed move; a subclass for each method."""
+
+    geometry: Geometry
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The runs that it needs besides those of the flow over the whole pile."""
+        return ()
+
+    def motion(self, cases: Path) -> Motion:
+        """Motion of the counted grains; `cases` is the directory of the finished runs."""
+        raise NotImplementedError
+
+    def loads(self, cases: Path) -> Loads:
+        """The grains under the flow of the whole pile."""
+        return self.geometry.loads(self.geometry.model.stress(cases))
+
+    def last(self, cases: Path) -> Worn:
+        """The grains of a bed that changes, when the last round has ended."""
+        raise NotImplementedError
+
+
+class Pivot(Method):
+    """The closed form: each grain by itself under its own stress. All roll."""
+
+    def motion(self, cases: Path) -> Motion:
+        """Motion at the flows of Eq. 3 or 5."""
+        return Motion.of_flows(self.loads(cases).alone())
+
+
+class Peeling(Method):
+    """Pivots that free one another, without dynamics. All roll."""
+
+    @property
+    def cases(self) -> tuple[WornFlow, ...]:
+        """The flows over a bed that changes."""
+        runs: tuple[WornFlow, ...] = ()
+        for _ in range(1, rounds(self.geometry.scene)):
+            before = runs[-1] if runs else self.geometry.flow
+            runs += (WornFlow(self.geometry.scene, before, None),)
+        return runs
+
+    def motion(self, cases: Path) -> Motion:
+        """Motion at the flows that `orchestrator.grains.peeling` finds."""
+        if self.geometry.scene.protocol.update:
+            return Motion.of_flows(self.last(cases).left[self.geometry.packing.windward])
+        return Motion.of_flows(self.loads(cases).leaving())
+
+    def last(self, cases: Path) -> Worn:
+        """The grains of a bed that changes, when the last round has ended."""
+        flow = self.cases[-1] if self.cases else self.geometry.flow
+        return peeled(self.geometry, flow, cases)
+
+
+class Dem(Method):
+    """A run of LIGGGHTS under a flow that is raised in steps."""
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The run; on a bed that changes a run for each flow, which goes on from the last one."""
+        return tuple(case for run in self.runs for case in (run.flow, run) if case is not None)
+
+    @cached_property
+    def runs(self) -> tuple[PileCase, ...]:
+        """The runs of LIGGGHTS."""
+        scene, run = self.geometry.scene, PileCase(self.geometry.scene)
+        runs = [run]
+        for _ in range(1, rounds(scene)):
+            flow = WornFlow(scene, run.flow or self.geometry.flow, run)
+            runs.append(run := PileCase(scene, flow, run))
+        return tuple(runs)
+
+    def motion(self, cases: Path) -> Motion:
+        """The motion that the finished runs left."""
+        motions = [Motion.from_csv(cases / run.name) for run in self.runs]
+        if len(motions) == 1:
+            return motions[0]
+        windward, whole = self.geometry.packing.windward, self.geometry.flow
+        begun = (grains(self.geometry, run.flow or whole, cases) for run in self.runs)
+        present = (worn.present[windward] for worn in begun)
+        return Motion.chained(list(zip(present, motions, strict=True)))
+
+    def last(self, cases: Path) -> Worn:
+        """The grains of a bed that changes, when the last round has ended."""
+        return Worn.from_csv(cases / self.runs[-1].name)
+
+
+METHODS: dict[str, type[Method]] = {"pivot": Pivot, "peeling": Peeling, "dem": Dem}
+"""The methods by what a study file calls them, cheap to dear."""
+
+
+@dataclass(frozen=True)
+class Pile:
+    """The pile of a scene: its bed, the flow over it, and its threshold method.
+
+    Attributes
+    ----------
+    scene : Scene
+        A scene with a pile.
+    cases : Path or None
+        Directory of the finished runs; only the grains of a poured bed are read from there.
+    """
+
+    scene: Scene
+    cases: Path | None = field(default=None, compare=False)
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """Its bed, in grains."""
+        return Geometry(self.scene, self.cases)
+
+    @property
+    def bed(self) -> PileBed:
+        """The scene's bed."""
+        return self.geometry.bed
+
+    @property
+    def line(self) -> BedLine:
+        """The bed line, diameters."""
+        return self.geometry.line
+
+    @property
+    def packing(self) -> Packing:
+        """The grains' places, diameters."""
+        return self.geometry.packing
+
+    @property
+    def pouring(self) -> tuple[PouredBed, ...]:
+        """The run that pours the bed, if one does."""
+        return self.geometry.pouring
+
+    @property
+    def model(self) -> FlowModel:
+        """The flow over the bed."""
+        return self.geometry.model
+
+    @property
+    def flow(self) -> FlowCase:
+        """The run of the flow, of a scene whose flow is solved."""
+        return self.geometry.flow
 
     @cached_property
     def method(self) -> Method:
         """How its threshold is found."""
-        return METHODS[self.scene.protocol.method](self)
+        return METHODS[self.scene.protocol.method](self.geometry)
 
     @cached_property
     def runs(self) -> tuple[Case, ...]:
@@ -49,18 +667,40 @@ class Pile(LoadedBed):
         worn = (run for run in self.method.cases if isinstance(run, WornFlow))
         return (*self.model.cases, *worn)
 
+    def stress(self, cases: Path) -> WallStress:
+        """The stress along the whole bed; `cases` is the directory of the finished runs."""
+        return self.model.stress(cases)
+
+    def loads(self, cases: Path) -> Loads:
+        """Its grains under the flow of the whole pile."""
+        return self.method.loads(cases)
+
     def face(self, cases: Path) -> Face:
-        """The windward grains, each with the stress on it; on a bed that changes, as it moved."""
-        found = super().face(cases)
-        if not self.scene.protocol.update:
-            return found
-        return replace(found, speed=self.method.last(cases).speed[self.packing.windward])
+        """The counted grains, each with the stress on it; on a bed that changes, as it moved."""
+        d, chosen = self.scene.grain.diameter, self.packing.windward
+        changes = bool(self.scene.protocol.update)
+        ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
+        return Face(
+            ids=np.flatnonzero(chosen) + 1,
+            arc_length=self.packing.arc_length[chosen] * d,
+            speed=ratio[chosen],
+            x=self.packing.centres[chosen, 0] * d,
+        )
+
+    def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which counted grains move by themselves, sorted, m/s.
+
+        `speed` is the local friction velocity of each over the undisturbed one, shape (N,).
+        """
+        ratio = np.zeros(len(self.packing.sizes))
+        ratio[self.packing.windward] = speed
+        return np.sort(Loads(self.geometry, ratio).alone())
 
     def motion(self, cases: Path) -> Motion:
-        """Motion of the windward grains; `cases` holds the finished runs."""
+        """Motion of the counted grains; `cases` is the directory of the finished runs."""
         return self.method.motion(cases)
 
     def thresholds(self, cases: Path, fractions: Iterable[float]) -> list[PileThreshold]:
-        """Its thresholds at some n/N; `cases` holds the finished runs."""
+        """Its thresholds at some n/N; `cases` is the directory of the finished runs."""
         motion, speed = self.motion(cases), self.face(cases).speed
-        return [of_pile(motion, speed, one, self.scene.fluid.density) for one in fractions]
+        return [of_pile(motion, speed, n, self.scene.fluid.density) for n in fractions]

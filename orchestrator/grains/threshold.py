@@ -1,6 +1,7 @@
-"""Thresholds from motion: of single grains, and of a pile at a fraction of its grains."""
+"""Thresholds from motion: of single grains, of a pile at a fraction, of a mixture's classes."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.grains.motion import Motion
+from orchestrator.types import BoolArray, FloatArray
 
-FloatArray = NDArray[np.float64]
+STEP = np.sqrt(2)
+"""Ratio of the ends of a class: half a phi; d lies in the middle of one."""
 
 
 @dataclass(frozen=True)
@@ -140,3 +143,30 @@ def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
     """Mean over the grains that have moved; NaN before any has."""
     moved = values[motion.moved_by(level)]
     return float(moved.mean()) if len(moved) else math.nan
+
+
+@dataclass(frozen=True)
+class SizeClass:
+    """The counted grains between two sizes.
+
+    Attributes
+    ----------
+    number : int
+        0 for the class around d.
+    size : float
+        Geometric mean of their diameters, d.
+    chosen : ndarray of bool, shape (N,)
+        Which of the counted grains they are.
+    """
+
+    number: int
+    size: float
+    chosen: BoolArray
+
+
+def classes(sizes: FloatArray) -> Iterator[SizeClass]:
+    """The classes that some counted grains are in, rising; sizes in d, shape (N,)."""
+    number = np.rint(np.log(sizes) / np.log(STEP)).astype(int)
+    for index in np.unique(number).tolist():
+        chosen = number == index
+        yield SizeClass(index, float(np.exp(np.log(sizes[chosen]).mean())), chosen)

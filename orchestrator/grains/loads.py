@@ -1,0 +1,289 @@
+"""The bed of a scene in grains, and the flow's forces on them: what each needs to move."""
+
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.bed import packing, poured
+from orchestrator.bed.line import BedLine, of_bed
+from orchestrator.bed.packing import APRON, Lattice, Packing
+from orchestrator.bed.poured import PouredBed
+from orchestrator.errors import InputError
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.model import FlowModel, model
+from orchestrator.flow.stress import WallStress
+from orchestrator.grains import peeling
+from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
+from orchestrator.study.closed_form import closed_form, forces, on_slopes
+from orchestrator.study.parts import PileBed, Range
+from orchestrator.study.scene import Scene
+from orchestrator.types import BoolArray, FloatArray
+
+TOE = 0.05
+"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
+KINDS = 20
+"""Kinds of grains in a bed beyond which their tables of forces have fewer places."""
+DIGITS = 9
+"""Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
+
+_packed, _covered, _poured = cache(packing.pile), cache(packing.cover), cache(poured.read)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The bed of a scene of a pile: its line, its n grains, and what holds whatever the flow is.
+
+    Attributes
+    ----------
+    scene : Scene
+        A scene with a pile.
+    cases : Path or None
+        Directory of the finished runs; only the grains of a poured bed are read from there.
+    """
+
+    scene: Scene
+    cases: Path | None = field(default=None, compare=False)
+
+    @property
+    def bed(self) -> PileBed:
+        """The scene's bed."""
+        assert isinstance(self.scene.bed, PileBed)
+        return self.scene.bed
+
+    @cached_property
+    def model(self) -> FlowModel:
+        """The flow over it."""
+        return model(self.scene)
+
+    @property
+    def flow(self) -> FlowCase:
+        """The run of the flow, of a scene whose flow is solved."""
+        (case,) = self.model.cases
+        return case
+
+    @cached_property
+    def line(self) -> BedLine:
+        """The bed line, diameters."""
+        return self.model.line.scaled(1 / self.scene.grain.diameter)
+
+    @property
+    def counts(self) -> str | Range:
+        """Which exposed grains are counted; a range of x in diameters."""
+        counts, d = self.bed.counts, self.scene.grain.diameter
+        return counts if isinstance(counts, str) else (counts[0] / d, counts[1] / d)
+
+    @property
+    def surface(self) -> float:
+        """Height over the bed line of the centre of an exposed grain, d."""
+        return 0.5 + self.bed.roughness / self.scene.grain.diameter
+
+    @cached_property
+    def pouring(self) -> tuple[PouredBed, ...]:
+        """The run that pours the bed, if one does."""
+        if not self.scene.is_poured:
+            return ()
+        line, grain = self.line, self.scene.grain
+        # the bed does not depend on how far the flow's domain goes on before and behind it
+        ends = (max(line.x[0], line.x[1] - APRON), min(line.x[-1], line.x[-2] + APRON))
+        x = tuple(round(v, DIGITS) for v in (ends[0], *line.x[1:-1], ends[1]))
+        z = tuple(round(v, DIGITS) for v in line.z)
+        bed = PouredBed(
+            line=replace(line, x=x, z=z),
+            depth=self.bed.poured_depth,
+            surface=round(self.surface, DIGITS),
+            sizes=grain.sizes,
+            diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
+            friction_angle_deg=grain.friction_angle_deg,
+            seed=self.bed.seed,
+            width=self.bed.width,
+        )
+        bed.check_size()
+        return (bed,)
+
+    @cached_property
+    def packing(self) -> Packing:
+        """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        bed, d = self.bed, self.scene.grain.diameter
+        for run in self.pouring:
+            assert self.cases is not None, "the grains of a poured bed lie in its run"
+            return _poured(
+                self.cases / run.name,
+                self.line,
+                self.counts,
+                surface=self.surface,
+                mobile_layers=bed.mobile_layers,
+                width=bed.width,
+            )
+        lattice = Lattice(
+            bed.entrainment_angle_deg,
+            gap=bed.roughness / d,
+            pattern=bed.packing,
+            mobile_layers=bed.mobile_layers,
+            disorder=bed.disorder if bed.packing == "disordered" else 0.0,
+            seed=bed.seed,
+        )
+        ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
+        if not bed.is_wedge:
+            return _covered(self.line, ground, self.counts, lattice)
+        packed = _packed(ground, lattice)
+        # an obstacle before it makes the way along the bed longer
+        return replace(packed, arc_length=self.line.nearest(packed.centres)[1])
+
+    @cached_property
+    def tangents(self) -> FloatArray:
+        """Unit vector downstream along the bed line under each grain, shape (n, 2)."""
+        return np.asarray(self.line.tangents[self.line.under(self.packing.centres)])
+
+    @cached_property
+    def gaps(self) -> FloatArray:
+        """Height of each grain's lowest point over the level where the flow begins, m, shape (n,).
+
+        By `forces.exposure` it is z0, or follows from the grain's own height over the local bed.
+        """
+        z0 = np.full(len(self.packing.sizes), self.bed.roughness)
+        if self.scene.forces.exposure == "alike":
+            return z0
+        return z0 + poured.standing(self.packing, self.line) * self.scene.grain.diameter
+
+    @cached_property
+    def force_tables(self) -> list[ForceTable]:
+        """Force table of each of the n grains, over its own weight.
+
+        Grains that the flow does not push share one table, that of diameter d; it is never used.
+        """
+        unit, weight = float(closed_form(self.scene).friction_velocity), self.scene.weight
+        pushed = self.packing.pushed
+        sizes = np.where(pushed, self.packing.sizes, 1.0).tolist()
+        kinds = list(zip(sizes, np.where(pushed, self.gaps, self.gaps[0]).tolist(), strict=True))
+        places = PLACES if len(set(kinds)) <= KINDS else FEWER
+        tables = {
+            (size, gap): ForceTable(
+                *forces(self.scene, size, gap), weight * size**3, unit, places=places
+            )
+            for size, gap in set(kinds)
+        }
+        return [tables[kind] for kind in kinds]
+
+    @cached_property
+    def pivot_angles_deg(self) -> FloatArray:
+        """Angle from the bed's normal over which each counted grain has to roll, shape (N,).
+
+        In a plane that of its foremost contact, in space that of the saddle between two.
+        """
+        packed = self.packing
+        angles = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
+        return np.asarray(angles[packed.windward])
+
+    def loads(self, stress: WallStress, line: BedLine | None = None) -> "Loads":
+        """The grains under the stress along the bed line, or along the line it has worn down to."""
+        how, d = self.scene.forces, self.scene.grain.diameter
+        length = max(d, how.averaging_length * self.bed.relief)
+        s = self.packing.arc_length
+        if line is not None:
+            x = np.interp(s, self.line.arc_lengths, self.line.x)
+            s = np.interp(x, line.x, line.arc_lengths)
+        tau = stress.mean_over(s * d, length, how.stress)
+        return Loads(self, np.where(self._unloaded, 0, np.sign(tau) * np.sqrt(np.abs(tau))))
+
+    @property
+    def _unloaded(self) -> BoolArray:
+        """Grains that go without the flow's force though they are exposed."""
+        windward, s = self.packing.windward, self.packing.arc_length
+        if self.scene.forces.loaded_grains == "all but crest":
+            return np.asarray(windward & (s == s[windward].max()))
+        if self.scene.forces.loaded_grains == "all but toe":
+            return np.asarray(windward & (s < TOE * self.line.crest_s))
+        return np.zeros_like(windward)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """The n grains of a bed under a flow, and the flows at which they move by their geometry.
+
+    Attributes
+    ----------
+    geometry : Geometry
+        The bed.
+    ratio : ndarray, shape (n,)
+        Friction velocity that drives each grain over the undisturbed one: of the mean stress
+        around it, positive downstream.
+    """
+
+    geometry: Geometry
+    ratio: FloatArray
+
+    @property
+    def speed(self) -> FloatArray:
+        """The ratio of the counted grains, shape (N,)."""
+        return np.asarray(self.ratio[self.geometry.packing.windward])
+
+    @cached_property
+    def loading(self) -> Loading:
+        """The forces on the grains: exposed ones that may move carry one."""
+        of, packed = self.geometry, self.geometry.packing
+        drag, lift = forces(of.scene, packed.sizes, of.gaps)
+        normals = np.column_stack([-of.tangents[:, 1], of.tangents[:, 0]])
+        return Loading(drag, lift, np.where(packed.pushed, self.ratio, 0.0), of.tangents, normals)
+
+    @property
+    def along(self) -> FloatArray:
+        """Unit vector along the bed, the way that the flow pushes each grain, shape (n, 2)."""
+        return np.where(self.ratio < 0, -1.0, 1.0)[:, None] * self.geometry.tangents
+
+    def alone(self) -> FloatArray:
+        """Undisturbed friction velocity at which each counted grain moves by itself, m/s, (N,).
+
+        In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it begins to
+        roll out of its own pocket. Where the flow runs back it pushes the grain upstream. Infinite
+        for grains without flow.
+
+        Raises
+        ------
+        InputError
+            If no grain feels a flow.
+        """
+        of, speed = self.geometry, self.speed
+        counted = of.packing.windward
+        if not np.any(speed != 0):
+            raise InputError(
+                "no counted grain feels a flow",
+                where=f"scene {of.scene.id}: flow",
+                remedy="look at the flow case; the mesh or the stress is wrong",
+            )
+        if of.pouring:
+            places, sizes = of.packing.places, of.packing.sizes
+            loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
+            return np.asarray(peeling.pivots(places, sizes, loading, of.force_tables)[counted])
+        slopes = np.degrees(np.arctan2(of.tangents[counted, 1], of.tangents[counted, 0]))
+        threshold = on_slopes(of.scene, np.where(speed < 0, -slopes, slopes))
+        return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
+
+    def leaving(self, present: BoolArray | None = None) -> FloatArray:
+        """Undisturbed friction velocity at which each counted grain leaves by peeling, m/s, (N,).
+
+        Parameters
+        ----------
+        present : ndarray of bool, shape (n,), optional
+            The grains that have not left yet; by default all.
+        """
+        of, packed = self.geometry, self.geometry.packing
+        criterion = of.scene.protocol.displacement_criterion
+        flows = peeling.flows(
+            packed.places, packed.sizes, self.loading, of.force_tables, criterion, present
+        )
+        return np.asarray(flows[packed.windward])
+
+    def row_hold(self) -> float:
+        """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
+
+        The flow (u*_0) at which the first counted grain leaves by peeling, over that at which the
+        same grain moves by itself. It is 1 where the first grain of a row has none before it, as at
+        a sharp crest, and on a poured bed.
+        """
+        if self.geometry.pouring or self.geometry.bed.is_wedge:
+            return 1.0
+        leaving, alone = self.leaving(), self.alone()
+        first = int(leaving.argmin())
+        return max(float(leaving[first] / alone[first]), 1.0) if alone[first] > 0 else 1.0
