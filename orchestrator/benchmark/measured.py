@@ -11,9 +11,8 @@ import pandas as pd
 from orchestrator.benchmark.exact import parameters
 from orchestrator.benchmark.pack import Problem, expectation, table_of
 from orchestrator.flow.case import SPEED_HEIGHT, FlowCase
-from orchestrator.grains.pile import Pile
-from orchestrator.grains.pile_case import MARGIN
-from orchestrator.grains.protocol import POURED_DRAG
+from orchestrator.grains.deck import POURED_DRAG
+from orchestrator.grains.pile import MARGIN, Pile
 from orchestrator.tables import Tables
 from orchestrator.types import Row
 
@@ -176,7 +175,8 @@ def _grains(bed: Bed) -> pd.DataFrame:
     packing, d = bed.pile.packing, bed.pile.scene.grain.diameter
     pushed = packing.mobile & packing.lee
     exposed = packing.windward | pushed
-    slope = np.degrees(np.arctan2(bed.pile.tangents[:, 1], bed.pile.tangents[:, 0]))
+    tangents = bed.pile.geometry.tangents
+    slope = np.degrees(np.arctan2(tangents[:, 1], tangents[:, 0]))
     x, z = packing.centres.T * d
     kinds = [~packing.mobile, packing.windward, pushed]
     return pd.DataFrame(
@@ -187,14 +187,14 @@ def _grains(bed: Bed) -> pd.DataFrame:
             "d_m": packing.sizes * d,
             "kind": np.select(kinds, ["fixed", "counted", "pushed"], "mobile"),
             "slope_deg": np.where(exposed, slope, np.nan),
-            "ustar_over_ustar0": np.where(exposed, bed.pile.ustar_over_ustar0(bed.cases), np.nan),
+            "ustar_over_ustar0": np.where(exposed, bed.pile.loads(bed.cases).ratio, np.nan),
         }
     )
 
 
 def _forces(bed: Bed) -> pd.DataFrame:
     """The flow's force on each exposed grain in each load step: each grain has its own size."""
-    loading = bed.pile.loading(bed.pile.ustar_over_ustar0(bed.cases))
+    loading = bed.pile.loads(bed.cases).loading
     exposed = np.flatnonzero(loading.ratio)
     flows = bed.curve["ustar0_m_s"].tolist()
     force = loading.in_steps(flows)[:, exposed]

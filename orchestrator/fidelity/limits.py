@@ -15,7 +15,7 @@ from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import model
 from orchestrator.flow.theory import half_length, seen_by_the_flow
-from orchestrator.grains.loaded_bed import LoadedBed
+from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study.parts import PileBed, UnfitError
@@ -173,7 +173,7 @@ def _bed_line(scene: Scene, bed: PileBed) -> Iterator[Fault]:
             what = f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
             yield Fault("slope", "bed", what, remedy)
         elif not bed.is_wedge and bed.packing != "poured":
-            _ = LoadedBed(scene).packing
+            _ = Geometry(scene).packing
     except UnfitError as error:
         yield Fault("slope", "bed", str(error), remedy)
     else:

@@ -369,9 +369,7 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     )
 
 
-def _present(
-    listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame
-) -> BoolArray:
+def _present(listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame) -> BoolArray:
     """Which grains were there at each sample: listed ones, or seen later in the load step."""
     steps, rows = read_dump(directory / BED, BED_COLUMNS)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)

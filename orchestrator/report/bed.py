@@ -13,9 +13,10 @@ import pandas as pd
 from matplotlib import colormaps
 from PIL import Image
 
+from orchestrator.bed.deck import read_dump
 from orchestrator.bed.line import BedLine
-from orchestrator.grains import dump, motion, wear
-from orchestrator.grains.method import Dem
+from orchestrator.grains import motion
+from orchestrator.grains import pile as piles
 from orchestrator.grains.pile import Pile
 from orchestrator.report import flows, labels
 from orchestrator.report.page import caption, fill
@@ -83,11 +84,11 @@ def read(pile: Pile, cases: Path) -> Steps:
     packing, moved = pile.packing, pile.motion(cases)
     (left, right, bottom, _), (x, z) = window(pile), packing.centres.T
     inside = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
-    rolling = packing.mobile if isinstance(pile.method, Dem) else False
+    rolling = packing.mobile if isinstance(pile.method, piles.Dem) else False
     grains = np.flatnonzero(inside | rolling)
     counted = np.zeros(len(x), np.int64)
     counted[packing.windward] = moved.level
-    if isinstance(pile.method, Dem):
+    if isinstance(pile.method, piles.Dem):
         after = [_by_dem(pile, cases / run.name) for run in pile.method.runs]
         every = np.concatenate([packing.centres[None], *after])
         places, stops = every[:, grains], np.arange(len(every))
@@ -98,9 +99,9 @@ def read(pile: Pile, cases: Path) -> Steps:
         places = np.broadcast_to(packing.centres[grains], (len(stops), len(grains), 2))
     lines = [(0, pile.line)]
     for worn in pile.flows[1:]:  # the first grain that moves under its flow
-        left_ = np.isfinite(wear.grains(pile, worn, cases).left).sum()
+        left_ = np.isfinite(piles.grains(pile.geometry, worn, cases).left).sum()
         stop = int(np.searchsorted(moved.moved[stops], left_, side="right"))
-        lines.append((stop, wear.line(pile, worn, cases)))
+        lines.append((stop, piles.line(pile.geometry, worn, cases)))
     level = np.where(counted > 0, np.searchsorted(stops, counted), 0)[grains]
     if len(lines) > 1:
         gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
@@ -113,7 +114,7 @@ def _by_dem(pile: Pile, directory: Path) -> FloatArray:
     packing = pile.packing
     samples = pd.read_csv(directory / motion.SAMPLES)
     ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
-    rows = dump.read_dump(directory / dump.BED, dump.BED_COLUMNS).rows
+    _, rows = read_dump(directory / motion.BED, motion.BED_COLUMNS)
     places = np.full((len(ends), len(packing.centres), 2), np.nan)
     places[:] = np.where(packing.mobile[:, None], np.nan, packing.centres)
     d = pile.scene.grain.diameter

@@ -11,10 +11,9 @@ import numpy as np
 from orchestrator.fidelity import calibration, decision, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
-from orchestrator.grains import classes, threshold
-from orchestrator.grains.loaded_bed import Face
+from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
-from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile import Face, Pile
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
@@ -40,7 +39,8 @@ class Answer:
     @classmethod
     def read(cls, decision: Decision, pile: Pile, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
-        return cls(decision, pile, pile.motion(cases), pile.face(cases), pile.row_hold(cases))
+        hold = pile.loads(cases).row_hold()
+        return cls(decision, pile, pile.motion(cases), pile.face(cases), hold)
 
     @property
     def scene_id(self) -> str:
@@ -66,7 +66,7 @@ def grains(answer: Answer) -> Columns:
     if pile.pouring:
         packing, counted = pile.packing, pile.packing.windward
         columns["size_over_d"] = packing.sizes[counted]
-        columns["pivot_deg"] = pile.pivot_angles_deg
+        columns["pivot_deg"] = pile.geometry.pivot_angles_deg
         if packing.width:
             columns["y_m"] = packing.places.xyz[counted, 1] * pile.scene.grain.diameter
     return columns
@@ -75,8 +75,8 @@ def grains(answer: Answer) -> Columns:
 def size_class_rows(answer: Answer) -> Iterator[Row]:
     """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
     pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
-    sizes = classes.classes(pile.packing.sizes[pile.packing.windward]) if pile.pouring else ()
-    listed = [(one, classes.of(motion, one.chosen)) for one in sizes]
+    sizes = threshold.classes(pile.packing.sizes[pile.packing.windward]) if pile.pouring else ()
+    listed = [(one, motion.of(one.chosen)) for one in sizes]
     for fraction in scene.protocol.fractions:
         found = {
             one.number: threshold.of_pile(

@@ -79,7 +79,7 @@ def test_the_native_starts_know_the_pivots_of_a_poured_bed(
     grains = pd.read_csv(next(poured.glob("scenes/4-*/grains.csv")))
     assert grains["d_m"].nunique() > 10
     flows = pd.read_csv(next(poured.glob("scenes/4-*/load_steps.csv")))["ustar0_m_s"].to_numpy()
-    alone = pile.alone(pile.face(pile.cases).speed)
+    alone = pile.loads(pile.cases).alone()
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     moved = numbers[numbers["quantity"] == "moved"]
     assert moved["answer"].max() > 3

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.grains import deck
@@ -24,6 +24,7 @@ ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
 OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))
 
 
+@settings(deadline=None)
 @given(
     law_name=st.sampled_from(sorted(LAWS)),
     ratio=st.floats(-2, 2).filter(lambda r: abs(r) > 1e-3),
@@ -39,6 +40,7 @@ def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
     np.testing.assert_allclose(loading.at(ustar0), [exact, [0, 0]], rtol=1e-12, atol=0)
 
 
+@settings(deadline=None)
 @given(
     law_name=st.sampled_from(sorted(LAWS)),
     goal=st.floats(0.01, 10),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed.packing import Places
@@ -81,6 +81,7 @@ def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(slope_deg: float)
     assert np.isfinite(back[:count]).all()
 
 
+@settings(deadline=None)
 @given(
     slope_deg=st.floats(0, 29),
     beta_deg=st.floats(45, 60),
@@ -131,6 +132,7 @@ def test_a_gap_in_front_makes_the_climb_a_little_easier() -> None:
     assert 2.0 > flows[0] > flows[1]
 
 
+@settings(deadline=None)
 @given(scale=st.floats(0.1, 10))
 def test_flows_scale_with_the_root_of_the_force(scale: float) -> None:
     centres, count = _row(4, 60, 20)

@@ -147,7 +147,7 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="row", where="test").scenes
     pile = Pile(scene)
-    assert least <= pile.row_hold(tmp_path) <= most
+    assert least <= pile.loads(tmp_path).row_hold() <= most
 
 
 def test_scenes_that_differ_in_their_grains_alone_share_the_flow() -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from orchestrator.bed.packing import Places
-from orchestrator.grains import deck, motion, peeling, protocol, threshold
+from orchestrator.grains import deck, motion, peeling, threshold
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.runs.case import templates
 from orchestrator.study.parts import Grain, Protocol
@@ -69,12 +69,12 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     )
     grain = Grain(diameter=d, stiffness=1e4)
     rules = Protocol(load_increment=0.002, waiting_time=8.0)
-    rising = protocol.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
+    rising = deck.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
     weight = 2500.0 * np.pi / 6 * d**3 * 9.81
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
-        **protocol.contact(grain, rules),
-        **protocol.raising(rules, 0),
+        **deck.Contact.of(grain, rules).variables,
+        **deck.raising(rules, 0),
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
     copy = tmp_path / "bed"

@@ -10,9 +10,9 @@ import pytest
 from orchestrator import tables
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import decide
-from orchestrator.grains import pile_case
+from orchestrator.grains import pile as pile_of_grains
+from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import Pile
 from orchestrator.plan import Plan, make
 from orchestrator.report import piles
 from orchestrator.report.results import Results
@@ -61,29 +61,21 @@ def test_each_method_answers(finished: tuple[Plan, Path]) -> None:
     assert (early < 0.2).all()
 
 
-def test_load_steps_begin_at_the_first_grain_that_lies(finished: tuple[Plan, Path]) -> None:
-    planned, _ = finished
-    (pile, *_) = planned.piles.values()
-    assert pile_case._first(pile, np.array([0.0, 0.1, 0.2])) == 0.1
-    many = np.concatenate([[0.0], np.arange(1.0, 401.0)])
-    assert pile_case._first(pile, many) == 5.0
-
-
-class Loose(Pile):
+class Loose(Loads):
     """A bed none of whose grains is held by another."""
 
-    def alone(self, speed: FloatArray) -> FloatArray:
-        return np.zeros(len(speed))
+    def alone(self) -> FloatArray:
+        return np.zeros(self.geometry.packing.count)
 
-    def leaving(self, ratio: FloatArray, there: BoolArray | None = None) -> FloatArray:
-        return np.zeros(self.packing.count)
+    def leaving(self, present: BoolArray | None = None) -> FloatArray:
+        return np.zeros(self.geometry.packing.count)
 
 
 def test_a_bed_none_of_whose_grains_is_held_is_refused(finished: tuple[Plan, Path]) -> None:
     planned, cases = finished
     (pile, *_) = planned.piles.values()
     with pytest.raises(InputError, match="lets it go"):
-        pile_case.flows(Loose(pile.scene, cases), pile.ustar_over_ustar0(cases))
+        pile_of_grains.flows(Loose(Geometry(pile.scene, cases), pile.loads(cases).ratio))
 
 
 @pytest.mark.parametrize("length", [1e-3, 1e-12])
@@ -131,8 +123,7 @@ def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, P
     rows = (cases / pile.case.name / "grains.data").read_text().partition("Atoms\n\n")[2]
     diameters = np.array([row.split()[2] for row in rows.splitlines()], float)
     np.testing.assert_allclose(diameters, packed.sizes * d, rtol=1e-14)
-    ratio = pile.ustar_over_ustar0(cases)
-    force = np.linalg.norm(pile.loading(ratio).at(0.02), axis=1)[packed.windward]
+    force = np.linalg.norm(pile.loads(cases).loading.at(0.02), axis=1)[packed.windward]
     own = packed.sizes[packed.windward]
     larger = np.argsort(own)
     assert (np.diff(force[larger]) > 0).all()

@@ -58,7 +58,7 @@ def test_grains_lie_between_the_sides_and_feel_the_flow_along_x(
     exposed = pile.packing.windward
     # some lie beside others at one x
     assert exposed.sum() > 4.0
-    force = pile.loading(pile.ustar_over_ustar0(cases)).at(0.02)
+    force = pile.loads(cases).loading.at(0.02)
     assert (force[exposed] > 0).all()
 
 

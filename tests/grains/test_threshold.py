@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.grains import threshold
@@ -83,6 +83,7 @@ def test_a_fraction_that_was_not_reached_is_empty() -> None:
     assert math.isnan(found.ustar0)
 
 
+@settings(deadline=None)
 @given(
     level=st.lists(st.integers(0, 4), min_size=2, max_size=50),
     fraction=st.floats(0.01, 1),
@@ -96,3 +97,23 @@ def test_intervals_enclose_their_value_where_the_stress_is_uniform(
         assert motion.fraction[-1] < fraction
     else:
         assert found.tau_low < found.tau < found.tau_high
+
+
+def test_every_grain_is_in_one_class_within_half_a_step() -> None:
+    sizes = np.random.default_rng(1).lognormal(0, 0.4, 500)
+    found = list(threshold.classes(sizes))
+    np.testing.assert_array_equal(np.sum([one.chosen for one in found], axis=0), 1)
+    for one in found:
+        own = sizes[one.chosen] / threshold.STEP**one.number
+        assert own.max() <= threshold.STEP**0.5
+        assert own.min() >= threshold.STEP**-0.5
+
+
+def test_a_class_is_at_its_threshold_when_its_own_grains_have_moved() -> None:
+    sizes = np.array([0.7, 0.7, 1.0, 1.0])
+    motion = Motion.of_flows(np.array([1.0, 3.0, 2.0, np.inf]))
+    small, middle = (motion.of(one.chosen) for one in threshold.classes(sizes))
+    speed = np.ones(2)
+    assert threshold.of_pile(small, speed, 1.0, 1.0).ustar0 == 3.0
+    assert threshold.of_pile(middle, speed, 0.5, 1.0).ustar0 == 2.0
+    assert np.isnan(threshold.of_pile(middle, speed, 1.0, 1.0).ustar0)

@@ -11,11 +11,10 @@ from orchestrator import pipeline, plan, tables
 from orchestrator.benchmark import export
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
-from orchestrator.grains import wear
-from orchestrator.grains.loaded_bed import LoadedBed
+from orchestrator.grains import pile as wear
+from orchestrator.grains.loads import Geometry
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import Pile
-from orchestrator.grains.wear import Worn
+from orchestrator.grains.pile import Pile, Worn
 from orchestrator.report import bed, piles
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import STUDY, Workspace
@@ -94,14 +93,14 @@ WORN: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", WORN)
 def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, packing: str) -> None:
     scene = Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
-    bed = LoadedBed(scene)
-    whole, counted = Worn.whole(bed), bed.packing.windward
+    bed = Geometry(scene)
+    whole, counted = Worn.whole(bed.packing), bed.packing.windward
     x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
     line = wear.sunk(bed, whole)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
     # the gap between rows, over the cosine of at most 40 degrees, and a grain of level rows
     sunk = bed.line.height(x) - wear.sunk(
-        bed, Worn(whole.gone(counted), whole.left, whole.speed)
+        bed, Worn(whole.without(counted), whole.left, whole.speed)
     ).height(x)
     places = np.sort(bed.packing.centres[counted, 0])
     away = np.abs(x[:, None] - places).min(axis=1)
@@ -111,11 +110,11 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, pack
 
 
 def test_a_bared_row_sinks_by_a_row() -> None:
-    bed = LoadedBed(_scene())
+    bed = Geometry(_scene())
     s = bed.packing.arc_length
     middle = bed.packing.windward & (s > 0.25 * bed.line.crest_s) & (s < 0.75 * bed.line.crest_s)
-    whole = Worn.whole(bed)
-    line = wear.sunk(bed, Worn(whole.gone(middle), whole.left, whole.speed))
+    whole = Worn.whole(bed.packing)
+    line = wear.sunk(bed, Worn(whole.without(middle), whole.left, whole.speed))
     # rows are sin(beta) apart along the normal, so much over the cosine of the slope upright
     row = np.sin(np.radians(60.0)) / np.cos(np.radians(25.0))
     x = float(bed.line.crest[0]) / 2
@@ -127,9 +126,9 @@ def test_a_bared_row_sinks_by_a_row() -> None:
 
 
 def test_worn_grains_survive_their_file(tmp_path: Path) -> None:
-    whole = Worn.whole(LoadedBed(_scene()))
+    whole = Worn.whole(Geometry(_scene()).packing)
     gone = np.arange(len(whole.left)) % 3 == 0
-    one = Worn(whole.gone(gone), np.where(gone, np.pi / 7, np.inf), np.where(gone, 1 / 3, 0.0))
+    one = Worn(whole.without(gone), np.where(gone, np.pi / 7, np.inf), np.where(gone, 1 / 3, 0.0))
     one.to_csv(tmp_path)
     again = Worn.from_csv(tmp_path)
     for before, after in zip(vars(one).values(), vars(again).values(), strict=True):
@@ -139,14 +138,15 @@ def test_worn_grains_survive_their_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("method", ["peeling", "dem"])
 def test_a_bed_changes_after_each_part_of_its_grains(worn: dict[str, Done], method: str) -> None:
     pile, cases = worn[method]
-    assert [wear.number(flow) for flow in pile.flows] == [0, 1, 2]
+    assert [flow.kind for flow in pile.flows] == ["flow", "worn", "worn"]
     count, windward = pile.packing.count, pile.packing.windward
-    gone = [np.isfinite(wear.grains(pile, flow, cases).left[windward]) for flow in pile.flows]
-    for number, part in enumerate(gone[1:]):
-        assert part.sum() >= wear.goal(pile, number)
+    begun = (wear.grains(pile.geometry, flow, cases) for flow in pile.flows)
+    gone = [np.isfinite(worn.left[windward]) for worn in begun]
+    for flow, part in zip(pile.flows[:-1], gone[1:], strict=True):
+        assert part.sum() >= wear.goal(pile.geometry, flow)
     # what has moved never comes back, and the line never rises
     assert all(np.all(after >= before) for before, after in pairwise(gone))
-    lines = [wear.line(pile, flow, cases) for flow in pile.flows]
+    lines = [wear.line(pile.geometry, flow, cases) for flow in pile.flows]
     x = np.linspace(lines[0].x[0], lines[0].x[-1], 300)
     for before, later in pairwise(lines):
         assert np.all(later.height(x) <= before.height(x) + 0.02)
@@ -210,7 +210,7 @@ def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str
     assert len(starts) == 3
     assert all(steps.moved(step - 1) < steps.moved(step) for step in starts[1:])
     # who has moved is off the bed before the next line is there
-    left = np.isfinite(wear.grains(pile, pile.flows[2], cases).left)
+    left = np.isfinite(wear.grains(pile.geometry, pile.flows[2], cases).left)
     assert np.isnan(steps.places[starts[2] - 1, left[steps.grains], 0]).all() or method == "dem"
     frames = bed.data(steps, steps.first(0.5))["lines"]
     assert [step for step, _ in frames] == starts

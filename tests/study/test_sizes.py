@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.grains.loaded_bed import LoadedBed
+from orchestrator.grains.loads import Geometry
 from orchestrator.study import sizes, study
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal, Sizes
@@ -163,7 +163,7 @@ def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:
     protocol = { method = "peeling" }
     """
     scenes = [study.parse(text % (80 * d, d), name="m", where="m").scenes[0] for d in (1e-4, 2e-3)]
-    assert len({LoadedBed(scene).pouring[0].id for scene in scenes}) == 1
+    assert len({Geometry(scene).pouring[0].id for scene in scenes}) == 1
 
 
 @pytest.mark.parametrize("ends", ["smallest = 0.3, largest = 1.0", "smallest = 1.0, largest = 3.0"])

@@ -1,0 +1,226 @@
+"""The counting rule, on tracks that are known; what is read of a run, and whether its bed rests."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator import pipeline, plan
+from orchestrator.bed.deck import read_table
+from orchestrator.errors import Exploded, Noisy, SolverError
+from orchestrator.grains import deck, motion
+from orchestrator.grains.deck import GrainTable
+from orchestrator.report import bed
+from orchestrator.runs.case import templates
+from orchestrator.study import study
+from orchestrator.study.closed_form import closed_form
+from orchestrator.types import FloatArray
+
+GONE = np.nan
+SLOPE = np.radians(20.0)
+STIFFNESS = 1e3
+WEIGHT = 2500.0 * np.pi / 6 * 1e-3**3 * 9.806076000000001
+
+
+@pytest.mark.parametrize(
+    ("track", "on_a_pile", "in_a_cell"),
+    [
+        ((0.0, 0.29, 0.29), (0, 0, 0), (0, 0, 0)),
+        ((0.0, 0.3, 0.1), (1, 0, 0), (1, 0, 0)),  # it came back
+        ((0.0, 0.4, GONE), (1, 0, 0), (1, 0, 0)),  # it went on its way
+        ((0.0, -0.3, -0.1), (0, 1, 0), (0, 1, 0)),  # it lies further down
+        ((0.0, -0.3, 0.3), (1, 1, 0), (1, 1, 0)),  # and goes after all
+        ((0.0, -0.4, GONE), (1, 1, 1), (0, 1, 0)),  # off a pile lift took it, backwards
+        ((0.0, 0.0, GONE), (1, 0, 1), (0, 1, 0)),  # straight up within one sample
+        ((GONE, GONE), (1, 0, 1), (0, 1, 0)),  # it did not even stay as the bed settled
+    ],
+)
+def test_what_a_track_counts_as(
+    track: tuple[float, ...], on_a_pile: tuple[int, ...], in_a_cell: tuple[int, ...]
+) -> None:
+    for falls_out, ends in ((False, on_a_pile), (True, in_a_cell)):
+        found = motion.count(np.array(track)[:, None], 0.3, falls_out=falls_out)
+        states = (found.moved, found.fallen, found.carried)
+        assert tuple(int(state[-1, 0]) for state in states) == ends
+
+
+def test_a_grain_moves_aside_too() -> None:
+    aside = np.array([[0.0, 0.0], [0.3, 0.2]])
+    found = motion.count(np.zeros((2, 2)), 0.3, falls_out=False, aside=aside)
+    assert found.moved[-1].tolist() == [True, False]
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-1, 1) | st.just(GONE), min_size=1, max_size=9), st.booleans())
+def test_the_rule_is_latched_and_nobody_is_both_moved_and_not(
+    track: list[float], falls_out: bool
+) -> None:
+    found = motion.count(np.array(track)[:, None], 0.3, falls_out=falls_out)
+    for state in (found.moved, found.fallen, found.carried):
+        assert (np.diff(state[:, 0].astype(int)) >= 0).all()
+    assert (found.moved >= found.carried).all()
+
+
+def test_a_grain_that_rocks_about_the_criterion_has_moved_once() -> None:
+    rocks, lies = [0.29, 0.31, 0.29, 0.31, 0.29], [0.0] * 5
+    lying, fallen = motion.deck_counts(np.array([rocks, lies]).T, 0.3)
+    assert lying.tolist() == [2, 1, 1, 1, 1]
+    assert fallen.tolist() == [0] * 5
+
+
+LIFT_OFF = """
+fluid = { density = 1.0, viscosity = 1e-5 }
+grain = { diameter = 5e-4, density = 2500.0, stiffness = 1e3 }
+flow = { model = "hill" }
+forces = { law = "low" }
+bed = { kind = "pile", height = 0.005, slope_deg = 20.0, mobile_layers = 1, roughness = "d/30" }
+[protocol]
+load_increment = 0.05
+waiting_time = 6.0
+time_step = 0.3
+final_fraction = 0.5
+fractions = [0.1, 0.3]
+"""
+"""A pile under Eq. 2 far above its range: lift bears the grains before drag can push them up."""
+
+
+def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
+    asked = study.parse(LIFT_OFF, name="lift", where="lift")
+    assert not pipeline.run(asked, tmp_path, workers=1).failures
+    names = ("curve", "threshold", "grain")
+    curve, thresholds, grains = (
+        pd.read_csv(tmp_path / "tables" / f"pile_{name}.csv") for name in names
+    )
+    last = curve.iloc[-1]
+    assert last["fallen_upstream"] > 0.3 * last["count"]
+    assert last["moved"] >= 0.5 * last["count"]
+    assert last["moved"] + last["not_moved"] == last["count"]
+    assert last["carried_off"] > 0.9 * last["moved"]
+    assert (thresholds["share_carried_off"] > 0.9).all()
+    assert (grains.loc[grains["carried_off"] == 1, "mode"] == "lifted").all()
+    # at the threshold of one grain lift over drag is steeper than the bed
+    alone = closed_form(asked.scenes[0])
+    assert float(alone.lift / alone.drag) > 1 / np.tan(np.radians(20.0))
+    # the pictures count as the tables do
+    (pile,) = plan.make(asked).piles.values()
+    steps = bed.read(pile, tmp_path / "cases")
+    assert steps.moved(len(steps.places) - 1) == last["moved"]
+
+
+@pytest.fixture(scope="module")
+def grains() -> GrainTable:
+    """The grains of the template's own pile."""
+    lines = (templates() / "liggghts" / "bed" / "grains.data").read_text().splitlines()
+    rows = np.array([line.split() for line in lines[lines.index("Atoms") + 2 :]], float)
+    return GrainTable(
+        position=rows[:, 4:],
+        kind=rows[:, 1].astype(np.int64),
+        along=np.tile([np.cos(SLOPE), np.sin(SLOPE)], (len(rows), 1)),
+        sizes=np.ones(len(rows)),
+        diameter=1e-3,
+        density=2500.0,
+    )
+
+
+def _copied(folder: Path, **numbers: float) -> Path:
+    """The template's pile with other values of some parameters."""
+    shutil.copytree(templates() / "liggghts" / "bed", folder)
+    text = (folder / "parameters.liggghts").read_text()
+    for name, value in numbers.items():
+        text = re.sub(rf"( {name} equal) \S+", rf"\1 {value}", text)
+    (folder / "parameters.liggghts").write_text(text)
+    return folder
+
+
+def _finer_steps(copy: Path, flows: FloatArray) -> None:
+    """Flows that take one grain after the other, with forces from the template's last set."""
+    last = float((copy / "load_steps.txt").read_text().split()[-1])
+    (copy / "load_steps.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    for path in (copy / "force.x.txt", copy / "force.z.txt"):
+        lines = path.read_text().splitlines()
+        rows = [line.split() for line in lines[-int(lines[0]) :]]
+        with path.open("w") as stream:
+            for flow in flows.tolist():
+                stream.write(lines[0] + "\n")
+                factor = (flow / last) ** 1.9
+                stream.writelines(
+                    f"{n} {float(f) * factor * (1 + 0.01 * int(n))}\n" for n, f in rows
+                )
+
+
+def _run(folder: Path, stir: float) -> Path:
+    copy = _copied(folder / f"stir-{stir}", stir=stir)
+    _finer_steps(copy, deck.flows(0.98, 1.5, 0.01))
+    subprocess.run(["./Allrun"], cwd=copy, check=True)
+    return copy
+
+
+def test_grains_at_their_places_need_no_line(tmp_path: Path, grains: GrainTable) -> None:
+    short, whole = (_run(tmp_path, stir) for stir in (0.02, 0.0))
+    sizes = [(folder / motion.PASSAGE).stat().st_size for folder in (short, whole)]
+    assert sizes[0] < sizes[1] / 2
+    samples = pd.read_csv(short / motion.SAMPLES)
+    pd.testing.assert_frame_equal(samples, pd.read_csv(whole / motion.SAMPLES))
+    few, every = (motion.read_track(folder, grains, samples) for folder in (short, whole))
+    gone = np.isnan(few.travel)
+    np.testing.assert_array_equal(gone, np.isnan(every.travel))
+    assert 0 < gone[-1].sum() < len(gone[-1])
+    np.testing.assert_allclose(few.travel, every.travel, rtol=0, atol=0.02)
+    found, expected = (motion.read(f, grains, 0.3, falls_out=False) for f in (short, whole))
+    for value, other in zip(vars(found).values(), vars(expected).values(), strict=True):
+        np.testing.assert_array_equal(value, other)
+    frames = (short / motion.BED).read_text().split("ITEM: TIMESTEP")
+    (short / motion.BED).write_text("ITEM: TIMESTEP".join(frames[:-1]))
+    with pytest.raises(SolverError, match=r"bed.dump: its frames are not the ends"):
+        motion.read_track(short, grains, samples)
+
+
+def _settled(folder: Path, *, time_step: float, damping: float) -> Path:
+    copy = _copied(folder / "bed", time_step=time_step, damping=damping, stiffness=STIFFNESS)
+    subprocess.run(["./Allrun"], cwd=copy, capture_output=True)
+    return copy
+
+
+def _check(directory: Path, grains: GrainTable, *, all_rest: bool = True) -> None:
+    motion.check_rest(directory, grains, WEIGHT, STIFFNESS, all_rest=all_rest)
+
+
+def test_a_bed_comes_to_rest_unless_grains_are_lost(tmp_path: Path, grains: GrainTable) -> None:
+    found = _settled(tmp_path, time_step=0.3, damping=0.1)
+    _check(found, grains)
+    table = read_table(found / motion.SETTLING)
+    energy = table["ke"] / grains.mobile_count / (WEIGHT * 1e-3) * STIFFNESS
+    assert energy.iloc[-5:].mean() < 0.01 * motion.NOISE
+    assert energy.iloc[0] > motion.NOISE  # it did fall into place
+    one_more = replace(grains, kind=np.append(grains.kind, grains.kind.max()))
+    with pytest.raises(Exploded, match="1 of 47 grains were lost before the flow rose"):
+        _check(found, one_more)
+
+
+def test_a_step_far_too_large_throws_the_grains_out(tmp_path: Path, grains: GrainTable) -> None:
+    found = _settled(tmp_path, time_step=1.2, damping=0.1)
+    for all_rest in (True, False):
+        with pytest.raises(Exploded, match=r"settling.csv: the bed burst .* protocol.time_step"):
+            _check(found, grains, all_rest=all_rest)
+
+
+@pytest.mark.parametrize(("time_step", "damping"), [(0.6, 0.1), (0.5, 0.2), (0.4, 0.3)])
+def test_a_step_too_large_keeps_the_grains_moving(
+    tmp_path: Path, grains: GrainTable, time_step: float, damping: float
+) -> None:
+    found = _settled(tmp_path, time_step=time_step, damping=damping)
+    with pytest.raises(Noisy, match="the bed does not come to rest"):
+        _check(found, grains)
+    # a noisy run goes up and down by chance; made to grow, it is another kind of failure
+    table = read_table(found / motion.SETTLING)
+    growing = table["ke"].sort_values().to_numpy() * np.linspace(1, 4, len(table))
+    table.assign(ke=growing).to_csv(found / motion.SETTLING, index=False)
+    with pytest.raises(Exploded, match="the energy of the bed at rest grows"):
+        _check(found, grains)
