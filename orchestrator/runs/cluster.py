@@ -94,31 +94,46 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
             remedy="run the command on a machine that may ask the queue for jobs",
         )
     cases.mkdir(exist_ok=True)
-    settings = _settings(queue.settings, cases.parent)
-    configuration = f"jobqueue.{settings.get('config_name', kind.job_cls.config_name)}"
-    cores = settings.get("cores") or dask.config.get(f"{configuration}.cores", None)
+    logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
+    if awkward := sorted(AWKWARD.intersection(logs)):
+        raise InputError(
+            f"jobs cannot write logs into {logs}: it has {' '.join(map(repr, awkward))} in it",
+            where="cluster.log_directory",
+            remedy="name a directory without these there; the study's own may stay as it is",
+        )
+    name = queue.settings.get("config_name", kind.job_cls.config_name)
+    given = {**dask.config.get(f"jobqueue.{name}"), **queue.settings}
+    # a job begins in an environment of its own, where this package need not be installed
+    path = f"export PYTHONPATH={shlex.quote(str(PACKAGE.parent))}:$PYTHONPATH"
+    scheduler = {"dashboard": False, "dashboard_address": ":0"}
+    settings = {
+        **queue.settings,
+        "python": given.get("python") or shlex.quote(sys.executable),
+        "log_directory": logs,
+        "job_script_prologue": [path, *(given.get("job_script_prologue") or [])],
+        "scheduler_options": {**scheduler, **queue.settings.get("scheduler_options", {})},
+    }
     dask.config.set({"distributed.deploy.lost-worker-timeout": f"{LOST_S}s"})
     try:
-        python = dask.config.get(f"{configuration}.python", None) or shlex.quote(sys.executable)
-        cluster = kind(**{"python": python, **settings})
+        cluster = kind(**settings)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         raise InputError(
             f"these settings make no jobs: {str(error).splitlines()[0]}",
             where="cluster",
             remedy="see [cluster] in the study file, and dask's own configuration of jobqueue",
         ) from None
-    jobs = math.ceil(workers / int(cores))
-    logs = Path(settings["log_directory"])
+    cores = int(given["cores"])
+    jobs = math.ceil(workers / cores)
     with cluster, distributed.Client(cluster) as client:
         _submit(cluster, jobs, queue.system)
         print(f"asked {queue.system} for {jobs} jobs; logs: {logs}", file=sys.stderr)
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
-        _await_first(client, logs)
+        _await_first(client, Path(logs))
         yield Pool(
             client.get_executor(pure=False),
             partial(execute_unless_done, cases=cases, limit_s=limit_s),
-            places=AHEAD * jobs * int(cores),
+            places=AHEAD * jobs * cores,
             lost=(distributed.KilledWorker,),
         )
     for name in names_in(cases):
@@ -137,29 +152,6 @@ def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
             fcntl.flock(stream, fcntl.LOCK_EX)
         state = done_state(case, cases)
         return float(state["wall_s"]) if state else engine.execute(case, cases, limit_s)
-
-
-def _settings(given: Mapping[str, Any], root: Path) -> dict[str, Any]:
-    """Arguments for dask-jobqueue: the settings given, and those that no study needs to give."""
-    logs = str(given.get("log_directory", root / "jobs"))
-    if awkward := sorted(AWKWARD.intersection(logs)):
-        raise InputError(
-            f"jobs cannot write logs into {logs}: it has {' '.join(map(repr, awkward))} in it",
-            where="cluster.log_directory",
-            remedy="name a directory without these there; the study's own may stay as it is",
-        )
-    # a job begins in an environment of its own, where this package need not be installed
-    path = f"export PYTHONPATH={shlex.quote(str(PACKAGE.parent))}:$PYTHONPATH"
-    return {
-        **given,
-        "log_directory": logs,
-        "job_script_prologue": [path, *given.get("job_script_prologue", [])],
-        "scheduler_options": {
-            "dashboard": False,
-            "dashboard_address": ":0",
-            **given.get("scheduler_options", {}),
-        },
-    }
 
 
 def _submit(cluster: Any, jobs: int, system: str) -> None:

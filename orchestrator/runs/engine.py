@@ -25,17 +25,7 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THRE
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended: without an error, it is done.
-
-    Attributes
-    ----------
-    case : Case
-        The case.
-    seconds : float
-        What it took, s; 0 where that is not known.
-    error : OrchestratorError or None
-        Why it failed.
-    """
+    """How a case ended, in how many seconds (0: not known); without an error, it is done."""
 
     case: Case
     seconds: float = 0.0
@@ -165,7 +155,19 @@ def execute(
                 tries=process.TRIES,
             )
         began = time.monotonic()
-        _check(case, directory, ended, limit_s)
+        if ended.over == "disk":
+            what = "no space is left on the disk, and the solver did not end"
+            remedy = "make room, then the same command continues"
+            raise SolverError(what, where=str(directory), remedy=remedy)
+        if ended.over:
+            what = f"the solver did not end within {limit_s:g} s and was killed"
+            remedy = "see its logs; raise time_limit in the study file if it was still at work"
+            raise SolverError(what, where=str(directory), remedy=remedy)
+        # the case's own look at its logs knows more than the exit code: it comes first
+        case.collect(directory)
+        if ended.returncode != 0:
+            what, log = f"./Allrun ended with {ended.returncode}", directory / case_states.LOG
+            raise SolverError(what, where=str(log), remedy="see it")
         took_s = outside_s + ended.seconds + time.monotonic() - began
         case_states.finish(
             case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
@@ -174,29 +176,6 @@ def execute(
         case_states.fail(directory, error)
         raise
     return took_s
-
-
-def _check(case: Case, directory: Path, ended: process.Ended, limit_s: float) -> None:
-    if ended.over == "disk":
-        raise SolverError(
-            "no space is left on the disk, and the solver did not end",
-            where=str(directory),
-            remedy="make room, then the same command continues",
-        )
-    if ended.over == "time":
-        raise SolverError(
-            f"the solver did not end within {limit_s:g} s and was killed",
-            where=str(directory),
-            remedy="see its logs; raise time_limit in the study file if it was still at work",
-        )
-    # the case's own look at its logs knows more than the exit code: it comes first
-    case.collect(directory)
-    if ended.returncode != 0:
-        raise SolverError(
-            f"./Allrun ended with {ended.returncode}",
-            where=str(directory / case_states.LOG),
-            remedy="see it",
-        )
 
 
 def check_solvers(cases: Iterable[Case], pool: Pool) -> None:

@@ -6,7 +6,6 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -41,30 +40,23 @@ class Display:
             console=self._console,
             disable=not sys.stderr.isatty(),
         )
-        self._task = self._bar.add_task(
-            "", total=1.0, ended=0, count=forecast.count, left=self._time_left()
-        )
+        left = self._time_left()
+        self._task = self._bar.add_task("", total=1.0, ended=0, count=forecast.count, left=left)
 
     def __enter__(self) -> Self:
         self._bar.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
     def __call__(self, outcome: Outcome) -> None:
         """Take note of a case that has ended."""
         self._ended += 1
         self._forecast.ended(outcome)
-        word = "failed" if outcome.error else "done"
         self._console.print(
-            f"[{self._ended}/{self._forecast.count}] {word}  {outcome.case.name}  "
-            f"{self._forecast.done:.0%} of the work, {self._time_left()}",
+            f"[{self._ended}/{self._forecast.count}] {'failed' if outcome.error else 'done'}  "
+            f"{outcome.case.name}  {self._forecast.done:.0%} of the work, {self._time_left()}",
             markup=False,
         )
         if outcome.error:

@@ -8,7 +8,7 @@ import socket
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
@@ -34,18 +34,11 @@ NAMED = 5
 """Number of cases that are listed by name where an earlier study file asked for them."""
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """A kind of directory that this program writes.
 
-    Attributes
-    ----------
-    word : str
-        Name of its contents: "study".
-    marker : str
-        The JSON file that states it, with "kind" and "name".
-    option : str
-        How another directory is chosen.
+    `word` names its contents, such as "study". The JSON file `marker` states them, with "kind" and
+    "name". `option` is how another directory is chosen.
     """
 
     word: str
@@ -116,35 +109,32 @@ def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
 
 def _check(folder: Folder, kind: Kind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
+    root = folder.root
     for other in KINDS:
-        marker = read_marker(folder.root, other)
+        marker = read_marker(root, other)
         if marker and (marker["kind"], marker["name"]) != (kind.word, name):
             raise InputError(
                 f"the directory holds the {marker['kind']} {marker['name']}, "
                 f"not the {kind.word} {name}",
-                where=str(folder.root),
+                where=str(root),
                 remedy=f"choose another{kind.option}",
             )
     # a study whose marker is lost still has its cases
-    has_cases = kind.marker == STUDY.marker and names_in(folder.root / "cases")
-    if read_marker(folder.root, kind) is None and not has_cases:
-        with os.scandir(folder.root) as entries:
-            strange = sorted(entry.name for entry in entries if not _is_nothing(Path(entry.path)))
-        if strange:
-            raise InputError(
-                f"the output directory holds something that is not a {kind.word}: {strange[0]}",
-                where=str(folder.root),
-                remedy=f"choose an empty or a new one{kind.option}",
-            )
+    has_cases = kind.marker == STUDY.marker and names_in(root / "cases")
+    if read_marker(root, kind) is None and not has_cases:
+        for path in sorted(root.iterdir()):
+            # a claim that was ended at once leaves these
+            is_nothing = path.name in (LOCK, RECORD) or path.name.endswith(".tmp")
+            if path.is_dir() and not path.is_symlink():
+                is_nothing = not any(path.iterdir())
+            if not is_nothing:
+                raise InputError(
+                    f"the output directory holds something that is not a {kind.word}: {path.name}",
+                    where=str(root),
+                    remedy=f"choose an empty or a new one{kind.option}",
+                )
     for place in (LOCK, RECORD, kind.marker, "cases", *folder.written()):
         folder.path(place)
-
-
-def _is_nothing(path: Path) -> bool:
-    """Whether it is left by a claim that was ended at once, or a directory without files."""
-    if path.is_dir() and not path.is_symlink():
-        return not any(path.iterdir())
-    return path.name in (LOCK, RECORD) or path.name.endswith(".tmp")
 
 
 @contextlib.contextmanager
@@ -193,11 +183,6 @@ class Workspace:
     def cases(self) -> Path:
         """The directory of the case directories."""
         return self.root / "cases"
-
-    @property
-    def tables(self) -> Path:
-        """The directory of the tables."""
-        return self.root / "tables"
 
     @property
     def page(self) -> Path:
@@ -294,25 +279,13 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Status:
-    """The cases of a study by how far they came.
+    """How far a study came.
 
-    Attributes
-    ----------
-    name : str
-        The study's name.
-    running : bool
-        Whether a process holds the study.
-    done, unfinished, waiting : tuple of str
-        Names of cases: finished; begun; not begun.
-    failed : dict of str to str
-        Cases that failed, with the cause.
-    page : Path or None
-        The page, once it is drawn.
-    sizes : dict of str to int
-        Bytes on disk by what they belong to: a kind of case, or tables, figures and page. Those
-        of a finished case are of the time when it ended, or was pruned.
-    left : dict of str to int
-        Cases that an earlier study file asked for and this one does not, and their bytes.
+    `done`, `unfinished` and `waiting` (not begun) name cases; `failed` has those that failed with
+    the cause, and `left` those of an earlier study file with their bytes. `sizes` are the bytes on
+    disk by kind of case, and of tables, figures and page; those of a finished case are of the time
+    when it ended, or was pruned. `page` is the page, once it is drawn; `running` is whether a
+    process holds the study.
     """
 
     name: str
@@ -370,8 +343,7 @@ def status_text(status: Status) -> str:
         *(f"  failed: {name}: {cause}" for name, cause in status.failed.items()),
         f"size: {_size_text(status.sizes)}",
     ]
-    if status.left:
-        lines.append(_left_text(status.left))
+    lines += _left_lines(status.left)
     if status.page:
         lines.append(f"page: {status.page}")
     elif not status.running:
@@ -411,16 +383,16 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
     ]
     if whole := [name for name in done if name in shown]:
         lines.append(f"whole, for the pictures of the page: {', '.join(whole)}")
-    if after.left:
-        lines.append(_left_text(after.left))
-    return "\n".join(lines)
+    return "\n".join([*lines, *_left_lines(after.left)])
 
 
-def _left_text(left: Mapping[str, int]) -> str:
+def _left_lines(left: Mapping[str, int]) -> list[str]:
     """The cases that are not asked for, for people, with their size."""
+    if not left:
+        return []
     named = ", ".join(list(left)[:NAMED]) + (", ..." if len(left) > NAMED else "")
     what = f"{len(left)} cases of an earlier study file, {_human(sum(left.values()))}: {named}"
-    return f"not asked for: {what}; they stay until you remove them"
+    return [f"not asked for: {what}; they stay until you remove them"]
 
 
 def _size_text(sizes: Mapping[str, int]) -> str:
