@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.physics.laws import LAWS
-from orchestrator.report import bed, flows, labels, piles, shields, style, theory, words
+from orchestrator.report import flows, labels, piles, shields, style, theory, words
 from orchestrator.report.results import Results
 from orchestrator.report.shields import SHAPE
 from orchestrator.study import fields
@@ -51,12 +51,6 @@ def test_the_method_comes_before_the_fields_that_it_alone_has() -> None:
     assert labels.varying(beds, "alpha_deg") == ["rho_f_kg_m3", "method"]
 
 
-def test_a_bed_without_obstacles_says_so() -> None:
-    row = pd.Series({"obstacles": None, "spacing": np.nan})
-    assert labels.panel(row, ["obstacles", "spacing"]) == "no obstacles"
-    assert labels.value("obstacles", None) == "none"
-
-
 def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
     asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
     panels, rows, entries = shields.parted(asked, *SHOWN)
@@ -64,27 +58,6 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     assert rows[SHAPE].tolist() == ["s", "D", "s", "s"]
     names = [one[0].get_label() for one in entries if isinstance(one, tuple)]
     assert names == ["mobile layers = 1", "mobile layers = 2"]
-
-
-def test_a_pile_without_dem_is_named_by_its_method(table: pd.DataFrame) -> None:
-    rows = table.assign(
-        answered_method=["dem", "peeling", "dem", "dem"],
-        mobile_layers=[1, np.nan, 1, 1],
-        stiffness=[1e3, np.nan, 1e3, 1e3],
-    )
-    _, _, entries = shields.parted(rows, *SHOWN)
-    names = [str(one[0].get_label()) for one in entries if isinstance(one, tuple)]
-    assert len(names) == 2
-    assert "peeling" in names[1]
-
-
-def test_more_variants_than_markers_part_panels(table: pd.DataFrame) -> None:
-    many = pd.concat([table.iloc[[0]]] * 20).assign(
-        stiffness=np.repeat([1e3, 1e4, 1e5, 1e6], 5), mobile_layers=[1, 2, 3, 4, 5] * 4
-    )
-    panels, rows, _ = shields.parted(many, *SHOWN)
-    assert panels == ["stiffness"]
-    assert rows[SHAPE].nunique() == 5
 
 
 def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
@@ -139,35 +112,6 @@ def test_page_lists_every_parameter(results: Results) -> None:
     assert float(asked["flow.first_cell_height"][4]) > 0
 
 
-def test_caption_of_grains_says_which_of_the_piles_they_are(two: Results) -> None:
-    (pile,) = two.plan.piles.values()
-    assert "z₀ = d/30, rows along the slope, Eq. 4 (high Re*), mobile layers = 1." in (
-        bed.words(two, pile)
-    )
-
-
-def test_captions_speak_of_holds_only_where_they_ran(results: Results) -> None:
-    rows = results.joined("pile_threshold")
-    assert shields.about(rows)["increment"] == "5"
-    without = rows.assign(
-        answered_method="pivot", answered_load_increment=None, marker="s", usable=True
-    )
-    about = shields.about(without)
-    assert (about["dem"], about["others"]) == (False, "pivot")
-    (entry,) = shields.point_entries(without)
-    assert not isinstance(entry, tuple)
-    assert entry.get_label() == "pivot, Eq. 4 (high Re*)"
-
-
-def test_no_marker_stands_for_a_law_and_for_a_variant(table: pd.DataFrame) -> None:
-    _, rows, variants = shields.parted(table.iloc[:3].assign(usable=True, why_not=""), *SHOWN)
-    rows = rows.assign(answered_method="dem")
-    assert variants
-    assert shields.point_entries(rows, variants) == []
-    both = pd.concat([rows, rows.assign(force_law="low")])
-    assert len(shields.point_entries(both, variants)) == 2
-
-
 def test_legends_leave_out_curves_beyond_the_frame() -> None:
     ax = style.canvas(2.0).subplots()
     entries = shields.draw_water(ax)
@@ -196,24 +140,10 @@ def test_values_with_their_symbols(column: str, value: object, said: str) -> Non
     assert labels.plain(column, value) == said
 
 
-def test_values_in_mathematics() -> None:
-    assert labels.written("nu_m2_s", 1e-5) == "$ν$ = $10^{-5}$ m²/s"
-    assert labels.written("alpha_s", 1.6) == "$α_{s}$ = 1.6"
-
-
 def test_each_force_law_has_a_look_of_its_own() -> None:
     looks = [theory.look(name) for name in LAWS]
     assert len({str(look) for look in looks}) == len(LAWS)
     assert not {colour for colour, _ in looks} & {style.WATER, style.AIR}
-
-
-def test_dashes_tell_all_laws_apart_but_the_papers_pair() -> None:
-    found = theory.dashes(LAWS)
-    assert list(found) == list(LAWS)
-    assert found["low"] == found["high"]
-    assert len({str(dash) for dash in found.values()}) == len(LAWS) - 1
-    assert theory.dashes(["bridged"]) == {"bridged": "-"}
-    assert list(theory.dashes(["high"])) == ["low", "high"]
 
 
 def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:

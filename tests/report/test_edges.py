@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.bed.line import BedLine
-from orchestrator.report import bed, flows, piles, shields, theory, words
+from orchestrator.report import bed, flows, piles, shields, words
 from orchestrator.report.results import FRACTION, Results
 from tests import small_study
 from tests.report.conftest import only, write
@@ -224,8 +224,3 @@ def test_a_figure_that_fails_costs_that_figure_and_a_line(
     assert 'id="bed-alpha15"' not in html
     assert "26.5 GiB for &lt;an array&gt;" in html
     assert "times the stress of a single one" in html
-
-
-def test_a_law_holds_where_its_range_says() -> None:
-    held = theory.law_holds("high", np.array([3.0, 29.0, 31.0]), theory.Bed(0, 60, 1 / 30, 1.6))
-    assert held.tolist() == [False, False, True]

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -102,22 +101,6 @@ def test_markers_are_hollow_exactly_where_the_closure_does_not_hold(
         assert is_white == (line.get_gid() == HOLLOW)
 
 
-def test_bars_are_the_intervals_of_the_table(
-    results: Results, grains: dict[str, list[Axes]]
-) -> None:
-    ax = grains["dem-slope-beta60"][-1]
-    bars = [
-        np.reshape(np.asarray(line.get_xydata(), float), (-1, 3, 2))
-        for line in marked(ax, "intervals")
-    ]
-    found = {(float(x), float(low), float(high)) for (x, low), (_, high), _ in np.concatenate(bars)}
-    table = results.tables["single_grain"]
-    own = table[(table["beta_deg"] == 60) & (table["z0_over_d"] == 0.033333333)]
-    columns = ["reynolds", "shields_dem_low", "shields_dem_high"]
-    assert found == {tuple(row) for row in own[columns].to_numpy().tolist()}
-    assert (own["shields_dem_low"] < own["shields_dem_high"]).all()
-
-
 def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Axes]]) -> None:
     lines = [line for ax in grains["dem-horizontal"] for line in marked(ax, LINE)]
     solid = np.concatenate([line.get_xdata() for line in lines if line.get_linestyle() == "-"])
@@ -140,33 +123,6 @@ def test_diagram_shows_transition_and_end_of_the_drag_law(grains: dict[str, list
         assert ax.get_xscale() == ax.get_yscale() == "log"
 
 
-def test_references_are_those_of_the_bed(grains: dict[str, list[Axes]]) -> None:
-    flat, slope = grains["dem-horizontal"][0], grains["dem-slope-beta60"][0]
-    assert [c for c in flat.collections if c.get_gid() == "water band"]
-    assert not [c for c in slope.collections if c.get_gid() == "water band"]
-    assert len(marked(flat, "air: Bagnold 1941", "air: Shao & Lu 2000")) == 2
-    assert len(marked(slope, "air: Shao & Lu 2000")) == len(marked(slope, "air: Bagnold 1941")) + 1
-
-
-def test_a_colour_means_the_same_in_every_figure(results: Results) -> None:
-    values = results.values("beta_deg")
-    assert values == [45, 60]
-    assert style.palette("beta_deg", values) == style.palette("beta_deg", values)
-    for column in ("beta_deg", "alpha_deg", "d_m", "fraction"):
-        assert len(set(style.palette(column, [1.0, 2.0, 3.0, 4.0]).values())) == 4
-
-
-def test_accuracy_is_the_ratio_of_the_friction_velocities(
-    results: Results, grains: dict[str, list[Axes]]
-) -> None:
-    (ax,) = grains["accuracy"]
-    table = results.tables["single_grain"]
-    ratio = table["ustar_m_s"] / table["ustar_closed_form_m_s"]
-    assert {y for _, y in points(marked(ax, SOLID, HOLLOW))} == set(ratio)
-    low, high = ax.get_ylim()
-    assert low < min(ratio.min(), 1) <= max(ratio.max(), 1) < high
-
-
 def test_fractions_are_those_of_the_holds(results: Results, heaps: dict[str, list[Axes]]) -> None:
     table = results.joined("pile_curve")
     moved = table[table["moved"] > 0]
@@ -187,18 +143,6 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
     (_, figure) = pile_figures(replace(results, tables={**results.tables, "pile_threshold": lost}))
     (ax,) = drawn([figure])["extended-shields-d30"]
     assert points(marked(ax, SOLID)) == rows(lost.dropna(subset=["shields"]), "reynolds", "shields")
-
-
-def test_piles_in_the_transition_are_hollow(results: Results) -> None:
-    table = results.tables["pile_threshold"].assign(usable=False)
-    scenes = results.scenes.assign(regime="transition", law_holds=False)
-    changed = {**results.tables, "scenes": scenes, "pile_threshold": table}
-    found = drawn(pile_figures(replace(results, tables=changed)))
-    (ax,) = found["extended-shields-d30"]
-    assert not marked(ax, SOLID)
-    assert points(marked(ax, HOLLOW)) == rows(table, "reynolds", "shields")
-    (line,) = marked(found["fractions-alpha15"][0], *table["scene_id"])
-    assert line.get_markerfacecolor() == "white"
 
 
 def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
@@ -226,14 +170,6 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert list(pile_figures(empty)) == list(flows.stress(empty)) == []
 
 
-def test_the_closed_form_has_no_panels_of_what_answers(results: Results) -> None:
-    stiff = results.tables["scenes"].copy()
-    stiff["stiffness"] = np.where(np.arange(len(stiff)) % 2, 1e4, 1e6)
-    none = {name: pd.DataFrame() for name in results.tables}
-    found = drawn(single_figures(replace(results, tables={**none, "scenes": stiff})))
-    assert len(found["closed-form-horizontal"]) == 2
-
-
 def test_grains_that_hardly_ever_go_do_not_set_the_scale(results: Results) -> None:
     curve = results.tables["pile_curve"]
     last = curve[curve["moved"] > 0].tail(1).assign(fraction_moved=0.97, shields=120.0)
@@ -244,24 +180,6 @@ def test_grains_that_hardly_ever_go_do_not_set_the_scale(results: Results) -> No
     early = curve[(curve["moved"] > 0) & (curve["fraction_moved"] <= piles.SHOWN_UP_TO)]
     shown = early["shields"]
     assert low < shown.min() <= shown.max() < high < 1
-
-
-def test_ramps_are_no_points_of_the_diagrams(results: Results) -> None:
-    ramps = {**results.tables, "scenes": results.tables["scenes"].assign(waiting_time=1.0)}
-    assert list(single_figures(replace(results, tables=ramps))) == []
-
-
-def test_diameters_beyond_the_papers_are_crossed(results: Results) -> None:
-    large = results.tables["single_grain"].assign(d_m=1.5e-3)
-    found = drawn(
-        single_figures(replace(results, tables={**results.tables, "single_grain": large}))
-    )
-    ax = found["dem-horizontal"][0]
-    points, crosses = (
-        sum(np.size(line.get_xdata()) for line in marked(ax, *marks))
-        for marks in ((SOLID, HOLLOW), (singles.CROSS,))
-    )
-    assert points == crosses > 0
 
 
 def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
@@ -295,44 +213,3 @@ def several_piles(results: Results) -> Results:
             own = pd.concat(copies, ignore_index=True)
         tables[name] = own
     return replace(heap, tables=tables)
-
-
-def test_no_colour_stands_for_two_diameters() -> None:
-    many = [1e-4 * (i + 1) for i in range(20)]
-    assert len(set(style.palette("d_m", many).values())) == 20
-
-
-def test_piles_in_water_are_held_against_the_shields_curve(results: Results) -> None:
-    water = results.tables["scenes"].assign(rho_f_kg_m3=1000.0, rho_sol_kg_m3=2650.0)
-    wet = replace(results, tables={**results.tables, "scenes": water})
-    (ax,) = drawn(piles.extended(wet))["extended-shields-d30"]
-    assert marked(ax, shields.WATER)
-    assert marked(ax, shields.MEASURED)
-
-
-def test_piles_in_water_and_in_air_in_one_panel_have_both_references(results: Results) -> None:
-    heap = only(results, "pile")
-    wet: dict[str, Any] = {"scene_id": "wet", "rho_f_kg_m3": 1e3, "nu_m2_s": 1e-6}
-    both: dict[str, pd.DataFrame] = {}
-    for name in ("scenes", "pile_threshold"):
-        own: pd.DataFrame = heap.tables[name]
-        other = own.assign(**{column: wet[column] for column in wet if column in own})
-        both[name] = pd.concat([own, other])
-    (figure,) = piles.extended(replace(heap, tables={**heap.tables, **both}))
-    (ax,) = drawn([figure])[figure.name]
-    assert marked(ax, "air: Shao & Lu 2000")
-    assert marked(ax, shields.WATER)
-    assert "Shao & Lu" in figure.caption
-    assert "curves for water" in figure.caption
-
-
-def test_a_curve_that_the_legend_names_is_within_the_frame(results: Results) -> None:
-    figure = next(piles.extended(only(results, "pile")))
-    (ax,) = drawn([figure])[figure.name]
-    (curve,) = marked(ax, "air: Shao & Lu 2000")
-    x, y = np.asarray(curve.get_xydata(), float).T
-    left, right = ax.get_xlim()
-    inside = y[(x > left) & (x < right)]
-    assert len(inside)
-    low, high = ax.get_ylim()
-    assert low < inside.min() <= inside.max() < high

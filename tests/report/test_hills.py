@@ -1,12 +1,9 @@
 """Hills that others measured, from their study file to the figure."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from orchestrator.physics.measured import rushil_hill
-from orchestrator.report import flows, words
+from orchestrator.report import flows
 from orchestrator.report.results import Results
 from tests import small_study
 
@@ -43,14 +40,6 @@ def test_a_steep_hill_separates_where_it_was_measured_to(results: Results) -> No
     assert table["ustar_mean"].between(1.2, 1.5).all()
 
 
-def test_the_flow_slows_at_the_foot_and_gains_up_to_near_the_top(results: Results) -> None:
-    table = results.tables["flow"]
-    climb = table[["ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters"]]
-    assert (climb.diff(axis=1).iloc[:, 1:] > 0).all(axis=None)
-    assert table["ustar_foot"].between(0.3, 1).all()
-    assert (table["ustar_three_quarters"] > table["ustar_top"]).all()
-
-
 def test_computed_stands_beside_measured(results: Results) -> None:
     (figure,) = flows.hills(results)
     assert figure.canvas
@@ -61,28 +50,3 @@ def test_computed_stands_beside_measured(results: Results) -> None:
     np.testing.assert_allclose(ends, results.tables["flow"]["reattachment_over_h"])
     tops = [np.max(np.asarray(one.get_ydata())) for one in lines if one.get_gid() == "stress"]
     np.testing.assert_allclose(tops, results.tables["flow"]["ustar_largest"])
-
-
-def test_the_page_of_a_measured_hill_begins_with_it(results: Results) -> None:
-    (figure,) = flows.hills(results)
-    assert figure.leads
-    assert figure.canvas
-    said = [text.get_text() for legend in figure.canvas.legends for text in legend.texts]
-    assert said == ["k-ε", "RNG k-ε", "measured end of the reversed flow (unverified)"]
-    (sentence,) = words._hills(results)
-    assert "half length 3 h: measured to 6.5 h (unverified); by k-ε to " in sentence
-    assert words.sentences(results)[0] == sentence
-
-
-def test_a_panel_without_reversed_flow_says_so(results: Results) -> None:
-    table = results.tables["flow"].assign(reattachment_over_h=np.nan, separation_over_h=np.nan)
-    (figure,) = flows.hills(replace(results, tables={**results.tables, "flow": table}))
-    assert figure.canvas
-    texts = [text.get_text() for axes in figure.canvas.axes for text in axes.texts]
-    assert texts == ["no reversed flow"]
-
-
-def test_another_hill_is_not_the_experiments() -> None:
-    assert rushil_hill(3.0, 745.0)
-    assert rushil_hill(4.0, 745.0) is None
-    assert rushil_hill(3.0, 100.0) is None

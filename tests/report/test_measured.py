@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import plan
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
@@ -15,8 +14,6 @@ from orchestrator.report import measured, shields, style, theory
 from orchestrator.report.measured import Fit
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Bed
-from orchestrator.study import study
-from orchestrator.study.parts import PileBed
 
 BED = Bed(0.0, 50.0, 1 / 30, 1.615)
 MIDDLES = np.array([one.middle for one in BUFFINGTON_MONTGOMERY])
@@ -103,30 +100,6 @@ def test_combinations_are_those_of_the_study(several: Results, flat: pd.DataFram
         assert one is own[0]
 
 
-def test_sheet_says_the_numbers() -> None:
-    (row,) = measured.sheet([bridged()]).to_numpy().tolist()
-    assert row == [
-        "bridged", "50°", "d/30", "0.1 … 163", "3.2", "1.19", "1.62 at Re* = 0.55"
-    ]  # fmt: skip
-
-
-def test_sentences_follow_from_the_numbers() -> None:
-    grains = pd.DataFrame({**AIR, "phi_deg": 35.0, "d_m": [1e-4, 2e-3]})
-    every = [bridged(), Fit("zeng-torque", Bed(0.0, 60.0, 1 / 30, 1.615), 0.01, 1e3)]
-    best, small, air = measured.sentences(grains, every)
-    assert "is bridged, β = 50°, z₀ = d/30: over 3.2 of 3.5 decades" in best
-    assert "1.19 in the median and of 1.62 at worst, at Re* = 0.55" in best
-    assert small.startswith("Up to Re* = 1.5 no law")
-    assert "nearest to them is Zeng et al. 2009, with torque" in air
-    (missed,) = [one for one in measured.sentences(grains, every[1:]) if "none is within" in one]
-    assert missed.endswith("Re* = 0.1 … 35.")
-    narrow = Fit("low", BED, 0.01, 2.0)
-    (air,) = [one for one in measured.sentences(grains, [*every, narrow]) if "for air" in one]
-    assert "Eq. 2" not in air
-    liquid = grains.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6)
-    assert not any("air" in said for said in measured.sentences(liquid, every))
-
-
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:
     (figure,) = shields.draw(several)
     assert figure.canvas is not None
@@ -142,17 +115,3 @@ def test_many_laws_have_colours_of_their_own(several: Results) -> None:
     for figure in figures.values():
         assert figure.canvas is not None
         assert len(figure.canvas.axes) == 2 <= style.PANELS
-
-
-def test_preset_reaches_over_the_whole_diagram_with_few_runs() -> None:
-    asked = study.load("shields")
-    planned = plan.make(asked)
-    assert len(planned.cases) <= 6
-    counts = [pile.packing.count for pile in planned.piles.values()]
-    assert 40 <= min(counts) <= max(counts) <= 100
-    slopes = {s.bed.slope_deg for s in asked.scenes if isinstance(s.bed, PileBed)}
-    assert slopes == {15.0, 20.0, 25.0, 30.0}
-    used = {scene.forces.law for scene in asked.scenes}
-    assert used == set(LAWS)
-    densities = {scene.fluid.density for scene in asked.scenes}
-    assert min(densities) < 2 < max(densities)

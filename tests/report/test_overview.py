@@ -11,7 +11,6 @@ import pytest
 
 from orchestrator.report import shields, words
 from orchestrator.report.results import Results
-from orchestrator.study.closed_form import closed_form
 from tests.report.conftest import only
 
 
@@ -45,18 +44,6 @@ def test_of_many_piles_one_fraction_is_drawn(results: Results) -> None:
     assert set(shown["fraction"]) == {0.3}
     assert len(shown) == len(many)
     assert len(shields.shown_piles(heap)) == len(found)
-
-
-def test_the_sentence_is_what_the_table_says(results: Results) -> None:
-    first, *_ = words.sentences(results)
-    piles = results.tables["pile_threshold"]
-    row = piles[piles["fraction"] == 0.3].iloc[0]
-    single = float(closed_form(results.plan.decisions[row["scene_id"]].asked).shields)
-    assert (
-        f"15°, d = 1 mm: 30% of the exposed grains move at {row['shields'] / single:.2g}" in first
-    )
-    assert f"u* {row['ustar0_m_s']:.2g} m/s" in first
-    assert "wind at 1 m" in first
 
 
 def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:

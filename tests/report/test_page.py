@@ -1,7 +1,6 @@
 """The page: well formed, in need of nothing else, with links that lead somewhere."""
 
 import base64
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,15 +10,11 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote, urljoin, urlparse
 
-import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_hex, to_rgb
 
 from orchestrator.report import page as page_module
 from orchestrator.report.results import Results
-from orchestrator.report.style import NOTE
-from orchestrator.runs.files import Folder
 from tests.report.conftest import only, write
 from tests.small_study import TITLE
 
@@ -136,13 +131,6 @@ def test_page_says_what_was_found(parsed: Page, results: Results) -> None:
         assert kind in parsed.texts["td"]
 
 
-def test_figures_are_beside_the_page(page: Path) -> None:
-    files = sorted(path.name for path in (page.parent / "figures").iterdir())
-    assert len(files) == 10
-    assert {Path(name).suffix for name in files} == {".svg"}
-    assert not list(page.parent.glob(".*.tmp"))
-
-
 def test_same_results_give_the_same_bytes(results: Results, tmp_path: Path) -> None:
     heap = only(results, "pile")
     pages = []
@@ -170,43 +158,10 @@ def test_page_without_results(results: Results, tmp_path: Path) -> None:
     assert not [href for href in parsed.all("a", "href") if href.startswith("cases/c")]
 
 
-def test_a_page_is_replaced_whole(results: Results, page: Path, tmp_path: Path) -> None:
-    Folder(tmp_path).put("report.html", page.read_bytes())
-    (tmp_path / "cases").mkdir()
-    old = (tmp_path / "report.html").stat().st_ino
-    write(only(results, "grain"), tmp_path, {})
-    assert (tmp_path / "report.html").stat().st_ino != old
-
-
 def test_importing_the_report_loads_no_drawing_library() -> None:
     heavy = "{'matplotlib', 'pyvista', 'vtkmodules', 'jinja2', 'pandas'}"
     code = f"import sys, orchestrator.report; sys.exit(bool({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_every_text_stands_out_from_its_ground(scheme: str) -> None:
-    css = (Path(page_module.__file__).parent / "page.css").read_text(encoding="utf-8")
-    light, dark, _ = re.findall(r"(?s):root \{(.*?)\}", css)
-    given = dict(re.findall(r"--(\w+): (#\w+)", light))
-    if scheme == "dark":
-        given |= dict(re.findall(r"--(\w+): (#\w+)", dark))
-    pairs = [(text, ground) for text in ("ink", "soft", "link") for ground in ("ground", "box")]
-    found = {pair: contrast(*(given[name] for name in pair)) for pair in pairs}
-    assert min(found.values()) >= 4.5, found  # WCAG 2, level AA
-    drawn = [NOTE["color"], "black"]
-    assert min(contrast(to_hex(colour), "#fff") for colour in drawn) >= 4.5
-
-
-def contrast(one: str, other: str) -> float:
-    """The ratio of two colours' luminances by WCAG 2."""
-    low, high = sorted(luminance(np.array(to_rgb(colour))) for colour in (one, other))
-    return (high + 0.05) / (low + 0.05)
-
-
-def luminance(colour: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> float:
-    linear = np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def test_symbols_have_an_index_and_names_of_columns_none() -> None:

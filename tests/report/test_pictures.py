@@ -1,6 +1,5 @@
 """Pictures of the flow, of its mesh, and of the bed with its grains."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -78,17 +77,6 @@ def test_grains_have_moved_as_the_tables_say(results: Results, steps: Steps) -> 
     assert counts[shown - 1] < 0.3 * steps.pile.packing.count <= counts[shown]
 
 
-def test_fixed_grains_stay_and_moved_ones_do_not(steps: Steps) -> None:
-    packing, last = steps.pile.packing, steps.places[-1]
-    centres, mobile = packing.centres[steps.grains], packing.mobile[steps.grains]
-    assert (last[~mobile] == centres[~mobile]).all()
-    moved = steps.level > 0
-    gone = np.isnan(last[:, 0])
-    assert not (gone & ~mobile).any()
-    along = np.linalg.norm(last - centres, axis=1)
-    assert (along[moved & ~gone] > 0.3).all()
-
-
 def test_the_slider_has_every_place_of_every_load_step(steps: Steps, figure: Figure) -> None:
     data = figure.data
     assert len(data["frames"]) == len(steps.places) - 1
@@ -101,18 +89,6 @@ def test_the_slider_has_every_place_of_every_load_step(steps: Steps, figure: Fig
         assert np.isnan(now[:, 0]).tolist() == np.isnan(places[:, 0]).tolist()
         known = ~np.isnan(now[:, 0])
         assert np.abs(now[known] * [1, -1] - places[known]).max() <= bed.SHIFT + 0.011
-
-
-def test_the_drawing_shows_the_load_step_of_its_title(steps: Steps, figure: Figure) -> None:
-    text = figure.image.decode()
-    shown = figure.data["shown"]
-    assert text.count('class="v"') + text.count('class="v g"') == steps.moved(shown)
-    grains = re.findall(r"<circle", text[text.index('class="grains"') :])
-    assert len(grains) == steps.pile.packing.mobile.sum()
-    share = steps.moved(shown) / steps.pile.packing.count
-    assert f"{share:.0%}" in figure.title
-    assert f'data-case="{steps.pile.case.name}"' in text
-    assert "data:image/png" in text
 
 
 def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
@@ -128,16 +104,6 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert found["step"] == "flow"
     assert "load step" not in bed.words(results, peeled)
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
-
-
-def test_a_check_that_did_not_run_shows_nothing(results: Results) -> None:
-    ((scene_id, pile),) = results.plan.piles.items()
-    rules = pile.scene.protocol.model_copy(update={"load_increment": 0.07})
-    other = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
-    failed = replace(results, plan=replace(results.plan, checks={scene_id: other}))
-    assert not failed.has_files(other)
-    assert failed.shown(scene_id) is pile
-    assert [shown for _, shown in bed.chosen(failed)] == [pile]
 
 
 def test_a_bed_without_results_has_no_picture(results: Results) -> None:

@@ -32,29 +32,10 @@ def test_band_is_the_envelope_of_the_curves_that_cover_a_place() -> None:
     assert high == pytest.approx(np.nanmax(found, axis=0), rel=2e-3)
 
 
-def test_no_band_where_one_curve_is_alone() -> None:
-    low, high = theory.water_band(np.array([0.011, 0.02]))
-    assert np.isnan(low).tolist() == np.isnan(high).tolist() == [True, False]
-
-
 def test_air_needs_a_gas(results: Results) -> None:
     grains = results.beds("grain")
     assert set(theory.air_lines(grains)) == set(curves.AIR)
     assert theory.air_lines(grains.assign(rho_f_kg_m3=1000.0)) == {}
-
-
-def test_slope_raises_the_friction_velocity_in_air(results: Results) -> None:
-    grains = results.beds("grain")
-    flat, up = (theory.air_lines(grains, slope)[theory.SLOPED] for slope in (0.0, 20.0))
-    factor = float(curves.slope_factor_on_ustar(np.array(20.0), 35.0))
-    assert up[0] == pytest.approx(factor * flat[0])
-    assert up[1] == pytest.approx(factor**2 * flat[1])
-
-
-def test_bagnold_ends_where_his_constant_changes(results: Results) -> None:
-    reynolds, theta = theory.air_lines(results.beds("grain"))["Bagnold 1941"]
-    assert reynolds.min() >= theory.BAGNOLD_FROM
-    assert theta == pytest.approx(0.01)
 
 
 @pytest.fixture
@@ -99,10 +80,3 @@ def test_the_fluid_does_not_move_a_line(bed: pd.DataFrame) -> None:
 @pytest.mark.parametrize(("ratio", "limit"), [(1 / 30, 155.0), (1 / 10, 245.0)])
 def test_drag_law_ends(ratio: float, limit: float) -> None:
     assert theory.drag_law_limit(ratio) == pytest.approx(limit, rel=0.02)
-
-
-def test_an_own_lift_coefficient_has_a_line_of_its_own(results: Results) -> None:
-    one = results.beds("grain").query("alpha_deg == 0 and beta_deg == 60 and z0_over_d == 0.1")
-    assert len(theory.branches(one)) == 2
-    varied = one.assign(alpha_s=np.linspace(0, 1, len(one)))
-    assert len(theory.branches(varied)) == 2 * len(one)

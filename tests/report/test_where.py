@@ -68,21 +68,3 @@ def test_the_picture_of_a_long_train_shows_single_grains(results: Results) -> No
     assert right - left == pytest.approx(bed.LONG)
     assert left < float(train.line.crest[0]) < right
     assert "of the first form" in bed.words(results, train)
-
-
-def test_pictures_of_a_page_do_not_change_each_others_texts(results: Results) -> None:
-    """The styles of all are one on the page: no size of one picture may stand there."""
-    (figure,) = bed.draw(results)
-    svg = figure.image.decode()
-    style = svg[svg.index("<style>") : svg.index("</style>")]
-    assert "px" not in style
-    (pile,) = results.plan.piles.values()
-    left, right, *_ = bed.window(pile)
-    assert svg.count(f'font-size="{(right - left) / 75:.3g}"') == 2
-
-
-def test_a_current_a_metre_above_the_bed_follows_from_the_log_law(results: Results) -> None:
-    rows = results.tables["pile_threshold"]
-    z0 = rows["z0_over_d"] * rows["d_m"]
-    expected = rows["ustar0_m_s"] / 0.41 * np.log((1 + z0) / z0)
-    np.testing.assert_allclose(rows["u_1m_m_s"], expected, rtol=1e-6)
