@@ -476,7 +476,7 @@ def hills(results: Results) -> Iterator[Figure]:
             ends = [row["separation_over_h"], row["reattachment_over_h"]]
             back.plot(ends, [place, place], color=colour, lw=3, gid="reversed flow")
         end = rows["measured_reattachment_over_h"].iloc[0]
-        if pd.notna(end):
+        if end > 0:
             back.axvline(end, **measured)
         if rows["reattachment_over_h"].isna().all():
             centre: Look = {**style.NOTE, "ha": "center", "va": "center"}
@@ -491,7 +491,7 @@ def hills(results: Results) -> Iterator[Figure]:
     colours = [style.entry(labels.value("turbulence_model", name), MODELS[name]) for name in names]
     label = f"measured end of the reversed flow{unverified}"
     entries = [Line2D([], [], label=label, **measured)]
-    known = flows["measured_reattachment_over_h"].notna().any()
+    known = (flows["measured_reattachment_over_h"] > 0).any()
     style.legends(canvas, colours, entries if known else [])
     cases, title = tuple(flows["flow_case"]), "Hills that others measured"
     yield Figure("hills", title, caption("hills"), cases, canvas, first=True)

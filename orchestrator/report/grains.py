@@ -29,73 +29,89 @@ def draw(results: Results) -> Iterator[Figure]:
     """
     grains = results.beds("grain")
     scenes = grains[held(grains)]
-    dem = by_dem(results.joined("single_grain"))
-    dem = dem[held(dem)] if len(dem) else dem
     flat = scenes[scenes["alpha_deg"] == 0]
     if theory.many(flat["force_law"]):
-        for (ratio,), own in split(flat, "z0_over_d"):
-            yield from _compared(own, dem, labels.ratio_of(float(str(ratio)), "d"))
+        for _, own in split(flat, "z0_over_d"):
+            yield from _diagrams(results, own, "force_law")
     elif len(flat):
-        yield _figure(results, flat, dem, "beta_deg")
+        yield from _diagrams(results, flat, "beta_deg")
     for _, own in split(scenes, "beta_deg"):
         if (own["alpha_deg"] > 0).any():
-            yield _figure(results, own, dem, "alpha_deg")
+            yield from _diagrams(results, own, "alpha_deg")
 
 
-def _of(dem: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
-    """The rows of some scenes, with the markers of these."""
-    return dem.merge(scenes[["scene_id", SHAPE]], on="scene_id") if len(dem) else dem
+def _dem(results: Results) -> pd.DataFrame:
+    """Single grains that DEM answered under a held flow."""
+    rows = by_dem(results.joined("single_grain"))
+    return rows[held(rows)] if len(rows) else rows
 
 
-def _figure(results: Results, scenes: pd.DataFrame, dem: pd.DataFrame, by: str) -> Figure:
-    """The closed form and DEM on it, coloured by entrainment angle or slope, by z0/d and law."""
+def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figure]:
+    """The closed form and DEM on it, coloured by entrainment angle, slope or force law."""
     choices, scenes, variants = parted(scenes, *SHOWN, "z0_over_d")
-    points = _of(dem, scenes)
+    points = _dem(results)
+    if len(points):
+        points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id")
     if points.empty:  # the closed form depends on nothing that is about its answer
         choices = [one for one in choices if fields.COLUMNS[one].info.about == "question"]
-    keys = ["z0_over_d", *choices]
-    panels = [part for _, part in split(scenes, *keys)][::-1]
-    figure, axes = style.grid(len(panels), 2.4)
-    colours = style.palette(by, results.values(by))
-    dashes = theory.dashes(scenes["force_law"])
-    for ax, part in zip(axes, panels, strict=True):
-        published = _panel(ax, part, points, by, colours, dashes)
-        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-    low, high = theory.span(scenes)
-    shields.prepare(axes, panels, (low / 2, high * 2))
-    shields.mark_drag_law(axes, panels)
-    looks: list[Sample] = [
-        *shields.within(axes, published),
-        *shields.line_entries(scenes, dashes),
-    ]
-    if len(points):
-        looks += [*shields.point_entries(points, variants)]
-        if _beyond(points).any():
-            label = "crossed: diameter beyond the paper’s"
-            looks.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
-        looks += variants
-    style.legends(figure, _colour_entries(scenes, by, colours), looks)
-    flat, alone = by == "beta_deg", points.empty
-    stem, beta = ("closed-form" if alone else "dem"), scenes["beta_deg"].iloc[0]
-    number = 5 if flat else 7
-    text = caption(
-        "grain",
-        about=shields.about(scenes),
-        lines=shields.references(scenes, sloped=not flat),
-        by=by,
-        number=number,
-    )
-    if not alone:
-        text += f" {caption('grain_dem', about=shields.about(points), number=number + 1)}"
-    bed = "horizontal bed" if flat else f"slope, β = {beta:g}°"
-    return Figure(
-        f"{stem}-horizontal" if flat else f"{stem}-slope-beta{beta:g}",
-        f"One grain on a {bed}: closed form" + ("" if alone else " and DEM"),
-        text,
-        case_names(points),
-        figure,
-        fold=not flat,
-    )
+    keys = ["beta_deg" if by == "force_law" else "z0_over_d", *choices]
+    panels = [part for _, part in split(scenes, *keys)]
+    panels = panels if by == "force_law" else panels[::-1]
+    for start in range(0, len(panels), style.PANELS):
+        chosen = panels[start : start + style.PANELS]
+        every = pd.concat(chosen)
+        shown = points[points["scene_id"].isin(every["scene_id"])] if len(points) else points
+        figure, axes = style.grid(len(chosen), 2.4)
+        colours = {} if by == "force_law" else style.palette(by, results.values(by))
+        dashes = theory.dashes(every["force_law"])
+        for ax, part in zip(axes, chosen, strict=True):
+            published = _panel(ax, part, shown, by, colours, dashes)
+            ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+        low, high = theory.span(every)
+        shields.prepare(axes, chosen, (low / 2, high * 2))
+        looks: list[Sample] = [*shields.within(axes, published)]
+        if by == "force_law":
+            for name in theory.drawn(every["force_law"]):
+                colour, dash = theory.look(name)
+                label = labels.value("force_law", name)
+                looks.append(Line2D([], [], color=colour, ls=dash, lw=1.4, label=label))
+        else:
+            shields.mark_drag_law(axes, chosen)
+            looks += shields.line_entries(every, dashes)
+        if len(shown):
+            looks += shields.point_entries(shown, variants)
+            if by != "force_law" and _beyond(shown).any():
+                label = "crossed: diameter beyond the paper’s"
+                looks.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
+        style.legends(figure, _colour_entries(every, by, colours), [*looks, *variants])
+        yield _named(every, shown, by, start // style.PANELS, figure)
+
+
+def _named(
+    scenes: pd.DataFrame, points: pd.DataFrame, by: str, number: int, canvas: Canvas
+) -> Figure:
+    """A diagram with its name, title and caption."""
+    ratio = labels.ratio_of(float(scenes["z0_over_d"].iloc[0]), "d")
+    beta, dem = scenes["beta_deg"].iloc[0], "dem" if len(points) else "closed-form"
+    name, bed = {
+        "force_law": (f"shields-{ratio.replace('/', '')}", ""),
+        "beta_deg": (f"{dem}-horizontal", "horizontal bed"),
+        "alpha_deg": (f"{dem}-slope-beta{beta:g}", f"slope, β = {beta:g}°"),
+    }[by]
+    about, lines = shields.about(scenes), shields.references(scenes, sloped=by == "alpha_deg")
+    if by == "force_law":
+        title = f"Force laws on a horizontal bed, z₀ = {ratio}"
+        text = caption("compared", about=shields.about(points), lines=lines)
+    else:
+        title = f"One grain on a {bed}: closed form" + (" and DEM" if len(points) else "")
+        figure = 5 if by == "beta_deg" else 7
+        text = caption("grain", about=about, lines=lines, by=by, number=figure)
+        if len(points):
+            about = shields.about(points)
+            text += f" {caption('grain_dem', about=about, number=figure + 1)}"
+    fold = number > 0 or by == "alpha_deg"
+    name += f"-{number + 1}" if number else ""
+    return Figure(name, title, text, case_names(points), canvas, fold=fold)
 
 
 def _panel(
@@ -106,23 +122,27 @@ def _panel(
     colours: dict[float, str],
     dashes: Mapping[str, theory.Dash],
 ) -> list[Artist]:
-    """One z0/d; returns the legend's entries of the references."""
+    """One panel; returns the legend's entries of the references."""
     published: list[Artist] = []
     for (value,), series in split(scenes, by):
-        colour = colours[float(str(value))]
-        shields.draw_branches(ax, theory.branches(series), colour, dashes)
-        if len(points):
-            own = points[points["scene_id"].isin(series["scene_id"])]
-            shields.draw_points(ax, own, colour, DEM)
-            crossed = own[_beyond(own)]
-            for filled, cross in ((True, "white"), (False, "0.4")):
-                x, y = crossed.loc[valid(crossed) == filled, list(DEM[:2])].to_numpy(float).T
-                ax.plot(x, y, "x", color=cross, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
+        law = by == "force_law"
+        colour = theory.look(str(value))[0] if law else colours[float(str(value))]
+        for branch in theory.branches(series):
+            shade, dash = theory.look(branch.law) if law else (colour, dashes[branch.law])
+            shields.draw_branch(ax, branch, shade, dash)
         if by == "alpha_deg":
             published = shields.draw_sloped_air(ax, series, colour)
-    if by == "beta_deg":
-        published = [*shields.draw_water(ax), *shields.draw_air(ax, scenes)]
-    return published
+        own = points[points["scene_id"].isin(series["scene_id"])] if len(points) else points
+        if own.empty:
+            continue
+        shields.draw_points(ax, own, colour, DEM)
+        crossed = own[_beyond(own)] if by != "force_law" else own[:0]
+        for filled, cross in ((True, "white"), (False, "0.4")):
+            x, y = crossed.loc[valid(crossed) == filled, list(DEM[:2])].to_numpy(float).T
+            ax.plot(x, y, "x", color=cross, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
+    if by == "alpha_deg":
+        return published
+    return [*shields.draw_water(ax), *(shields.draw_air(ax, scenes) if by == "beta_deg" else [])]
 
 
 def _beyond(points: pd.DataFrame) -> "pd.Series[bool]":
@@ -135,57 +155,10 @@ def _colour_entries(rows: pd.DataFrame, by: str, colours: dict[float, str]) -> l
     return [style.entry(labels.written(by, v), c) for v, c in colours.items() if v in used]
 
 
-def _compared(scenes: pd.DataFrame, dem: pd.DataFrame, ratio: str) -> Iterator[Figure]:
-    """Many laws at one z0/d: colours mean laws, a panel for each entrainment angle."""
-    choices, scenes, variants = parted(scenes, *SHOWN, "z0_over_d")
-    points, keys = _of(dem, scenes), ["beta_deg", *choices]
-    panels = [part for _, part in split(scenes, *keys)]
-    for start in range(0, len(panels), style.PANELS):
-        chosen = panels[start : start + style.PANELS]
-        every = pd.concat(chosen)
-        own = points[points["scene_id"].isin(every["scene_id"])] if len(points) else points
-        lines, about = shields.references(every), shields.about(own)
-        yield Figure(
-            f"shields-{ratio.replace('/', '')}"
-            + (f"-{start // style.PANELS + 1}" if start else ""),
-            f"Force laws on a horizontal bed, z₀ = {ratio}",
-            caption("compared", about=about, lines=lines),
-            case_names(own),
-            _laws(chosen, own, keys, variants),
-            fold=start > 0,
-        )
-
-
-def _laws(
-    panels: list[pd.DataFrame], points: pd.DataFrame, keys: list[str], variants: list[Sample]
-) -> Canvas:
-    figure, axes = style.grid(len(panels), 2.4)
-    for ax, part in zip(axes, panels, strict=True):
-        published = shields.draw_water(ax)
-        for branch in theory.branches(part):
-            colour, dash = theory.look(branch.law)
-            shields.draw_branches(ax, [branch], colour, {branch.law: dash})
-            if len(points):
-                own = points[points["scene_id"].isin(part["scene_id"])]
-                shields.draw_points(ax, own[own["force_law"] == branch.law], colour, DEM)
-        ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-    every = pd.concat(panels)
-    low, high = theory.span(every)
-    shields.prepare(axes, panels, (low / 1.5, high * 1.5))
-    entries: list[Sample] = []
-    for name in theory.drawn(every["force_law"]):
-        colour, dash = theory.look(name)
-        label = labels.value("force_law", name)
-        entries.append(Line2D([], [], color=colour, ls=dash, lw=1.4, label=label))
-    marks = shields.point_entries(points) if len(points) else []
-    style.legends(figure, [], [*entries, *published, *marks, *variants])
-    return figure
-
-
 def accuracy(results: Results) -> Iterator[Figure]:
     """u* of DEM over that of the closed form, a panel for each increment of the load steps."""
-    dem = by_dem(results.joined("single_grain"))
-    dem = dem[held(dem) & dem["ustar_m_s"].notna()] if len(dem) else dem
+    dem = _dem(results)
+    dem = dem[dem["ustar_m_s"].notna()] if len(dem) else dem
     if dem.empty:
         return
     exact = dem["ustar_closed_form_m_s"]

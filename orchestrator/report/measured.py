@@ -176,19 +176,10 @@ def sheet(listed: Iterable[Fit]) -> pd.DataFrame:
 
 def sentences(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     """Conclusions from the numbers: the best law, ranges that none meets, small Re*, air."""
-    first = ranked[0]
-    worst, at = first.worst
+    first, (worst, at) = ranked[0], ranked[0].worst
     if np.isfinite(worst) and first.decades:
-        yield caption(
-            "best_law",
-            count=len(ranked),
-            name=first.name,
-            decades=f"{first.decades:.1f} of {DECADES:.1f}",
-            start=f"{FACTORS_FROM:g}",
-            median=f"{first.median_factor:.2f}",
-            worst=f"{worst:.2f}",
-            at=number(at),
-        )
+        facts = {"count": len(ranked), "decades": DECADES, "start": FACTORS_FROM}
+        yield caption("best_law", fit=first, at=number(at), **facts)
     unmet = np.any([fit.answered for fit in ranked], axis=0)
     unmet &= ~np.any([fit.met for fit in ranked], axis=0)
     if unmet.any():
@@ -207,15 +198,10 @@ def _small(ranked: Sequence[Fit]) -> Iterator[str]:
     if above[grid < 1].any():
         first = int(above.argmax())
         last = first + int((~np.append(above[first:], False)).argmax()) - 1
-        yield caption(
-            "small_reynolds",
-            last=number(grid[last]),
-            first=number(grid[first]),
-            ratio=f"{low[first] / highest[first]:.1f}",
-            curve=f"{1 - low[last] / low[first]:.0%}",
-            law=f"{1 - highest[last] / highest[first]:.0%}",
-            begin=f"{BINS[0].low:g}",
-        )
+        ends = [first, last]
+        numbers = [number(reynolds) for reynolds in grid[ends]]
+        facts = {"curve": low[ends], "law": highest[ends], "begin": BINS[0].low}
+        yield caption("small_reynolds", ends=numbers, **facts)
 
 
 def _air(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
@@ -241,13 +227,13 @@ def _air(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     distances = [off(fit, air) for fit in ranked]
     nearest = int(np.argmin(distances))
     fit = ranked[nearest]
+    ratio = air / water
     yield caption(
         "air",
-        median=f"{np.median(air / water):.2f}",
-        ends=f"{(air / water).min():.2f} … {(air / water).max():.2f}",
+        ratio=(ratio.min(), np.median(ratio), ratio.max()),
         span=f"{number(at[0])} … {number(at[-1])}",
-        widest=f"{distances[0]:.2f}" if np.isfinite(distances[0]) else "",
-        nearest=f"{distances[nearest]:.2f}" if np.isfinite(distances[nearest]) else "",
+        widest=distances[0] if np.isfinite(distances[0]) else None,
+        nearest=distances[nearest] if np.isfinite(distances[nearest]) else None,
         name=fit.name,
-        from_water=f"{off(fit, water):.2f}",
+        from_water=off(fit, water),
     )

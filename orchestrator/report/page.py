@@ -7,18 +7,19 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from orchestrator.report.style import Figure
+if TYPE_CHECKING:
+    from orchestrator.report.style import Figure
 
 FOLDER = Path(__file__).parent
 
 
 def render(
-    parts: Mapping[str, Any], figures: Sequence[Figure], sections: Sequence[Markup] = ()
+    parts: Mapping[str, Any], figures: Sequence["Figure"], sections: Sequence[Markup] = ()
 ) -> str:
     """The HTML of a study's page.
 
@@ -44,7 +45,7 @@ def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
 
 
 def caption(name: str, /, **values: Any) -> str:
-    """A caption from its macro in ``captions.j2``, as plain text on one line."""
+    """A caption or a sentence from its macro in ``captions.j2``, as plain text on one line."""
     macro = getattr(_templates(FOLDER, autoescape=False).get_template("captions.j2").module, name)
     return " ".join(str(macro(**values)).split())
 
@@ -59,6 +60,7 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
     )
     environment.filters["typeset"] = typeset
     environment.filters["json"] = _json
+    environment.filters["n"] = format  # a number by a format specification
     return environment
 
 
@@ -75,7 +77,7 @@ def _json(data: Any) -> Markup:
     return Markup(text.replace("<", "\\u003c"))
 
 
-def entry(figure: Figure) -> dict[str, Any]:
+def entry(figure: "Figure") -> dict[str, Any]:
     """The values of a figure for the templates, with its image; an interactive one is inline."""
     names = ("name", "title", "caption", "cases", "data", "fold", "leads")
     is_svg = figure.image.lstrip().startswith((b"<svg", b"<?xml"))

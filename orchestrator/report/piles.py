@@ -161,7 +161,8 @@ def _thresholds(
     """Thresholds of one slope beside the closed form; returns the legend of the references."""
     piles = results.scenes[results.scenes["scene_id"].isin(rows["scene_id"])]
     for _, scenes in split(piles, "beta_deg"):
-        shields.draw_branches(ax, theory.branches(scenes), "0.2", dashes)
+        for branch in theory.branches(scenes):
+            shields.draw_branch(ax, branch, "0.2", dashes[branch.law])
     columns = [*dict.fromkeys((*SHOWN, *TAU, "fraction", "regime", "usable", SHAPE))]
     for (fraction,), points in split(rows[columns], "fraction"):
         colour = colours[float(str(fraction))]

@@ -186,16 +186,12 @@ def mark_drag_law(axes: Sequence[Axes], panels: Sequence[pd.DataFrame]) -> None:
             style.upright_note(ax, limit / 1.04, "drag law ends", at="bottom")
 
 
-def draw_branches(
-    ax: Axes, branches: Sequence[theory.Branch], colour: str, dashes: Mapping[str, theory.Dash]
-) -> None:
-    """Closed-form lines, dashed by law; dotted where it does not hold but the study has grains."""
-    for branch in branches:
-        own = dashes[branch.law]
-        for chosen, look, width in ((branch.valid, own, 1.1), (branch.continued, ":", 0.9)):
-            if chosen.any():
-                x, y = (np.where(chosen, a, np.nan) for a in (branch.reynolds, branch.shields))
-                ax.plot(x, y, ls=look, color=colour, lw=width, gid=RESULT[0])
+def draw_branch(ax: Axes, branch: theory.Branch, colour: str, dash: theory.Dash) -> None:
+    """A closed-form line, dotted where its law does not hold but the study has grains."""
+    for chosen, look, width in ((branch.valid, dash, 1.1), (branch.continued, ":", 0.9)):
+        if chosen.any():
+            x, y = (np.where(chosen, a, np.nan) for a in (branch.reynolds, branch.shields))
+            ax.plot(x, y, ls=look, color=colour, lw=width, gid=RESULT[0])
 
 
 def draw_points(

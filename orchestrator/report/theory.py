@@ -25,28 +25,16 @@ PAIR = LAWS_OF["transition"]
 """The two laws of the paper, which hold at no common Re*: their lines need not be told apart."""
 Dash = Any
 """A line's style, as matplotlib has it."""
+_BROKEN = (0, (4, 1.5))
 LOOKS: tuple[tuple[str, Dash], ...] = (
-    ("#5a5a5a", "--"),
-    ("#5a5a5a", "-"),
-    ("#c8102e", "-"),
-    ("#c8102e", (0, (4, 1.5))),
-    ("#009e73", "-"),
-    ("#7b3294", "-"),
-    ("#e69f00", "-"),
-    ("#e69f00", (0, (4, 1.5))),
-    ("#e377c2", "-"),
-    ("#009e73", (0, (4, 1.5))),
-    ("#7b3294", (0, (4, 1.5))),
+    *(("#5a5a5a", "--"), ("#5a5a5a", "-"), ("#c8102e", "-"), ("#c8102e", _BROKEN)),
+    *(("#009e73", "-"), ("#7b3294", "-"), ("#e69f00", "-"), ("#e69f00", _BROKEN)),
+    *(("#e377c2", "-"), ("#009e73", _BROKEN), ("#7b3294", _BROKEN)),
 )
 """Colour and dash where colours mean laws, in the order of `LAWS`: variants share a colour."""
 DASHES: tuple[Dash, ...] = (
-    "-",
-    (0, (5, 1.2)),
-    (0, (6, 1.2, 1, 1.2)),
-    (0, (2.5, 1)),
-    (0, (6, 1, 1, 1, 1, 1)),
-    (0, (9, 1.5)),
-    (0, (4, 1, 4, 1, 1, 1)),
+    *("-", (0, (5, 1.2)), (0, (6, 1.2, 1, 1.2)), (0, (2.5, 1))),
+    *((0, (6, 1, 1, 1, 1, 1)), (0, (9, 1.5)), (0, (4, 1, 4, 1, 1, 1))),
 )
 """Dashes where colours mean something else. Dotted is where a law does not hold."""
 FEW_LAWS = 3

@@ -17,6 +17,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
 from orchestrator.report import labels, theory
+from orchestrator.report.page import caption
 from orchestrator.report.results import (
     Results,
     by_dem,
@@ -86,17 +87,8 @@ def _ends(results: Results) -> list[pd.Series]:
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
-    pile = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
-    seeds = ""
-    if row["of_seeds"] > 1:
-        usable = "" if row["seeds"] == row["of_seeds"] else f" usable ones of {row['of_seeds']}"
-        ends = f"({row['least']:.3g} … {row['largest']:.3g})"
-        seeds = f" in the mean of {row['seeds']}{usable} seeds {ends}"
-    return (
-        f"{pile}: {row['fraction']:.0%} of the exposed grains move at "
-        f"{row['shields'] / single:.2g} times the stress of a single one, τ_c = "
-        f"{row['shields']:.3g}{seeds}; upwind {_flow(row, 'ustar0_m_s')}{_unless(row)}."
-    )
+    name = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
+    return caption("pile", row=row, name=name, single=single, flow=_flow(row, row["ustar0_m_s"]))
 
 
 def _grains(grains: pd.DataFrame) -> Iterator[str]:
@@ -106,44 +98,38 @@ def _grains(grains: pd.DataFrame) -> Iterator[str]:
     here = here.sort_values("d_m", kind="stable")
     for at in sorted({0, len(here) - 1}):
         row = here.iloc[at]
-        by_run = pd.notna(row["ustar_m_s"])
-        shields = row["shields_dem" if by_run else "shields_closed_form"]
-        yield (
-            f"One grain of {labels.millimetres(row['d_m'])} on "
-            f"{labels.value('alpha_deg', row['alpha_deg'])} starts to move at "
-            f"{_flow(row, 'ustar_m_s' if by_run else 'ustar_closed_form_m_s')}, τ_c = "
-            f"{shields:.3g}{_unless(row)}."
-        )
+        names = ("ustar_m_s", "shields_dem")
+        if pd.isna(row["ustar_m_s"]):
+            names = ("ustar_closed_form_m_s", "shields_closed_form")
+        ustar, shields = (row[name] for name in names)
+        size, slope = labels.millimetres(row["d_m"]), labels.value("alpha_deg", row["alpha_deg"])
+        flow = _flow(row, ustar)
+        yield caption("one_grain", row=row, size=size, slope=slope, shields=shields, flow=flow)
 
 
-def _flow(row: pd.Series, column: str) -> str:
-    ustar, speed = row[column], ""
+def _flow(row: pd.Series, ustar: float) -> str:
+    """A friction velocity with a speed that is measured: of a channel's mean, or of the wind."""
     if pd.notna(row.get("mean_speed_m_s")):
-        speed = f", {row['mean_speed_m_s']:.2g} m/s in the mean over {row['depth_m']:g} m of depth"
-    elif row["rho_f_kg_m3"] < GAS_BELOW:
-        z0 = max(row["z0_m"], float(smooth_wall_roughness(ustar, row["nu_m2_s"])))
-        speed = f", {float(log_law_speed(ustar, 1.0, z0)):.2g} m/s wind at 1 m"
-    return f"u* {ustar:.2g} m/s{speed}"
-
-
-def _unless(row: pd.Series) -> str:
-    return "" if row["usable"] else f" (not usable: {row['why_not']})"
+        speed, depth = row["mean_speed_m_s"], row["depth_m"]
+        return f"u* {ustar:.2g} m/s, {speed:.2g} m/s in the mean over {depth:g} m of depth"
+    if row["rho_f_kg_m3"] >= GAS_BELOW:
+        return f"u* {ustar:.2g} m/s"
+    z0 = max(row["z0_m"], float(smooth_wall_roughness(ustar, row["nu_m2_s"])))
+    return f"u* {ustar:.2g} m/s, {float(log_law_speed(ustar, 1.0, z0)):.2g} m/s wind at 1 m"
 
 
 def _hills(results: Results) -> Iterator[str]:
     """Where reversed flow ends behind each hill that others measured, by model and as measured."""
     for hill, rows in measured_hills(results):
-        models = [labels.value("turbulence_model", name) for name in rows["turbulence_model"]]
-        ends = list(zip(models, rows["reattachment_over_h"].tolist(), strict=True))
-        parts = [f"by {name} to {end:.1f} h" for name, end in ends if pd.notna(end)]
-        none = [name for name, end in ends if pd.isna(end)]
-        parts += [f"none by {', '.join(none)}"] if none else []
-        end = rows["measured_reattachment_over_h"].iloc[0]
-        measured = f"measured to {end:.1f} h" if pd.notna(end) else "none measured"
-        measured += "" if rows["measured_verified"].all() else " (unverified)"
-        yield (
-            f"Reversed flow behind the top of the hill of half length {hill:g} h: {measured}; "
-            f"{', '.join(parts)}."
+        names = [labels.value("turbulence_model", name) for name in rows["turbulence_model"]]
+        ends = dict(zip(names, rows["reattachment_over_h"], strict=True))
+        yield caption(
+            "hill",
+            hill=hill,
+            ends={name: end for name, end in ends.items() if pd.notna(end)},
+            without=[name for name, end in ends.items() if pd.isna(end)],
+            measured=rows["measured_reattachment_over_h"].iloc[0],
+            verified=rows["measured_verified"].all(),
         )
 
 
@@ -155,15 +141,9 @@ def _usable(table: pd.DataFrame) -> Iterator[str]:
 
 def _frozen(piles: pd.DataFrame) -> Iterator[str]:
     """Where the flow of the whole pile is known to be too little to go by."""
-    beyond = piles["frozen_bed"] > FROZEN_BED
-    if beyond.any():
-        least, largest = piles.loc[beyond, "fraction"].min(), piles["frozen_bed"].max()
-        yield (
-            "The flow of the whole pile acts until the last grain has gone. With "
-            f"`protocol.update = 0.1` the flow follows the bed: {int(beyond.sum())} of "
-            f"{len(piles)} thresholds then move by more than {FROZEN_BED:.0%} (up to "
-            f"{largest:.0%}, from n/N = {least:.0%} on; column frozen_bed)."
-        )
+    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
+    if len(beyond):
+        yield caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
 
 
 def _defaults(results: Results) -> Iterator[str]:
@@ -172,11 +152,7 @@ def _defaults(results: Results) -> Iterator[str]:
     if chosen:
         names = ", ".join(dict.fromkeys(one.levels.text for one in chosen if one.levels))
         error = max(one.known.total for one in chosen)
-        yield (
-            f"Answered by default on the levels {names}: at most {error:.0%} off DEM, less than "
-            f"the model's own choices move a threshold ({lowest_floor():.0%}). `--tolerance 0` "
-            "runs DEM."
-        )
+        yield caption("defaults", names=names, error=error, floor=lowest_floor())
 
 
 def _tolerance(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
@@ -187,11 +163,8 @@ def _tolerance(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
     low = 1 - rows["shields_model_low"] / rows["shields"]
     high = rows["shields_model_high"] / rows["shields"] - 1
     if tolerance < float(((low + high) / 2).min()):
-        yield (
-            f"The tolerance of {tolerance:.0%} is about numerics. The choices that all models here "
-            f"share move the same thresholds by −{low.max():.0%} … +{high.max():.0%}, most by "
-            f"{rows['model_share'].mode().iloc[0]} (see `orchestrator budget`)."
-        )
+        ends, share = (low.max(), high.max()), rows["model_share"].mode().iloc[0]
+        yield caption("tolerance", tolerance=tolerance, ends=ends, share=share)
 
 
 def sheet(results: Results) -> pd.DataFrame | None:
