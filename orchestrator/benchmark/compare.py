@@ -332,13 +332,7 @@ def _put(
 
 
 def content(path: Path) -> bytes:
-    """The bytes of an answer.
-
-    Raises
-    ------
-    AnswerError
-        If there is no file, or it is too large for an answer.
-    """
+    """The bytes of an answer; raises AnswerError if there is no plain file, or it is too large."""
     try:
         state = path.lstat()
         if not stat.S_ISREG(state.st_mode):
@@ -353,9 +347,7 @@ def content(path: Path) -> bytes:
 
 
 def parsed(data: bytes) -> pd.DataFrame:
-    """The answers of a file: columns ``quantity``, ``place`` and ``answer``.
-
-    ``place`` is the number ``at`` to seven digits, however the solver writes it.
+    """The answers of a file: columns ``quantity``, ``place`` (see `place_of`) and ``answer``.
 
     Raises
     ------
@@ -364,21 +356,17 @@ def parsed(data: bytes) -> pd.DataFrame:
     """
     try:
         text = data.decode("utf-8-sig")  # some programs begin a text with a mark of its encoding
-        head, *lines = [
-            [word.strip() for word in row] for row in csv.reader(text.splitlines())
-        ] or [[]]
+        lines = [[word.strip() for word in row] for row in csv.reader(text.splitlines())]
     except (UnicodeDecodeError, csv.Error) as error:
         raise AnswerError(f"{ANSWER} is no table: {error}") from None
-    if head != COLUMNS:
+    if lines[:1] != [COLUMNS]:
         raise AnswerError(f"{ANSWER} does not begin with {','.join(COLUMNS)}")
     rows = []
-    for number, row in enumerate(lines, 2):
-        if not row:
-            continue
-        if len(row) != len(COLUMNS):
+    for number, row in enumerate(lines[1:], 2):
+        if len(row) not in (0, len(COLUMNS)):
             raise AnswerError(f"{ANSWER}, line {number}: {len(row)} fields in place of 3")
         try:
-            rows.append((row[0], place_of(row[1]), _number(row[2])))
+            rows += [(row[0], place_of(row[1]), _number(row[2]))] if row else []
         except ValueError:
             what = f"{','.join(row)[:80]!r} holds no finite number below {LARGEST:g}"
             raise AnswerError(f"{ANSWER}, line {number}: {what}") from None
@@ -429,7 +417,8 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
                 answer = parsed(content(results / name / ANSWER))
             except AnswerError as fault:
                 error = str(fault)
-        if os.path.lexists(path := results / OURS / name / ANSWER):
+        path = results / OURS / name / ANSWER
+        if os.path.lexists(path):
             try:
                 again = parsed(content(path))
             except AnswerError as fault:

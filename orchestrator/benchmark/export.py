@@ -4,7 +4,7 @@ import re
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,19 +43,17 @@ PRINTED = {
     "time of passing": ("passing_time_over_t", ""),
 }
 """What the check decks print, and the quantities of a pack."""
-NAMED = {
-    "alpha_deg": ("{:g}deg", 1.0),
-    "beta_deg": ("beta{:g}", 1.0),
-    "h_m": ("h{:g}mm", 1e3),
-    "d_m": ("d{:g}mm", 1e3),
-    "z0_over_d": ("z{:.3g}d", 1.0),
-    "nu_m2_s": ("nu{:g}", 1.0),
-    "packing": ("{}", 1),
-    "force_law": ("{}", 1),
-    "stress": ("{}", 1),
-    "seed": ("seed{:g}", 1),
+NAMED: dict[str, Callable[[Any], str]] = {
+    "alpha_deg": "{:g}deg".format,
+    "beta_deg": "beta{:g}".format,
+    "h_m": lambda h: f"h{1e3 * h:g}mm",
+    "d_m": lambda d: f"d{1e3 * d:g}mm",
+    "z0_over_d": "z{:.3g}d".format,
+    "nu_m2_s": "nu{:g}".format,
+    **dict.fromkeys(("packing", "force_law", "stress"), str),
+    "seed": "seed{:g}".format,
 }
-"""Columns that name a scene where they differ between the scenes of a study, with a unit."""
+"""Columns that name a scene where they differ between the scenes of a study."""
 
 
 def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
@@ -196,19 +194,11 @@ def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
             columns = [name for name in columns if name in of_flow]
         counts: Counter[str] = Counter()
         for digest, row in values.iterrows():
-            words = [
-                NAMED[c][0].format(_scaled(row[c], NAMED[c][1]))
-                for c in columns
-                if pd.notna(row[c])
-            ]
+            words = [NAMED[column](row[column]) for column in columns if pd.notna(row[column])]
             name = re.sub("[^a-z0-9.+]+", "-", "-".join([kind, *words]).lower())
             counts[name] += 1
             names[str(digest)] = name if counts[name] == 1 else f"{name}-{counts[name]}"
     return names
-
-
-def _scaled(value: Any, unit: float) -> Any:
-    return value if isinstance(value, str) else unit * value
 
 
 def _has_decks() -> bool:

@@ -50,17 +50,9 @@ COSTS = (
     "steps, M/s is millions of them a second of CPU time, times the mobile grains."
 )
 SHOWN = {
-    "solver": "solver",
-    "scene": "scene",
-    "kind": "kind",
-    "passed": "passed",
-    "error": "error, %",
-    "worst": "largest, %",
-    "seconds": "s",
-    "ours_seconds": "ours, s",
-    "ratio": "ratio",
-    "cpu_ratio": "CPU ratio",
-    "peak_mib": "MiB",
+    **{name: name for name in ("solver", "scene", "kind", "passed")},
+    **{"error": "error, %", "worst": "largest, %", "seconds": "s", "ours_seconds": "ours, s"},
+    **{"ratio": "ratio", "cpu_ratio": "CPU ratio", "peak_mib": "MiB"},
 }
 """Columns of the table of scenes."""
 
@@ -157,26 +149,20 @@ def costs(chosen: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
 
 def _looks(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
     """A colour for each solver, and rings one in the other: equal answers hide none."""
+    sizes = range(2 * len(contenders) + 1, 1, -2)
     return [
-        {
-            "color": COLOURS[number % len(COLOURS)],
-            "ms": 2 * (len(contenders) - number) + 1,
-            "mfc": "none",
-            "mew": 0.7,
-        }
-        for number in range(len(contenders))
+        {"color": COLOURS[number % len(COLOURS)], "ms": size, "mfc": "none", "mew": 0.7}
+        for number, size in enumerate(sizes)
     ]
 
 
 def _legends(canvas: Canvas, contenders: Sequence[Contender], *others: Line2D) -> None:
-    colours = [look["color"] for look in _looks(contenders)]
     names = [
-        Line2D([], [], color=colour, lw=2.5, label=one.name)
-        for one, colour in zip(contenders, colours, strict=True)
+        Line2D([], [], color=look["color"], lw=2.5, label=one.name)
+        for one, look in zip(contenders, _looks(contenders), strict=True)
     ]
     canvas.legend(handles=names, loc="outside upper center", ncols=6)
-    if others:
-        canvas.legend(handles=list(others), loc="outside lower center", ncols=3)
+    canvas.legend(handles=list(others), loc="outside lower center", ncols=3)
 
 
 def _canvas(height: float) -> Canvas:
