@@ -88,7 +88,7 @@ def write(chosen: Pack, contenders: Sequence[Contender], folder: Folder) -> None
         ]
         names = ", ".join(one.name for one in contenders)
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
-        shown = [one for one in sections if one.figures or any(t.rows for t in one.tables)]
+        shown = [one for one in sections if one.figures or any(len(table) for table in one.tables)]
         document.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
 
 
