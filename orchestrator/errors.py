@@ -11,6 +11,17 @@ from typing import ClassVar
 
 LONGEST = 400
 """Characters of a message's place, cause and remedy, each."""
+_REMEDIES = {
+    errno.ENOSPC: "make room, then the same command continues",
+    errno.EDQUOT: "make room, then the same command continues",
+    errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
+    errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
+    errno.EMFILE: "raise the limit: ulimit -n 1024",
+    errno.ENFILE: "too many files are open on this machine",
+    errno.ENOMEM: "free memory, or raise its limit: ulimit -v",
+    errno.EAGAIN: "too many processes? See ulimit -u",
+    errno.ENAMETOOLONG: "choose a shorter path",
+}
 
 
 class OrchestratorError(Exception):
@@ -29,9 +40,7 @@ class OrchestratorError(Exception):
     exit_code = 1
 
     def __init__(self, what: str, where: str = "", remedy: str = "") -> None:
-        self.what = what
-        self.where = where
-        self.remedy = remedy
+        self.what, self.where, self.remedy = what, where, remedy
         super().__init__(what, where, remedy)
 
     def __str__(self) -> str:
@@ -57,16 +66,15 @@ class InputError(OrchestratorError):
     exit_code = 2
 
 
-class Fault(OrchestratorError):  # noqa: N818 - of the program, not of what the user gave
+class Fault(OrchestratorError):  # noqa: N818
     """An exception that nobody foresaw: a fault of this program."""
 
 
 class SolverError(OrchestratorError):
-    """A solver is missing, or its run did not end as it must."""
+    """A solver is missing, or its run did not end as it must; `ended` is the kind of its end."""
 
     exit_code = 3
     ended: ClassVar[str] = "failed"
-    """One word for the kind of end."""
 
 
 class Exploded(SolverError):  # noqa: N818
@@ -93,30 +101,17 @@ class Interrupted(OrchestratorError):  # noqa: N818
     exit_code = 130
 
 
-_REMEDIES = {
-    errno.ENOSPC: "make room, then the same command continues",
-    errno.EDQUOT: "make room, then the same command continues",
-    errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
-    errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
-    errno.EMFILE: "raise the limit: ulimit -n 1024",
-    errno.ENFILE: "too many files are open on this machine",
-    errno.ENOMEM: "free memory, or raise its limit: ulimit -v",
-    errno.EAGAIN: "too many processes? See ulimit -u",
-    errno.ENAMETOOLONG: "choose a shorter path",
-}
-
-
 def of_system(error: OSError, where: str = "") -> OrchestratorError:
     """The message of a failure of the system, at `where` or the file that the error names."""
     # shutil collects the failure of each file: the first one is given
     text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
-    is_full = error.errno == errno.ENOSPC or "No space left" in (text or "")
+    if error.errno == errno.ENOSPC or "No space left" in (text or ""):
+        text, remedy = "no space is left on the disk", _REMEDIES[errno.ENOSPC]
+    else:
+        remedy = _REMEDIES.get(error.errno or 0, "see the file system")
     name = error.filename
-    return OrchestratorError(
-        "no space is left on the disk" if is_full else text or str(error),
-        where=where or ("" if name is None or isinstance(name, int) else os.fsdecode(name)),
-        remedy=_REMEDIES.get(errno.ENOSPC if is_full else error.errno or 0, "see the file system"),
-    )
+    place = where or ("" if name is None or isinstance(name, int) else os.fsdecode(name))
+    return OrchestratorError(text or str(error), place, remedy)
 
 
 def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
@@ -132,17 +127,17 @@ def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
     if isinstance(error, OSError):
         return of_system(error, "" if error.filename else where)
     if "can't start new thread" in str(error):
-        remedy = "fewer --workers, or a higher limit: ulimit -u"
-        return OrchestratorError("no more threads can be started", where, remedy)
-    if isinstance(error, MemoryError) or (is_at_import and "failed to map" in str(error)):
-        remedy = "fewer --workers, or a higher limit: ulimit -v"
-        return OrchestratorError("there is not enough memory", where, remedy)
-    if isinstance(error, ImportError | SyntaxError) or is_at_import:
+        what, remedy = "no more threads can be started", "fewer --workers, or ulimit -u"
+    elif isinstance(error, MemoryError) or (is_at_import and "failed to map" in str(error)):
+        what, remedy = "there is not enough memory", "fewer --workers, or ulimit -v"
+    elif isinstance(error, ImportError | SyntaxError) or is_at_import:
+        what = f"a library does not load: {error}"
         remedy = "`orchestrator doctor` says what is missing"
-        return OrchestratorError(f"a library does not load: {error}", where, remedy)
-    at = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
-    what = f"a fault of this program: {type(error).__name__}: {error}{at}"
-    return Fault(what, where, "report it, with the study file")
+    else:
+        at = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+        what = f"a fault of this program: {type(error).__name__}: {error}{at}"
+        return Fault(what, where, "report it, with the study file")
+    return OrchestratorError(what, where, remedy)
 
 
 def unknown_key(
@@ -158,5 +153,4 @@ def unknown_key(
     near = [written for name, written in elsewhere if name in there]
     close = same or difflib.get_close_matches(key, known, n=1) or near
     meant, listed = f"did you mean {' or '.join(close)}?", f"known keys: {', '.join(sorted(known))}"
-    hint = meant if close else listed
-    return InputError("unknown key", where=where, remedy=hint)
+    return InputError("unknown key", where, meant if close else listed)

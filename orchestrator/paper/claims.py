@@ -17,30 +17,15 @@ from orchestrator.report import page
 from orchestrator.tables import Tables
 
 FILE = Path(__file__).with_name("claims.toml")
-WORDS: dict[Verdict, str] = {
-    "reproduced": "reproduced",
-    "partly": "partly",
-    "not": "not reproduced",
-}
-"""The verdicts as the page has them."""
 
 
 @dataclass(frozen=True)
 class Claim:
     """A claim of the paper.
 
-    Attributes
-    ----------
-    says, where : str
-        The paper's words in short, and its section or figure.
-    measure : callable
-        The comparisons that judge it, from the tables of a study.
-    verdict : {"reproduced", "partly", "not"}
-        The verdict on the data of the preset ``paper``, which `why` explains.
-    why : str
-        The physics behind that verdict.
-    figures : tuple of str
-        How the names of the page's figures that show it begin.
+    `says` is the paper's words in short, `where` its section or figure, and `verdict` that on the
+    data of the preset ``paper``, which `why` explains. `measure` gives the comparisons that judge
+    the claim; names of the page's figures that show it begin with one of `figures`.
     """
 
     says: str
@@ -86,14 +71,8 @@ def judge(tables: Tables) -> list[Judged]:
 def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: bool) -> Markup:
     """The report card as a section of the page; empty where no claim could be judged.
 
-    Parameters
-    ----------
-    judged : sequence of Judged
-        As `judge` gives them.
-    figures : sequence of str
-        Names of the page's figures, in its order.
-    has_tolerance : bool
-        Whether the study was answered with a tolerance, which takes scenes away from DEM.
+    `figures` are the names of the page's figures in their order. With a tolerance (`has_tolerance`)
+    many scenes are answered without DEM, which the section says.
     """
     entries = [one for one in judged if one.verdict != "no data"]
     counts = Counter(one.verdict for one in entries)
@@ -103,8 +82,7 @@ def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: boo
     ]
     values = {
         "entries": list(zip(entries, shown, strict=True)),
-        "counts": [f"{count} {WORDS[verdict]}" for verdict, count in counts.items()],
-        "words": WORDS,
+        "counts": counts,
         "rule": RULE,
         "lacking": [one for one in judged if one.verdict == "no data"],
         "has_tolerance": has_tolerance,

@@ -23,19 +23,9 @@ RULE = (
 class Comparison:
     """Values of one quantity in many scenes, and the range in which a claim has them.
 
-    Attributes
-    ----------
-    name : str
-        The quantity and the scenes.
-    values : array_like
-        Numbers, NaN where a scene has none; or bools, whether the claim is true of a scene.
-    above, below : float
-        A claim is true of a scene whose value is above the one and not above the other; without
-        either, numbers are shown and not judged.
-    form : str
-        Format of the numbers.
-    is_judged : bool
-        False for bools that are only shown.
+    `values` are numbers, NaN where a scene has none, printed by `form`; the claim is true of those
+    `above` the one bound and not above the other, `below`. Without a bound they are shown and not
+    judged. Bools say themselves if the claim is true, and are judged unless `is_judged` is False.
     """
 
     name: str
@@ -45,15 +35,9 @@ class Comparison:
     form: str = ".3g"
     is_judged: bool = True
 
-    @cached_property
-    def numbers(self) -> FloatArray:
-        """The values that there are."""
-        values: FloatArray = np.asarray(self.values, float)
-        return values[~np.isnan(values)]
-
     @property
     def has_bools(self) -> bool:
-        """Whether the values say by themselves if the claim is true."""
+        """Whether the values are the answers themselves."""
         return np.asarray(self.values).dtype == bool
 
     @property
@@ -61,12 +45,17 @@ class Comparison:
         """Whether the verdict of a claim depends on these values."""
         return self.is_judged and (self.has_bools or self.above > -np.inf or self.below < np.inf)
 
+    @cached_property
+    def numbers(self) -> FloatArray:
+        """The values without those that are missing."""
+        values: FloatArray = np.asarray(self.values, float)
+        return values[~np.isnan(values)]
+
     @property
     def true(self) -> BoolArray:
         """Whether the claim is true, for each of the `numbers`."""
-        if self.has_bools:
-            return self.numbers > 0
-        return (self.numbers > self.above) & (self.numbers <= self.below)
+        above = 0.0 if self.has_bools else self.above
+        return (self.numbers > above) & (self.numbers <= self.below)
 
     @property
     def verdict(self) -> Verdict:
