@@ -182,13 +182,7 @@ def run(
 
 
 def load(source: str | Path, tolerance: float | None = None, name: str = "tolerance") -> Study:
-    """Read a study file or a preset, to be answered with a tolerance that messages call `name`.
-
-    Raises
-    ------
-    InputError
-        If it is no study, or the tolerance is no relative error.
-    """
+    """Read a study file or a preset, to be answered with a tolerance that messages call `name`."""
     asked = study.load(str(_path(source, "source")), [paper.PRESETS])
     if tolerance is None:
         return asked

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +23,10 @@ from orchestrator.study.study import Study, parse
 
 @dataclass(frozen=True)
 class Finished:
-    """Outcome of a study.
+    """Outcome of a study: its page, the number of cases that were run, and those that failed.
 
-    Attributes
-    ----------
-    page : Path
-        The page.
-    started : int
-        Number of cases that were run.
-    failures : dict of str to OrchestratorError
-        The cases that failed, with the causes.
-    left : tuple of str
-        If the study has changed since the last time, the cases that it does not ask for now.
-    answer : str
-        The answer, for a terminal.
+    `left` are the cases of an earlier study file that this one does not ask for, and `answer` is
+    the answer for a terminal.
     """
 
     page: Path
@@ -101,10 +92,7 @@ def run(
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     """Write into the directory what is asked for; whether it is something else than before.
 
-    Raises
-    ------
-    InputError
-        If the directory is of another study file of the same name, which is still there.
+    An `InputError` if the directory is of another study file of the same name, still there.
     """
     about = {"study": study.text, "tolerance": study.tolerance}
     before = read_marker(space.root, STUDY) or {}
@@ -140,11 +128,8 @@ def complete(
     """
     if not todo:
         return {}
-    opened = (
-        cluster.pool(queue, space.cases, workers=workers, limit_s=limit_s)
-        if queue
-        else engine.local(space.cases, workers=workers, limit_s=limit_s)
-    )
+    make_pool = partial(cluster.pool, queue) if queue else engine.local
+    opened = make_pool(space.cases, workers=workers, limit_s=limit_s)
     forecast = Forecast(todo.values(), workers, after_s)
     with opened as pool, Display(forecast, space.cases) as display:
         engine.check_solvers(todo.values(), pool)
@@ -166,13 +151,7 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
 
 
 def prune(directory: Path) -> str:
-    """Drop the large files of a study's finished cases that no picture of its page is drawn from.
-
-    Raises
-    ------
-    OrchestratorError
-        If the directory holds no study, or it is being run.
-    """
+    """Drop the large files of finished cases, but for those that the page is drawn from."""
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
     with space.held(STUDY, study.name, new=False):

@@ -32,14 +32,11 @@ class Plan:
 
     Attributes
     ----------
-    decisions : dict of str to Decision
-        By the id of the scene that was asked for: how it is answered, and why.
-    piles : dict of str to Pile
-        By the same id.
+    decisions, piles, checks : dict
+        By the id of the scene that was asked for: how it is answered, and why; its pile; a pile by
+        DEM that checks an answer without DEM.
     cells : tuple of SingleGrainCase
         Each answers all of its scenes.
-    checks : dict of str to Pile
-        Piles by DEM that check answers without it, by the id of the scene asked for.
     cases : dict of str to Case
         Every run once, by name, a case after those whose results it needs.
     """
@@ -90,14 +87,13 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         the field.
     """
     limits.check_study(study)
-    decisions = {}
-    for scene in study.scenes:
-        bound = (above or {}).get(scene.id, NO_BOUND)
-        decisions[scene.id] = (
-            by_default(scene, bound)
-            if study.tolerance is None
-            else decide(scene, study.tolerance, bound)
-        )
+    bounds = {scene.id: (above or {}).get(scene.id, NO_BOUND) for scene in study.scenes}
+    decisions = {
+        scene.id: by_default(scene, bounds[scene.id])
+        if study.tolerance is None
+        else decide(scene, study.tolerance, bounds[scene.id])
+        for scene in study.scenes
+    }
     return of(decisions, study.name, study.tolerance, cases)
 
 
