@@ -88,7 +88,8 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
     name = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
-    return caption("pile", row=row, name=name, single=single, flow=_flow(row, row["ustar0_m_s"]))
+    flow, why = _flow(row, row["ustar0_m_s"]), "" if row["usable"] else row["why_not"]
+    return caption("pile", row=row, name=name, single=single, flow=flow, why=why)
 
 
 def _grains(grains: pd.DataFrame) -> Iterator[str]:
@@ -103,8 +104,8 @@ def _grains(grains: pd.DataFrame) -> Iterator[str]:
             names = ("ustar_closed_form_m_s", "shields_closed_form")
         ustar, shields = (row[name] for name in names)
         size, slope = labels.millimetres(row["d_m"]), labels.value("alpha_deg", row["alpha_deg"])
-        flow = _flow(row, ustar)
-        yield caption("one_grain", row=row, size=size, slope=slope, shields=shields, flow=flow)
+        facts = {"flow": _flow(row, ustar), "why": "" if row["usable"] else row["why_not"]}
+        yield caption("one_grain", size=size, slope=slope, shields=shields, **facts)
 
 
 def _flow(row: pd.Series, ustar: float) -> str:
