@@ -11,6 +11,7 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from orchestrator.fidelity import calibration
 from orchestrator.fidelity.calibration import UNKNOWN, Known
@@ -97,7 +98,7 @@ class Bound:
 
 
 NO_BOUND = Bound()
-THEORY = Bound(flow=level("flow", "waves"))
+THEORY = level("flow", "waves")
 """Above it the flow is solved."""
 CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
 """Above it are the levels that check an answer without DEM."""
@@ -127,8 +128,17 @@ def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> De
     """
     if not tolerance:
         return as_asked(scene)
-    if why := _asks_for(scene):
+    # the levels approximate DEM in a held, solved flow; over a level bed no flow is solved
+    rules, model = scene.protocol, scene.flow.model
+    if rules.method != "dem":
+        return as_asked(scene, f"the study asks for the method {rules.method}")
+    if model not in ("solve", solved_model(scene)):
+        return as_asked(scene, f"the study asks for the flow model {model}")
+    if rules.update:
+        why = "the study asks for a bed that changes, for which no error is known"
         return as_asked(scene, why)
+    if rules.waiting_time < LEAST_HELD:
+        return as_asked(scene, "the study asks for a ramp of the flow")
     if not isinstance(scene.bed, PileBed):
         if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
             return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
@@ -152,28 +162,24 @@ def by_default(scene: Scene, above: Bound = NO_BOUND) -> Decision:
     alike. Single grains, poured beds, classes without a measured spread, and all that sets a field
     about the answer are answered as asked.
     """
-    if not leaves_open(scene) or math.isnan(calibration.floor(calibration.model_class(scene))):
+    is_set = any(
+        field in getattr(scene, part).model_fields_set
+        for quantity in fields.FIELDS
+        if quantity.info.about == "answer"
+        for part, _, field in (quantity.name.partition("."),)
+    )
+    if is_set or scene.is_poured or not isinstance(scene.bed, PileBed):
+        return as_asked(scene)
+    if math.isnan(calibration.floor(calibration.model_class(scene))):
         return as_asked(scene)
     floor = calibration.lowest_floor()
-    chosen = decide(scene, floor, replace(above, flow=above.flow or THEORY.flow))
+    chosen = decide(scene, floor, replace(above, flow=above.flow or THEORY))
     if chosen.is_as_asked or not chosen.levels:
         return chosen
     which = "cheapest" if chosen.known.total <= floor else NONE_WITHIN
     why = f"chosen by default: {which} within the model's own spread of {floor:.0%}"
     because = f"; {above.because}" if above.because else ""
     return replace(chosen, why=why + because, by_default=True)
-
-
-def leaves_open(scene: Scene) -> bool:
-    """Whether the study file of a pile sets none of the fields that are about the answer."""
-    if not isinstance(scene.bed, PileBed) or scene.is_poured:
-        return False
-    return not any(
-        field in getattr(scene, part).model_fields_set
-        for quantity in fields.FIELDS
-        if quantity.info.about == "answer"
-        for part, _, field in (quantity.name.partition("."),)
-    )
 
 
 def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:
@@ -191,42 +197,25 @@ def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
     return Decision(scene, pair.answer(scene), pair, calibration.known(pair, scene), why)
 
 
-def _asks_for(scene: Scene) -> str:
-    """How a scene wants to be answered; empty where the tool may choose.
-
-    It may choose where DEM in a held, solved flow is asked for, which the levels approximate. Over
-    a level bed no flow is solved.
-    """
-    if scene.protocol.method != "dem":
-        return f"the study asks for the method {scene.protocol.method}"
-    if scene.flow.model not in ("solve", solved_model(scene)):
-        return f"the study asks for the flow model {scene.flow.model}"
-    if scene.protocol.update:
-        return "the study asks for a bed that changes, for which no error is known"
-    if scene.protocol.waiting_time < LEAST_HELD:
-        return "the study asks for a ramp of the flow"
-    return ""
-
-
-Names = tuple[str, ...]
-
-
 @cache  # a study has thousands of scenes of a few classes
 def _cheapest(
     flow: tuple[Level, ...],
     grains: tuple[Level, ...],
-    flow_classes: Names,
-    grain_classes: Names,
+    flow_classes: tuple[str, ...],
+    grain_classes: tuple[str, ...],
     above: Bound,
     tolerance: float,
 ) -> tuple[Pair | None, str]:
     """The cheapest pair of some levels, and why; None where nothing is known."""
-    # over a level bed there is no other flow
-    level_bed = flow_classes == (calibration.LEVEL_BED,)
-    flows = (FLAT,) if level_bed else _above(flow, above.flow)
+    offered = []
+    for levels, bound in ((flow, above.flow), (grains, above.grains)):
+        start = levels.index(bound) + 1 if bound in levels else 0
+        offered.append([one for one in levels[start:] if one.same_model])
+    if flow_classes == (calibration.LEVEL_BED,):
+        offered[0] = [FLAT]
     known = {
         Pair(*pair): calibration.known_of_classes(*pair, flow_classes, grain_classes)
-        for pair in itertools.product(flows, _above(grains, above.grains))
+        for pair in itertools.product(*offered)
     }
     pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
     within = next((pair for pair in pairs if known[pair].total <= tolerance), None)
@@ -238,11 +227,6 @@ def _cheapest(
     # errors below the uncertainty of the reference cannot be ranked
     enough = next(pair for pair in pairs if known[pair].error <= best)
     return enough, f"{NONE_WITHIN} within the tolerance"
-
-
-def _above(levels: tuple[Level, ...], bound: Level | None) -> Iterator[Level]:
-    start = levels.index(bound) + 1 if bound in levels else 0
-    return (level for level in levels[start:] if level.same_model)
 
 
 def check_group(scene: Scene) -> str:
@@ -264,7 +248,7 @@ def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decis
     Returns
     -------
     dict of str to Decision
-        By the id of the scene asked for whose answer it checks.
+        By the same ids, of those whose answer is checked.
     """
     groups: dict[str, list[tuple[float, str, Decision]]] = {}
     for asked, answer in answers.items():
@@ -278,8 +262,7 @@ def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decis
     return {asked: check for _, asked, check in cheapest}
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """An answer without DEM and that of DEM, at one fraction of one pile."""
 
     cheap: PileThreshold

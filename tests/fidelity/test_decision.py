@@ -68,7 +68,6 @@ def test_the_choice_is_the_cheapest_within_the_tolerance_or_says_that_none_is(
         ({"bed.packing": "disordered", "bed.disorder": 0.2}, "no error is known"),
         ({"forces.averaging_length": 10.0}, "averaging_length = 10"),
         ({"flow.first_cell_height": 0.005}, "first cells of 0.005 m"),
-        ({"flow.top": "open water", "flow.depth": 0.1, "flow.speed": 1.0}, "no error is known"),
         ({"forces.law": "low", "bed.slope_deg": 20.0}, "lift"),
     ],
 )
@@ -84,7 +83,10 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
 def test_open_water_is_answered_at_any_tolerance(pile: MakePile) -> None:
     """With a tolerance of 0.3 a theory was chosen that knows no water."""
     water = {"flow.top": "open water", "flow.depth": 0.1, "flow.speed": 1.0, "flow.viscosity": 1e-6}
-    assert plan.of({"a": decide(pile(water), 0.3)}, "water").cases
+    chosen = decide(pile(water), 0.3)
+    assert chosen.levels
+    assert chosen.scene.flow.model == "solve"
+    assert plan.of({"a": chosen}, "water").cases
 
 
 def test_lift_beyond_the_weight_has_no_known_error(pile: MakePile) -> None:

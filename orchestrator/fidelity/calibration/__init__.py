@@ -90,12 +90,12 @@ STATED = ("packing", "roughness length", "entrainment angle", "friction angle", 
 """Choices whose values a study file states."""
 
 
-def scene_class(part: str, scene: Scene) -> str:
+def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     """The class under which the known error of a level is measured on a scene.
 
     The class for the flow names how the stress is read and what is above the water; the class for
     the grains names their packing. Both name the form, and the limiting slope, on which a row
-    waits for a touch.
+    waits for a touch; or that there are obstacles, unless these are left out.
     """
     bed = scene.bed
     assert isinstance(bed, PileBed)
@@ -107,9 +107,16 @@ def scene_class(part: str, scene: Scene) -> str:
     elif name == "disordered":
         end = next(end for end in DISORDERS if bed.disorder <= end)
         name = f"disordered up to {end:g} d"
-    if not bed.is_triangle:
-        return name + _form(bed)
-    return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
+    if bed.is_triangle:
+        return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
+    if bed.obstacles and obstacles:
+        return f"{name}, obstacles"
+    if bed.shape == "flat" and not bed.profile:
+        return f"{name}, flat"
+    # on a curved bed a row has no edge where it could begin to leave, on straight faces it has
+    rounded = bed.profile or bed.brink_radius or bed.windward == "curved"
+    curved = rounded or bed.shape in ("cosine", "gaussian", "rushil")
+    return name + (", curved forms" if curved else ", straight forms")
 
 
 def classes(part: str, scene: Scene) -> tuple[str, ...]:
@@ -117,7 +124,7 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
 
     A slope between those that were measured belongs to both of its neighbours. So do level rows on
     any slope: which grain of a chain goes first is chaotic, and no slope is known better than
-    another.
+    another. A form with obstacles has the errors of both.
     """
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
@@ -125,21 +132,9 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     between = 1 <= scene.limiting_slope_deg - bed.slope_deg < BETWEEN_DEG
     if bed.is_triangle and (between or base == "horizontal"):
         return base, base + LIMITING
-    return (name,)
-
-
-def _form(bed: PileBed) -> str:
-    """Ending of a class: what was measured on triangles is not known of other forms.
-
-    On a curved bed a row has no edge where it could begin to leave, on straight faces it has.
-    """
     if bed.obstacles:
-        return ", obstacles"
-    if bed.shape == "flat" and not bed.profile:
-        return ", flat"
-    rounded = bed.profile or bed.brink_radius or bed.windward == "curved"
-    curved = rounded or bed.shape in ("cosine", "gaussian", "rushil")
-    return ", curved forms" if curved else ", straight forms"
+        return name, scene_class(part, scene, obstacles=False)
+    return (name,)
 
 
 def unmeasured(scene: Scene) -> str:
