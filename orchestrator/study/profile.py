@@ -149,7 +149,7 @@ def read_text(path: Path, largest: int, where: str) -> str:
     """
     try:
         with opened(path) as stream:
-            content = stream.read(largest + 1)
+            content = stream.read(largest + 1) or b""  # nothing of a file that would wait
         if len(content) > largest:
             raise ValueError(f"larger than {largest // 2**20} MiB")
         text = content.decode("utf-8-sig")  # some editors begin with a mark of the encoding

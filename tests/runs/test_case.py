@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -71,36 +70,6 @@ def test_a_finished_case_is_done_and_its_checksums_hold(finished: tuple[Tiny, Pa
     tiny, cases = finished
     assert case.is_done(tiny, cases)
     subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=cases / tiny.name, check=True)
-
-
-def _truncate(share: float) -> Callable[[Path], None]:
-    def harm(path: Path) -> None:
-        os.truncate(path, int(path.stat().st_size * share))
-
-    return harm
-
-
-def _garbage(path: Path) -> None:
-    path.write_bytes(b"\x00\xff{]")
-
-
-def _directory(path: Path) -> None:
-    path.unlink()
-    path.mkdir()
-
-
-HARMS = [*(_truncate(share) for share in (0, 0.25, 0.5, 0.75, 0.99)), _garbage, _directory]
-
-
-@pytest.mark.parametrize("name", [case.IDENTITY, case.DONE, "result.txt"])
-@pytest.mark.parametrize("harm", HARMS)
-def test_a_harmed_case_is_not_done(
-    finished: tuple[Tiny, Path], name: str, harm: Callable[[Path], None]
-) -> None:
-    tiny, cases = finished
-    harm(cases / tiny.name / name)
-    assert not case.is_done(tiny, cases)
-    case.prepare(tiny, cases)  # and it can be made again
 
 
 def test_a_file_is_read_again_only_if_its_time_or_size_has_changed(
