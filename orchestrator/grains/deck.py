@@ -113,31 +113,22 @@ def flows(first: float, last: float, step: float) -> FloatArray:
     return np.concatenate([[SETTLE_FLOW * first], rising])
 
 
-def cost_s(load_steps: float, grains: float, rules: Protocol, grain: Grain) -> float:
-    """Expected time of one core for a deck of a lattice, s: 4.5e7 grain-steps a second.
-
-    Measured on piles of 30 to 770 counted grains and 150 single ones, on one core: load steps of
-    twice the waiting time; they are shorter, and steps dearer, than that.
-    """
-    return _cost_s(load_steps * 2 * rules.waiting_time, grains, 4.5e7, rules, grain.stiffness)
-
-
-def poured_cost_s(
-    load_steps: float, grains: float, exposed: float, rules: Protocol, grain: Grain
+def cost_s(
+    load_steps: float, grains: float, rules: Protocol, grain: Grain, exposed: float = math.nan
 ) -> float:
-    """Expected time of one core for a deck of a poured bed, s: 6e6 grain-steps a second.
+    """Expected time of one core for a deck, s; `exposed` is how many grains a poured bed exposes.
 
-    The more grains are exposed, the more often one passes before all have waited: load steps of
-    2000 took four times as long as those of 100. The smallest grain sets the time step.
+    Lattices, measured with 30 to 770 counted grains: load steps of twice the waiting time, 4.5e7
+    grain-steps a second. Poured beds: 6e6, and the more grains are exposed, the more often one
+    passes before all have waited: load steps of 2000 took four times as long as those of 100. Their
+    smallest grain sets the time step.
     """
-    length = rules.waiting_time * (1 + exposed / 700)
-    small = math.pow(smallest(grain.sizes, grain.diameter), 1.5)
-    return _cost_s(load_steps * length / small, grains, 6e6, rules, grain.stiffness)
-
-
-def _cost_s(time: float, grains: float, rate: float, rules: Protocol, stiffness: float) -> float:
-    """Time of one core for a run of so many sqrt(d/g'), at a rate of grain-steps a second."""
-    return 0.1 + time * math.sqrt(stiffness) / rules.time_step * grains / rate
+    length, rate = 2 * rules.waiting_time, 4.5e7
+    if not math.isnan(exposed):
+        small = math.pow(smallest(grain.sizes, grain.diameter), 1.5)
+        length, rate = rules.waiting_time * (1 + exposed / 700) / small, 6e6
+    steps = load_steps * length * math.sqrt(grain.stiffness) / rules.time_step
+    return 0.1 + steps * grains / rate
 
 
 @dataclass(frozen=True)

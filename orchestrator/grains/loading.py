@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-FloatArray = NDArray[np.float64]
+from orchestrator.types import FloatArray
+
 Force = Callable[[FloatArray], FloatArray]
 """Size of a force (N) at local friction velocities (m/s) of at least 0."""
 

@@ -12,7 +12,7 @@ the deck; rolling needs no friction.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -40,31 +40,14 @@ class Disc(NamedTuple):
     z: float
     radius: float
 
-    @property
-    def place(self) -> Place:
-        """Its centre."""
-        return self.x, self.z
-
 
 @dataclass(frozen=True)
 class _Roller:
-    """A grain that the flow pushes, in the plane of the flow.
+    """A grain that the flow pushes, and its neighbours by their numbers; lengths in d.
 
     The plane is mirrored where the flow pushes the grain upstream, so that it always goes towards
-    +x. Lengths are in d, forces over the grain's weight.
-
-    Attributes
-    ----------
-    start : Disc
-        The grain at its place.
-    others : dict
-        Its neighbours, by their numbers.
-    table : ForceTable
-        Its forces.
-    ratio : float
-        Size of the local friction velocity over the undisturbed one.
-    along, outward : sequence of float
-        Unit vectors along the bed, the way that the flow pushes, and out of it.
+    +x; `along` and `outward` are the unit vectors of that way and out of the bed, `ratio` the size
+    of the local friction velocity over the undisturbed one.
     """
 
     start: Disc
@@ -74,13 +57,9 @@ class _Roller:
     along: Sequence[float]
     outward: Sequence[float]
 
-    def foremost(self, numbers: Sequence[int]) -> int | None:
-        """The contact, of some neighbours, that lies farthest round from below towards +x."""
-        return _foremost(self.start, {k: self.others[k] for k in numbers})
-
     def flow_over(self, place: Place, pivot: Disc) -> float:
         """The flow (u*_0) at which the resultant passes through a contact: no moment about it."""
-        lean = _lean(place, pivot.place)
+        lean = _lean(place, pivot[:2])
         x, z = math.cos(lean), math.sin(lean)
         drag_arm = self.along[0] * x + self.along[1] * z
         lift_arm = self.outward[0] * x + self.outward[1] * z
@@ -88,7 +67,7 @@ class _Roller:
 
     def way(self, numbers: Sequence[int], criterion: float) -> tuple[float, list[int]]:
         """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
-        place, pivot = self.start.place, self.foremost(numbers)
+        place, pivot = self.start[:2], _foremost(self.start, self.others, numbers)
         flow, rolled = 0.0, []
         while pivot is not None:
             rolled.append(pivot)
@@ -100,7 +79,7 @@ class _Roller:
                 break
             place, pivot = met
             travel = sum(
-                (a - b) * t for a, b, t in zip(place, self.start.place, self.along, strict=True)
+                (a - b) * t for a, b, t in zip(place, self.start[:2], self.along, strict=True)
             )
             if travel >= (criterion - 1e-9) * 2 * self.start.radius:
                 break
@@ -115,7 +94,7 @@ class _Roller:
         nearest: tuple[float, int] | None = None
         for k in numbers:
             other = self.others[k]
-            apart, touch = math.dist(other.place, pivot.place), self.start.radius + other.radius
+            apart, touch = math.dist(other[:2], pivot[:2]), self.start.radius + other.radius
             if not abs(arm - touch) < apart < arm + touch:
                 continue
             cosine = (arm * arm + apart * apart - touch * touch) / (2 * arm * apart)
@@ -194,8 +173,8 @@ def pivots(
     pushed = loading.ratio != 0
     if not places.width:
         for i, roller in _rollers(places, sizes, loading, tables, pushed):
-            pivot = roller.foremost(list(roller.others))
-            start = roller.start.place
+            pivot = _foremost(roller.start, roller.others, roller.others)
+            start = roller.start[:2]
             found[i] = 0.0 if pivot is None else roller.flow_over(start, roller.others[pivot])
         return found
     for i, sides in _pyramids(places, sizes, pushed):
@@ -218,10 +197,10 @@ def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> Fl
     if not places.width:
         discs = _discs(places, sizes, 1.0)
         for i, near in _neighbours(places, sizes, every):
-            pivot = _foremost(discs[i], {k: discs[k] for k in near})
+            pivot = _foremost(discs[i], discs, near)
             if pivot is not None:
                 slope = math.atan2(along[i, 1], along[i, 0])
-                found[i] = math.degrees(_lean(discs[i].place, discs[pivot].place) - slope)
+                found[i] = math.degrees(_lean(discs[i][:2], discs[pivot][:2]) - slope)
         return found
     outward = np.column_stack([-along[:, 1], along[:, 0]])
     for i, sides in _pyramids(places, sizes, every):
@@ -278,14 +257,16 @@ def _by_grain(
         yield i, order[ends[i] : ends[i + 1]]
 
 
-def _foremost(grain: Disc, others: dict[int, Disc]) -> int | None:
-    """The contact of a grain that lies farthest round towards +x, from below."""
+def _foremost(
+    grain: Disc, discs: dict[int, Disc] | list[Disc], numbers: Iterable[int]
+) -> int | None:
+    """The contact of a grain, of some others, that lies farthest round towards +x, from below."""
     touching = [
         k
-        for k, other in others.items()
-        if math.dist(other.place, grain.place) < (1 + TOUCH) * (grain.radius + other.radius)
+        for k in numbers
+        if math.dist(discs[k][:2], grain[:2]) < (1 + TOUCH) * (grain.radius + discs[k].radius)
     ]
-    return max(touching, key=lambda k: _lean(grain.place, others[k].place), default=None)
+    return max(touching, key=lambda k: _lean(grain[:2], discs[k][:2]), default=None)
 
 
 def _lean(place: Place, neighbour: Place) -> float:

@@ -311,11 +311,9 @@ class PileCase(GrainCase):
         """Expected time of one core, s."""
         rules, grain, width = self.scene.protocol, self.scene.grain, self.geometry.bed.width
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
-        if self.geometry.pouring:
-            size = self._size * (IN_SPACE if width else 1)
-            exposed = self._length * (width or 1)
-            return deck.poured_cost_s(load_steps, size, exposed, rules, grain)
-        return deck.cost_s(load_steps, self._size, rules, grain)
+        size = self._size * (IN_SPACE if width else 1)
+        exposed = self._length * (width or 1) if self.geometry.pouring else np.nan
+        return deck.cost_s(load_steps, size, rules, grain, exposed)
 
     @property
     def ranks(self) -> int:
@@ -344,7 +342,10 @@ class PileCase(GrainCase):
             rising = flows(loads)
         else:
             reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
-            rising = flows_from(reached, loads, worn.present)
+            # the run goes on from the flow that the one before has reached
+            thresholds, step = loads.leaving(worn.present), rules.load_increment
+            last = thresholds[np.isfinite(thresholds)].max(initial=reached)
+            rising = deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
         packed = geometry.packing
         enough = int((1 - rules.final_fraction) * packed.count + 1e-9)
         if rules.update:
@@ -440,14 +441,6 @@ def _first(thresholds: FloatArray, geometry: Geometry) -> float:
     if geometry.pouring and len(held):
         return float(held[int(EARLY * len(held))])
     return float(thresholds[0]) if len(thresholds) else 0.0
-
-
-def flows_from(reached: float, loads: Loads, present: BoolArray) -> FloatArray:
-    """The flows where a run goes on from that which the one before has reached."""
-    step = loads.geometry.scene.protocol.load_increment
-    thresholds = loads.leaving(present)
-    last = thresholds[np.isfinite(thresholds)].max(initial=reached)
-    return deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
 
 
 def table(loads: Loads, worn: Worn) -> GrainTable:
