@@ -89,15 +89,15 @@ def _parser() -> argparse.ArgumentParser:
         "--plan", action="store_true", help="say what would run, how long and how large, and end"
     )
     calculator.add(commands)
-    for name, function, text in (
-        ("status", _status, "what of a study is done, running, failed and why"),
-        ("report", _report, "draw tables, figures and page of a study again"),
-        ("gallery", _gallery, "one page over the studies that a directory holds"),
-        ("prune", _prune, "drop the large files of finished cases; a rerun makes them anew"),
+    for name, text in (
+        ("status", "what of a study is done, running, failed and why"),
+        ("report", "draw tables, figures and page of a study again"),
+        ("gallery", "one page over the studies that a directory holds"),
+        ("prune", "drop the large files of finished cases; a rerun makes them anew"),
     ):
         command = commands.add_parser(name, help=text)
         command.add_argument("directory", type=Path, metavar="DIR")
-        command.set_defaults(run=function)
+        command.set_defaults(run=partial(_on_directory, name))
     for name, text in (
         ("ladder", "what each model costs and how far it is off: speed against accuracy"),
         ("budget", "what the choices are worth that all models share: a tornado for each scene"),
@@ -170,10 +170,19 @@ def _experiment(name: str, options: argparse.Namespace) -> int:
     return _end(experiment.run(*studies, out, workers=options.workers))
 
 
-def _report(options: argparse.Namespace) -> int:
-    from orchestrator import face, pipeline
+def _on_directory(name: str, options: argparse.Namespace) -> int:
+    if name == "status":
+        from orchestrator.runs import workspace
 
-    return _end(pipeline.redraw(options.directory, face.GUESTS))
+        found = workspace.status(options.directory)
+        print(workspace.status_text(found))
+        return 3 if found.failed else 0
+    from orchestrator import face, gallery, pipeline
+
+    if name == "report":
+        return _end(pipeline.redraw(options.directory, face.GUESTS))
+    print((gallery.write if name == "gallery" else pipeline.prune)(options.directory))
+    return 0
 
 
 def _end(finished: "Finished") -> int:
@@ -184,28 +193,6 @@ def _end(finished: "Finished") -> int:
         print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
     print(finished.page)
     return 3 if finished.failures else 0
-
-
-def _status(options: argparse.Namespace) -> int:
-    from orchestrator.runs import workspace
-
-    found = workspace.status(options.directory)
-    print(workspace.status_text(found))
-    return 3 if found.failed else 0
-
-
-def _gallery(options: argparse.Namespace) -> int:
-    from orchestrator import gallery
-
-    print(gallery.write(options.directory))
-    return 0
-
-
-def _prune(options: argparse.Namespace) -> int:
-    from orchestrator import pipeline
-
-    print(pipeline.prune(options.directory))
-    return 0
 
 
 def _doctor(options: argparse.Namespace) -> int:

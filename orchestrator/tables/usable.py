@@ -89,11 +89,7 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, study: Study) -> pd.D
         if "mean_speed_m_s" in rows:
             speed, height = rows["mean_speed_m_s"].fillna(speed), rows["depth_m"].fillna(height)
         rows["flow_reynolds"] = speed * height / rows["nu_m2_s"]
-    is_pile = "share_carried_off" in rows
-    texts = [
-        "; ".join([*_of_grain(row), *(_of_pile(row, study.tolerance) if is_pile else ())])
-        for row in rows.to_dict("records")
-    ]
+    texts = ["; ".join(_reasons(row, study.tolerance)) for row in rows.to_dict("records")]
     return table.assign(usable=[not text for text in texts], why_not=texts)
 
 
@@ -117,7 +113,7 @@ def _beyond_laws(rows: pd.DataFrame, ustar: FloatArray) -> list[str]:
     return list(texts)
 
 
-def _of_grain(row: Mapping[Any, Any]) -> Iterator[str]:
+def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if np.isnan(row["reynolds"]):
         if "highest_fraction" in row:
             highest = f"at most {row['highest_fraction']:.0%} of {row['count']} grains moved"
@@ -128,9 +124,8 @@ def _of_grain(row: Mapping[Any, Any]) -> Iterator[str]:
         yield row["law"]
     if row["standing_out"] < EXPOSED_FROM:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
-
-
-def _of_pile(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
+    if "share_carried_off" not in row:
+        return
     number, flow = row["roughness_reynolds"], row["flow_reynolds"]
     if number < SMOOTH_BELOW:
         yield f"hydraulically smooth bed: u* z0/nu {number:.2g} is below {SMOOTH_BELOW:.2g}"
