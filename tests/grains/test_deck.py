@@ -105,21 +105,16 @@ def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
         assert high == pytest.approx(grains.position[:, axis].max() + 0.1)
 
 
-def test_the_template_runs_by_hand_as_it_lies(tmp_path: Path) -> None:
-    copy = tmp_path / "bed"
-    shutil.copytree(templates() / "liggghts" / "bed", copy)
-    ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
-    assert (copy / "samples.csv").read_text().splitlines()[-1].split(",")[3] == "0"
-
-
-def test_runs_that_start_together_share_no_directory(tmp_path: Path) -> None:
+def test_the_template_runs_as_it_lies_and_shares_no_directory_with_other_runs(
+    tmp_path: Path,
+) -> None:
     copy, shared = tmp_path / "bed", tmp_path / "shared"
     shutil.copytree(templates() / "liggghts" / "bed", copy)
     shared.mkdir()
     untouched = shared.stat().st_mtime_ns
     # MPI's own would be made here, and removed while another run starts
     subprocess.run(["./Allrun"], cwd=copy, check=True, env={**os.environ, "TMPDIR": str(shared)})
+    assert (copy / "samples.csv").read_text().splitlines()[-1].split(",")[3] == "0"
     assert shared.stat().st_mtime_ns == untouched
 
 
@@ -174,7 +169,3 @@ def test_processes_that_share_the_grains_die_with_their_shell(tmp_path: Path) ->
     while _at_work_in(tmp_path / "bed") and time.monotonic() < deadline:
         time.sleep(0.05)
     assert _at_work_in(tmp_path / "bed") == []
-
-
-def test_ids_of_the_counted_grains() -> None:
-    assert _table().counted_ids.tolist() == [3]

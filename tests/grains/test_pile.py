@@ -5,14 +5,12 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.runs.files import Folder
 from orchestrator.study import study
 from tests import small_study
 
@@ -90,21 +88,6 @@ def test_tables_reconcile(slow: Pile, cases: Path) -> None:
     np.testing.assert_allclose(found["reynolds"], ustar * 1e-3 / 1e-5, rtol=1e-12)
     grains = made["pile_grain"]
     assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]
-
-
-def test_every_column_has_a_meaning_and_survives_its_files(
-    slow: Pile, cases: Path, tmp_path: Path
-) -> None:
-    asked = _study(step=0.01)
-    planned = plan.make(asked)
-    made = tables.make(asked, planned, cases, planned.done(cases))
-    tables.write(made, Folder(tmp_path), "made")
-    listed = pd.read_csv(tmp_path / "made" / "columns.csv").set_index("column")
-    assert {str(c) for table in made.values() for c in table} == set(listed.index)
-    assert listed["meaning"].str.len().min() >= 3
-    for name, table in tables.read(Folder(tmp_path), "made").items():
-        # cells without a value are None in one table, not a number in the other
-        pd.testing.assert_frame_equal(table, made[name].astype(table.dtypes))
 
 
 def test_a_copy_reruns_by_hand_and_gives_the_same_bytes(

@@ -1,7 +1,8 @@
-"""Piles of poured grains through the whole line: one bed for all scenes, three methods."""
+"""Piles of poured grains, in the plane and in strips, through the whole line: bed to page."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -9,56 +10,100 @@ import pytest
 
 from orchestrator import tables
 from orchestrator.errors import InputError
-from orchestrator.fidelity.decision import decide
 from orchestrator.grains import pile as pile_of_grains
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
-from orchestrator.plan import Plan, make
+from orchestrator.grains.pile import Pile
+from orchestrator.plan import Plan
 from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
+from orchestrator.study.study import Study
 from orchestrator.tables.piles import Answer, size_class_rows
 from orchestrator.types import BoolArray, FloatArray
 from tests import small_study
 
 STUDY = """
-fluid = { density = 1000.0, viscosity = 1e-6 }
-grain = { diameter = 1e-3, density = 2650.0, sizes = { sigma_g = 1.25 } }
-bed = { kind = "pile", slope_deg = 15.0, height = 0.006, packing = "poured", poured_depth = 3.0 }
-flow = { model = "flat" }
+fluid = {{ density = 1000.0, viscosity = 1e-6 }}
+flow = {{ model = "flat" }}
+{fields}
 [protocol]
 load_increment = 0.05
 waiting_time = 6.0
+time_step = 0.3
 final_fraction = 0.5
 fractions = [0.1, 0.3]
 [axes]
-"protocol.method" = ["pivot", "peeling", "dem"]
+"protocol.method" = {methods}
 """
-ASKED = study.parse(STUDY, name="poured", where="test")
+MIXED = """
+grain = { diameter = 1e-3, density = 2650.0, stiffness = 1e3, sizes = { sigma_g = 1.25 } }
+bed = { kind = "pile", slope_deg = 15.0, height = 0.006, packing = "poured", poured_depth = 3.0 }
+"""
+STRIP = """
+grain = { diameter = 1e-3, density = 2650.0, stiffness = 1e3 }
+[bed]
+kind = "pile"
+shape = "flat"
+height = 0.005
+length = 0.004
+packing = "poured"
+poured_depth = 3.0
+width = 3.0
+mobile_layers = 1
+"""
+
+
+class Done(NamedTuple):
+    """A study whose runs are done."""
+
+    asked: Study
+    plan: Plan
+    cases: Path
+
+    def pile(self, method: str) -> Pile:
+        """The pile by a method."""
+        piles = self.plan.piles.values()
+        return next(one for one in piles if one.scene.protocol.method == method)
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Its tables."""
+        return dict(tables.make(self.asked, self.plan, self.cases, list(self.plan.cases)))
+
+
+def _done(cases: Path, fields: str, methods: list[str]) -> Done:
+    text = STUDY.format(fields=fields, methods=methods)
+    asked = study.parse(text, name="poured", where="test")
+    return Done(asked, small_study.in_turn(asked, cases), cases)
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
-    cases = tmp_path_factory.mktemp("cases")
-    return small_study.in_turn(ASKED, cases), cases
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    return _done(tmp_path_factory.mktemp("cases"), MIXED, ["pivot", "peeling", "dem"])
 
 
-def test_all_scenes_share_one_poured_bed(finished: tuple[Plan, Path]) -> None:
-    planned, _ = finished
-    kinds = [one.kind for one in planned.cases.values()]
-    assert sorted(kinds) == ["pile", "poured"]
-    assert all(pile.runs[0].kind == "poured" for pile in planned.piles.values())
-    assert len({id(pile.packing) for pile in planned.piles.values()}) == 1
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    return _done(tmp_path_factory.mktemp("cases"), STRIP, ["pivot", "dem"])
 
 
-def test_each_method_answers(finished: tuple[Plan, Path]) -> None:
-    planned, cases = finished
-    made = tables.make(ASKED, planned, cases, list(planned.cases))
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, name: str) -> None:
+    done: Done = request.getfixturevalue(name)
+    assert sorted(one.kind for one in done.plan.cases.values()) == ["pile", "poured"]
+    assert len({id(pile.packing) for pile in done.plan.piles.values()}) == 1
+    made = done.tables
     rows = made["pile_threshold"].merge(made["scenes"][["scene_id", "method"]], on="scene_id")
     early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
-    assert set(early.index) == {"pivot", "peeling", "dem"}
-    assert (early > 0.005).all()
-    assert (early < 0.2).all()
+    assert set(early.index) == {pile.scene.protocol.method for pile in done.plan.piles.values()}
+    assert early.between(0.003, 0.2).all()
+    held = made["pile_grain"]["pivot_deg"].dropna()
+    assert len(held) > 0.3 * len(made["pile_grain"])
+    assert held.between(-90, 180).all()
+    drawn = piles.poured(Results(done.asked, done.plan, made, done.cases))
+    names = {f"poured-{method}" for method in early.index}
+    assert {figure.name for figure in drawn} >= names | {"pivots"}
 
 
 class Loose(Loads):
@@ -71,83 +116,49 @@ class Loose(Loads):
         return np.zeros(self.geometry.packing.count)
 
 
-def test_a_bed_none_of_whose_grains_is_held_is_refused(finished: tuple[Plan, Path]) -> None:
-    planned, cases = finished
-    (pile, *_) = planned.piles.values()
+def test_a_bed_none_of_whose_grains_is_held_is_refused(mixed: Done) -> None:
+    pile = mixed.pile("dem")
+    loose = Loose(Geometry(pile.scene, mixed.cases), pile.loads(mixed.cases).ratio)
     with pytest.raises(InputError, match="lets it go"):
-        pile_of_grains.flows(Loose(Geometry(pile.scene, cases), pile.loads(cases).ratio))
+        pile_of_grains.flows(loose)
 
 
-@pytest.mark.parametrize("length", [1e-3, 1e-12])
-def test_a_poured_bed_has_room_for_some_grains(length: float) -> None:
-    text = STUDY.replace("slope_deg = 15.0", f'shape = "flat", length = {length}')
-    with pytest.raises(InputError, match=r"bed\.length: a poured bed of .* grains"):
-        make(study.parse(text, name="short", where="test"))
-
-
-def test_each_size_class_has_its_threshold(finished: tuple[Plan, Path]) -> None:
-    planned, cases = finished
-    made = tables.make(ASKED, planned, cases, list(planned.cases))
-    rows = made["size_class"]
-    counted = rows.groupby(["scene_id", "fraction"])["count"].sum()
-    (pile, *_) = planned.piles.values()
-    assert (counted == pile.packing.count).all()
+def test_each_size_class_has_its_threshold(mixed: Done) -> None:
+    rows, pile = mixed.tables["size_class"], mixed.pile("dem")
+    assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count).all()
     middle = rows[np.abs(np.log(rows["size_over_d"])) < np.log(2) / 4]
     assert (middle["hiding"].dropna() == 1).all()
-    grains = made["pile_grain"]
-    assert grains["pivot_deg"].between(-90, 180).all()
-    np.testing.assert_allclose(
-        np.sort(grains["size_over_d"].unique()),
-        np.unique(pile.packing.sizes[pile.packing.windward]),
-    )
+    # where the first grains of the class around d lie loose, nothing is hidden
+    name, pile = next(iter(mixed.plan.piles.items()))
+    answer = Answer.read(mixed.plan.decisions[name], pile, mixed.cases)
+    near = np.abs(np.log(pile.packing.sizes[pile.packing.windward])) < np.log(2) / 4
+    motion = Motion.of_flows(np.where(near, 0.0, 0.1))
+    loose = pd.DataFrame(size_class_rows(replace(answer, motion=motion)))
+    assert set(loose["shields_own"] > 0) == {False, True}
+    assert loose["hiding"].isna().all()
 
 
-def test_a_class_whose_first_grains_lie_loose_hides_nothing(finished: tuple[Plan, Path]) -> None:
-    planned, cases = finished
-    (answer, *_) = (
-        Answer.read(planned.decisions[name], pile, cases) for name, pile in planned.piles.items()
-    )
-    sizes = answer.pile.packing.sizes[answer.pile.packing.windward]
-    middle = np.abs(np.log(sizes)) < np.log(2) / 4
-    motion = Motion.of_flows(np.where(middle, 0.0, 0.1))
-    rows = pd.DataFrame(size_class_rows(replace(answer, motion=motion)))
-    assert set(rows["shields_own"] > 0) == {False, True}
-    assert rows["hiding"].isna().all()
+def _written(done: Done) -> FloatArray:
+    """The grains that LIGGGHTS was given: id, type, diameter, density, x, y, z."""
+    text = (done.cases / done.pile("dem").case.name / "grains.data").read_text()
+    return np.array([row.split() for row in text.partition("Atoms\n\n")[2].splitlines()], float)
 
 
-def test_each_grain_weighs_and_is_driven_by_its_own_size(finished: tuple[Plan, Path]) -> None:
-    planned, cases = finished
-    pile = next(one for one in planned.piles.values() if one.scene.protocol.method == "dem")
-    packed, d = pile.packing, pile.scene.grain.diameter
+def test_each_grain_weighs_and_is_driven_by_its_own_size(mixed: Done) -> None:
+    pile = mixed.pile("dem")
+    packed = pile.packing
     assert packed.sizes.max() / packed.sizes.min() > 1.5
-    rows = (cases / pile.case.name / "grains.data").read_text().partition("Atoms\n\n")[2]
-    diameters = np.array([row.split()[2] for row in rows.splitlines()], float)
-    np.testing.assert_allclose(diameters, packed.sizes * d, rtol=1e-14)
-    force = np.linalg.norm(pile.loads(cases).loading.at(0.02), axis=1)[packed.windward]
-    own = packed.sizes[packed.windward]
-    larger = np.argsort(own)
-    assert (np.diff(force[larger]) > 0).all()
+    np.testing.assert_allclose(_written(mixed)[:, 2], packed.sizes * 1e-3, rtol=1e-14)
+    force = np.linalg.norm(pile.loads(mixed.cases).loading.at(0.02), axis=1)[packed.windward]
+    assert (np.diff(force[np.argsort(packed.sizes[packed.windward])]) > 0).all()
 
 
-def test_no_cheap_level_is_promised_on_poured_beds() -> None:
-    solved = STUDY.replace('flow = { model = "flat" }', "").partition("[protocol]")[0]
-    (scene,) = study.parse(solved, name="poured", where="test").scenes
-    decision = decide(scene, 0.05)
-    assert "none is within" in decision.why
-    assert decision.error_estimate is not None
-    assert decision.error_estimate > 0.05
-
-
-def test_the_page_shows_where_grains_go_their_pockets_and_sizes(
-    finished: tuple[Plan, Path],
-) -> None:
-    planned, cases = finished
-    made = tables.make(ASKED, planned, cases, list(planned.cases))
-    found = {one.name: one for one in piles.poured(Results(ASKED, planned, made, cases))}
-    assert {"poured-pivot", "poured-peeling", "poured-dem", "pivots", "hiding"} == set(found)
-    bed = found["poured-dem"].canvas
-    assert bed is not None
-    (discs,) = bed.axes[0].collections
-    (pile, *_) = planned.piles.values()
-    assert np.shape(discs.get_offsets()) == pile.packing.centres.shape
-    assert pile.runs[-1].name in str([one.cases for one in found.values()])
+def test_grains_lie_between_the_sides_and_feel_the_flow_along_x(strip: Done) -> None:
+    y, pile = _written(strip)[:, 5] / 1e-3, strip.pile("dem")
+    assert 0 <= y.min() < y.max() < 3.0
+    assert np.ptp(y) > 2.0
+    exposed = pile.packing.windward
+    # some lie beside others at one x
+    assert exposed.sum() > 4.0
+    assert (pile.loads(strip.cases).loading.at(0.02)[exposed] > 0).all()
+    assert strip.tables["pile_grain"]["y_m"].between(0, 0.003).all()

@@ -143,49 +143,35 @@ def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> Non
     assert ended.returncode != 0
 
 
-def _before_liggghts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
-    """Put a script before the real solver; what it does to the case, the solver then suffers."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    program = folder / "liggghts"
+STOPPED = """pid=$$
+(until [ -s samples.csv ]; do sleep 0.01; done; kill -KILL $pid) &"""
+
+
+@pytest.mark.parametrize(
+    ("script", "limit_s", "word"),
+    [
+        # LIGGGHTS itself ends with 0: a spring too stiff for the step throws all grains out
+        ("sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts", 120, "lost"),
+        ("echo 'fix nothing' >>parameters.liggghts", 120, "ERROR"),
+        (STOPPED, 120, "before its protocol did"),
+        ("kill -STOP $$", 1, "within 1 s"),
+    ],
+)
+def test_a_solver_that_fails_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, limit_s: float, word: str
+) -> None:
+    # the script runs before the real solver; what it does to the case, the solver then suffers
+    program = tmp_path / "bin" / "liggghts"
+    program.parent.mkdir()
     program.write_text(f'#!/bin/sh\n{script}\nexec {shutil.which("liggghts")} "$@"\n')
     program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
-
-
-def _failure(tmp_path: Path, limit_s: float = 120.0) -> str:
-    one = _cells(FEW)
-    cases = tmp_path / "cases"
-    with pytest.raises(SolverError) as caught:
+    monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
+    one, cases = _cells(FEW), tmp_path / "cases"
+    with pytest.raises(SolverError, match=word) as caught:
         _run(one, cases, limit_s)
     assert not case.is_done(one, cases)
     assert (cases / one.name / case.FAILED).is_file()
     assert str(cases / one.name) in str(caught.value)
-    return str(caught.value)
-
-
-def test_a_solver_that_loses_every_grain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # LIGGGHTS itself ends with 0: a spring that is too stiff for the step throws all grains out
-    script = "sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts"
-    _before_liggghts(tmp_path, monkeypatch, script)
-    assert "lost" in _failure(tmp_path)
-
-
-def test_a_solver_that_refuses_its_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _before_liggghts(tmp_path, monkeypatch, "echo 'fix nothing' >>parameters.liggghts")
-    assert "ERROR" in _failure(tmp_path)
-
-
-def test_a_solver_that_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # the shell that becomes the solver leaves a child that kills it once it is at work
-    script = "pid=$$\n(until [ -s samples.csv ]; do sleep 0.01; done; kill -KILL $pid) &"
-    _before_liggghts(tmp_path, monkeypatch, script)
-    assert "before its protocol did" in _failure(tmp_path)
-
-
-def test_a_solver_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _before_liggghts(tmp_path, monkeypatch, "kill -STOP $$")
-    assert "within 1 s" in _failure(tmp_path, limit_s=1)
 
 
 @pytest.mark.parametrize("name", ["passage.dump", "samples.csv", "settling.csv"])

@@ -15,7 +15,7 @@ from orchestrator.grains import pile as wear
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, Worn
-from orchestrator.report import bed, piles
+from orchestrator.report import bed
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import STUDY, Workspace
 from orchestrator.study import study
@@ -109,22 +109,6 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, pack
     assert 0.8 < np.median(sunk[away < 0.5]) < 1.2
 
 
-def test_a_bared_row_sinks_by_a_row() -> None:
-    bed = Geometry(_scene())
-    s = bed.packing.arc_length
-    middle = bed.packing.windward & (s > 0.25 * bed.line.crest_s) & (s < 0.75 * bed.line.crest_s)
-    whole = Worn.whole(bed.packing)
-    line = wear.sunk(bed, Worn(whole.without(middle), whole.left, whole.speed))
-    # rows are sin(beta) apart along the normal, so much over the cosine of the slope upright
-    row = np.sin(np.radians(60.0)) / np.cos(np.radians(25.0))
-    x = float(bed.line.crest[0]) / 2
-    sunk = bed.line.height(np.array([x])) - line.height(np.array([x]))
-    assert sunk == pytest.approx(row, abs=0.3)
-    for untouched in (0.1, 0.95):
-        x = untouched * float(bed.line.crest[0])
-        assert line.height(np.array([x])) == pytest.approx(bed.line.height(np.array([x])), abs=1e-6)
-
-
 def test_worn_grains_survive_their_file(tmp_path: Path) -> None:
     whole = Worn.whole(Geometry(_scene()).packing)
     gone = np.arange(len(whole.left)) % 3 == 0
@@ -192,15 +176,6 @@ def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:
         assert np.all(own.loc[own["fraction_moved"] <= 0.25, "change"].abs() < 1e-9)
 
 
-def test_the_figure_has_a_line_for_each_bed(results: Results) -> None:
-    (figure,) = piles.wear(results)
-    assert figure.canvas is not None
-    panels = figure.canvas.axes
-    assert len(panels) == 2
-    assert all(len(ax.lines) == 3 for ax in panels)
-    assert len(figure.cases) == 2
-
-
 @pytest.mark.parametrize("method", ["peeling", "dem"])
 def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str) -> None:
     pile, cases = worn[method]
@@ -265,12 +240,6 @@ def test_what_a_bed_that_changes_needs(change: str, word: str) -> None:
     if "[flow]" in change:
         text = text.replace("flow = { expansion_ratio = 1.4 }\n", "")
     with pytest.raises(InputError, match=word):
-        study.parse(text, name="one", where="test")
-
-
-def test_a_single_grain_has_no_bed_that_changes() -> None:
-    text = "grain = { diameter = 1e-3 }\nprotocol = { update = 0.1 }"
-    with pytest.raises(InputError, match=r"protocol\.update"):
         study.parse(text, name="one", where="test")
 
 
