@@ -7,14 +7,10 @@ import math
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator.parameters import (
-    GAS_BELOW,
-    MOST_POINTS,
-    PARAMETERS,
-    QUANTITIES,
-)
+from orchestrator.calculator.parameters import GAS_BELOW, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 
 if TYPE_CHECKING:
@@ -93,7 +89,7 @@ def _run(options: argparse.Namespace) -> int:
     if count > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
         raise InputError(what, where="threshold", remedy="lower a COUNT")
-    asked = questions({name: _numbers(axis) for name, axis in axes.items()})
+    asked = questions(axes)
     points = pd.DataFrame(itertools.product(*axes.values()), columns=list(axes))
     try:
         thresholds = table.thresholds(points, options.law)
@@ -128,7 +124,7 @@ def values(name: str, text: str) -> list[Value]:
     """
     import numpy as np
 
-    option, ends, geometric = OPTIONS[name], text.split(":"), PARAMETERS[name].geometric
+    option, ends = OPTIONS[name], text.split(":")
     parts = [re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", end) for end in ends[:2]]
     of_diameter = name == "roughness" and all(part and float(part[1]) > 0 for part in parts)
     if len(ends) == 1:
@@ -140,21 +136,18 @@ def values(name: str, text: str) -> list[Value]:
     else:
         first, last = (_number(end, name, option) for end in ends[:2])
     count = _number(ends[2], name, option)
-    if not (math.isfinite(first) and math.isfinite(last)):
-        what = f"{text!r} does not end at finite numbers"
-    elif not first < last:
-        what = f"{text!r} does not rise from its first to its last value"
-    elif not count.is_integer() or count < 2:
-        what = f"{ends[2]!r} is not a count of values from 2 up"
-    elif count > MOST_POINTS:
-        what = f"{ends[2]} values are more than {MOST_POINTS}"
-    else:
-        # a range wider than all floats ends in values that the scene refuses
-        with np.errstate(all="ignore"):
-            space = np.geomspace if geometric and first > 0 else np.linspace
-            spaced = [float(value) for value in space(first, last, int(count))]
-        return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else [*spaced]
-    raise InputError(what, where=option, remedy=FORM)
+    wrong = {
+        f"{text!r} does not end at finite numbers": not np.isfinite([first, last]).all(),
+        f"{text!r} does not rise from its first to its last value": not first < last,
+        f"{ends[2]!r} is not a count of values from 2 up": not count.is_integer() or count < 2,
+        f"{ends[2]} values are more than {MOST_POINTS}": count > MOST_POINTS,
+    }
+    if what := next((what for what, holds in wrong.items() if holds), ""):
+        raise InputError(what, where=option, remedy=FORM)
+    space = np.geomspace if PARAMETERS[name].geometric and first > 0 else np.linspace
+    with np.errstate(all="ignore"):  # the scene refuses values of a range wider than all floats
+        spaced = space(first, last, int(count)).tolist()
+    return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else spaced
 
 
 def _number(text: str, name: str, option: str) -> float:
@@ -167,25 +160,25 @@ def _number(text: str, name: str, option: str) -> float:
         raise InputError(f"{text!r} is not a number", where=option, remedy=remedy) from None
 
 
-def _numbers(axis: Sequence[Value]) -> list[float]:
-    return [v for v in axis if not isinstance(v, str) and math.isfinite(v)] or [0.0]
-
-
-def questions(axes: Mapping[str, Sequence[float]]) -> dict[str, str]:
+def questions(axes: Mapping[str, Sequence[Value]]) -> dict[str, str]:
     """Questions on parameters that look like another unit, or lie beyond the model, by name.
 
     Parameters
     ----------
     axes : mapping
-        The numbers of each parameter; the largest of them is looked at.
+        The values of each parameter; the largest number among them is looked at.
     """
-    top = {name: max(axis) for name, axis in axes.items()}
+    numbers = {
+        name: [value for value in axis if not isinstance(value, str) and math.isfinite(value)]
+        for name, axis in axes.items()
+    }
+    top = {name: max(values, default=0.0) for name, values in numbers.items()}
     asked = {
         name: f"{question.format(top[name])}, {OPTIONS[name]} {top[name] * factor:.4g}?"
         for name, low, high, question, factor in UNITS
         if low <= top[name] < high
     }
-    smallest, rho = min(axes["diameter"]), top["fluid_density"]
+    smallest, rho = min(numbers["diameter"], default=0.0), top["fluid_density"]
     kind = "gas" if rho < GAS_BELOW else "liquid"
     if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[kind]:
         asked["diameter"] = (
@@ -209,13 +202,12 @@ def _fluid(rho: float, nu: float) -> str:
     if is_usual(rho, nu):
         of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
         return f"{nu:g} m2/s is air's: did you mean water, --viscosity 1e-06?" if of_air else ""
-    units = (
-        (1 / rho, f"{nu:g} Pa s"),
-        (1e-6, f"{nu:g} mm2/s"),
-        (1e-5, f"{nu:g}e-5 m2/s"),
-        (1e-4, f"{nu:g} cm2/s"),
-    )
-    meant = [f"{text}, --viscosity {nu * f:.4g}" for f, text in units if is_usual(rho, nu * f)]
+    units = {" Pa s": 1 / rho, " mm2/s": 1e-6, "e-5 m2/s": 1e-5, " cm2/s": 1e-4}
+    meant = [
+        f"{nu:g}{unit}, --viscosity {nu * factor:.4g}"
+        for unit, factor in units.items()
+        if is_usual(rho, nu * factor)
+    ]
     if is_usual(rho * 1000, nu):
         meant.insert(0, f"{rho:g} g/cm3, --fluid-density {rho * 1000:g}")
     kind = "gas" if rho < GAS_BELOW else "liquid"
@@ -226,34 +218,32 @@ def _fluid(rho: float, nu: float) -> str:
 def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
     """A refusal with options for the fields of a study file; questions are its remedy."""
     options = {each.field: OPTIONS[name] for name, each in PARAMETERS.items()}
-
-    def renamed(text: str) -> str:
-        return re.sub(r"\b[a-z]+\.[a-z_]+\b", lambda field: options.get(field[0], field[0]), text)
-
+    named = partial(re.sub, r"\b[a-z]+\.[a-z_]+\b", lambda field: options.get(field[0], field[0]))
     place, _, field = error.where.rpartition(": ")
     where = f"{place}: {options.get(field, field)}" if place else field
     about = [text for name, text in asked.items() if not place or where.endswith(OPTIONS[name])]
-    advice = about if about and not place else [renamed(error.remedy), *about]
-    return InputError(renamed(error.what), where=where, remedy="; ".join(filter(None, advice)))
+    advice = about if about and not place else [named(error.remedy), *about]
+    return InputError(named(error.what), where=where, remedy="; ".join(filter(None, advice)))
 
 
 def as_json(table: "pd.DataFrame") -> str:
     """A record for one point, or a list of records: parameters, rules, an object for each law."""
-    from orchestrator.physics.threshold import LAWS_OF
+    import numpy as np
 
-    def plain(value: Any) -> Any:  # JSON has no NaN
-        return None if isinstance(value, float) and not math.isfinite(value) else value
+    from orchestrator.physics.threshold import LAWS_OF
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
     names |= {"valid": "valid", "why_not": "why_not"}
-    rows, laws = table.to_dict("records"), table["law"].nunique()
+    table = table.replace([np.inf, -np.inf], np.nan)  # JSON has neither
+    rows = table.astype(object).where(table.notna(), None).to_dict("records")
+    laws = table["law"].nunique()
     records = [
         {
-            "input": {name: plain(point[0][each.column]) for name, each in PARAMETERS.items()},
+            "input": {name: point[0][each.column] for name, each in PARAMETERS.items()},
             "regime": point[0]["regime"],
             "paper": list(LAWS_OF[point[0]["regime"]]),
             "answer": [row["law"] for row in point if row["answer"]],
-            **{row["law"]: {name: plain(row[c]) for c, name in names.items()} for row in point},
+            **{row["law"]: {name: row[c] for c, name in names.items()} for row in point},
         }
         for point in (rows[start : start + laws] for start in range(0, len(rows), laws))
     ]

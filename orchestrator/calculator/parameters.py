@@ -7,30 +7,19 @@ from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number that the closed form depends on.
-
-    Attributes
-    ----------
-    field : str
-        Field of a study file; the depth has none.
-    column : str
-        Column of the table, with the unit.
-    label : str
-        Symbol and unit, for people.
-    default : float or str or None
-        None: there is none.
-    note : str
-        For the help.
-    geometric : bool
-        Whether a range of it is spaced geometrically.
-    """
+    """A number that the closed form depends on."""
 
     field: str
+    """Field of a study file; the depth has none."""
     column: str
+    """Column of the table, with the unit."""
     label: str
+    """Symbol and unit, for people."""
     default: float | str | None = None
     note: str = ""
+    """For the help."""
     geometric: bool = False
+    """Whether a range of it is spaced geometrically."""
 
 
 MOST_POINTS = 100_000

@@ -74,12 +74,12 @@ def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
     grains["depth"] = points["depth"].to_numpy(float) if "depth" in points else np.nan
     if "depth" in points:
         _check_depth(grains)
-    exposure = _exposure(grains)
+    exposure = Exposure(*(grains[name] for name in SingleGrain._fields[:5]))
     others = {name: grains[name].to_numpy() for name in SingleGrain._fields[5:]}
     # numbers beyond all floats end as laws that do not hold
     with np.errstate(all="ignore"):
         by_law = {name: threshold(each, exposure, **others) for name, each in LAWS.items()}
-        blocks = {name: _columns(LAWS[name], by_law[name], grains) for name in LAWS}
+        blocks = {name: _columns(LAWS[name], by_law[name], exposure, grains) for name in LAWS}
     regimes = regime(by_law["low"], by_law["high"])
     given = pd.DataFrame({each.column: grains[name] for name, each in PARAMETERS.items()})
     picked = {key: laws if answer == PAPER else (answer,) for key, laws in LAWS_OF.items()}
@@ -96,10 +96,6 @@ def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
         what, remedy = "no force law holds", "are all numbers in SI units?"
         raise InputError(what, where="threshold", remedy=remedy)
     return table
-
-
-def _exposure(grains: pd.DataFrame) -> Exposure:
-    return Exposure(*(grains[name] for name in SingleGrain._fields[:5]))
 
 
 def _scene(point: Mapping[Any, Any]) -> Scene:
@@ -128,16 +124,17 @@ def _check_depth(grains: pd.DataFrame) -> None:
         raise InputError(what, where="threshold: depth", remedy=remedy)
 
 
-def _columns(here: ForceLaw, found: Threshold, grains: pd.DataFrame) -> dict[str, Any]:
+def _columns(
+    here: ForceLaw, found: Threshold, exposure: Exposure, grains: pd.DataFrame
+) -> dict[str, Any]:
     """The columns of one law, each of shape (n,)."""
-    ustar, exposure = found.friction_velocity, _exposure(grains)
+    ustar = found.friction_velocity
     density, viscosity = grains["fluid_density"].to_numpy(), grains["viscosity"].to_numpy()
     z0 = np.maximum(grains["roughness"], smooth_wall_roughness(ustar, viscosity))
     gas, depth = density < GAS_BELOW, grains["depth"].to_numpy()
     mean = depth_mean_speed(ustar, depth, z0)
     turbulent = mean * depth / viscosity >= LAMINAR_BELOW
     rest = {name: grains[name].to_numpy() for name in ("density", "slope_deg", "gravity")}
-    why = np.array(why_not(here, ustar, exposure, **rest), object)
     return {
         "ustar_m_s": ustar,
         "wind_1m_m_s": np.where(gas, log_law_speed(ustar, 1.0, z0), np.nan),
@@ -149,5 +146,5 @@ def _columns(here: ForceLaw, found: Threshold, grains: pd.DataFrame) -> dict[str
         "drag_n": found.drag,
         "lift_n": found.lift,
         "valid": found.valid,
-        "why_not": why,
+        "why_not": np.array(why_not(here, ustar, exposure, **rest), object),
     }

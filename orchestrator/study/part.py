@@ -83,11 +83,7 @@ class Part(BaseModel):
     """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
 
     model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
     @field_validator("*", mode="after")

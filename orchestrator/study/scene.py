@@ -16,16 +16,7 @@ from orchestrator.physics.threshold import weight
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.part import Part, UnfitError
-from orchestrator.study.parts import (
-    Bed,
-    Flow,
-    Fluid,
-    Forces,
-    Grain,
-    GrainBed,
-    PileBed,
-    Protocol,
-)
+from orchestrator.study.parts import Bed, Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.shapes import having
 from orchestrator.study.sizes import Sizes, largest, percentile
 

@@ -136,10 +136,7 @@ def test_a_scene_is_what_a_profile_says_not_its_name(tmp_path: Path) -> None:
     one = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
     text = STUDY.replace("scan", "other")
     other = study.parse(text, name="a", where=str(tmp_path / "a.toml"))
-    np.testing.assert_allclose(
-        of_bed(one.scenes[0].bed).x,
-        of_bed(other.scenes[0].bed).x,
-    )
+    np.testing.assert_allclose(of_bed(one.scenes[0].bed).x, of_bed(other.scenes[0].bed).x)
     (tmp_path / "scan.csv").write_text(GOOD.replace("0.02", "0.021"))
     changed = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
     assert changed.scenes[0].id != one.scenes[0].id

@@ -183,9 +183,7 @@ class PileBed(Bed):
     """width of a poured bed across the flow, a strip in space with periodic sides: at least 3 of
     its largest grains; 0 is one layer of grains in the plane of the flow"""
     seed: Annotated[
-        int,
-        Field(ge=0, le=10**9),
-        Info("seed", scope="random beds and replicas", about="replica"),
+        int, Field(ge=0, le=10**9), Info("seed", scope="random beds and replicas", about="replica")
     ] = 0
     """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
     replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""

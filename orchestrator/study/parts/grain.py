@@ -100,11 +100,7 @@ class Forces(Part):
     """lift coefficient"""
     stress: Annotated[
         Literal["wall", "eq10"],
-        Info(
-            "stress",
-            scope="piles",
-            choices={"wall": "wall stress", "eq10": "stress of Eq. 10"},
-        ),
+        Info("stress", scope="piles", choices={"wall": "wall stress", "eq10": "stress of Eq. 10"}),
     ] = "wall"
     """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
     # from far below a cell of any mesh to several piles
