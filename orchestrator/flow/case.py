@@ -313,7 +313,7 @@ class FlowCase(Case):
         ustar, depth = solved.approach_ustar() * self.ustar0_m_s, self.lid * self.height_m
         closed = self.settings.top == "closed channel"
         law = depth_mean_speed(ustar, depth, self.roughness_m, closed=closed)
-        return solved.column_speed() / float(law)
+        return float(solved.column_speed() / law)
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:
         if not np.isfinite([stress.tau_wall, stress.ustar_over_ustar0_eq10]).all():

@@ -108,20 +108,22 @@ class WallStress:
             If a length is not positive, or reaches beyond the bed.
         """
         centre, length = np.broadcast_arrays(np.asarray(s_m, float), np.asarray(length_m, float))
-        low, high = centre - length / 2.0, centre + length / 2.0
-        self._check_reach(low, high)
+        low, high, edges = centre - length / 2.0, centre + length / 2.0, self.edges_m
+        if not (np.all(low < high) and np.all(low >= edges[0]) and np.all(high <= edges[-1])):
+            raise InputError(
+                "a mean of the stress needs a positive length within the bed, "
+                f"which spans s = {edges[0]:.4g} ... {edges[-1]:.4g} m",
+            )
         tau = self.tau_wall if measure == "wall" else self.tau_eq10
-        gained = self._integral(tau, high) - self._integral(tau, low)
-        return np.asarray(gained / length)
+        slope, sums = self._slopes(tau), np.concatenate([[0.0], np.cumsum(tau * self.length_m)])
 
-    def _integral(self, tau: FloatArray, s_m: FloatArray) -> FloatArray:
-        """The integral of the stress from the start of the bed, kinematic and in u*_0^2 m."""
-        edges, slope = self.edges_m, self._slopes(tau)
-        face = np.clip(np.searchsorted(edges, s_m, side="right") - 1, 0, len(tau) - 1)
-        before = np.concatenate([[0.0], np.cumsum(tau * self.length_m)])[face]
-        into = s_m - edges[face]
-        tilt = slope[face] * (into - self.length_m[face]) / 2.0
-        return np.asarray(before + into * (tau[face] + tilt))
+        def integral(s: FloatArray) -> FloatArray:
+            face = np.clip(np.searchsorted(edges, s, side="right") - 1, 0, len(tau) - 1)
+            into = s - edges[face]
+            tilt = slope[face] * (into - self.length_m[face]) / 2.0
+            return np.asarray(sums[face] + into * (tau[face] + tilt))
+
+        return np.asarray((integral(high) - integral(low)) / length)
 
     def _slopes(self, tau: FloatArray) -> FloatArray:
         """Change of the stress along each face, 1/m: the mean of those to its two neighbours.
@@ -143,14 +145,6 @@ class WallStress:
         slope = np.where(behind * ahead > 0.0, (behind + ahead) / 2.0, 0.0)
         most = 2.0 * np.minimum(np.abs(behind), np.abs(ahead))
         return np.asarray(np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most)))
-
-    def _check_reach(self, low: FloatArray, high: FloatArray) -> None:
-        start, end = self.edges_m[0], self.edges_m[-1]
-        if not (np.all(low < high) and np.all(low >= start) and np.all(high <= end)):
-            raise InputError(
-                "a mean of the stress needs a positive length within the bed, "
-                f"which spans s = {start:.4g} ... {end:.4g} m",
-            )
 
     def to_csv(self, path: Path) -> None:
         """Write a table with all digits: `from_csv` gives the same numbers back."""

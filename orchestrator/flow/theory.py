@@ -13,8 +13,8 @@ h_m = L/sqrt(ln(L/z0)), and Euler's gamma ::
     b = 1 + Lambda + 2 ln(pi/2) + 4 gamma
     A = 2 b ln(h_m/z0)^2/Lambda^3,    B = A pi/b
 
-`waves` takes the A0 and B0 that Fourriere, Claudin and Andreotti (2010) computed for the wavelength
-lambda of each mode, from the fit to them that `of_wavelength` has.
+`waves` takes the A0 and B0 of Fourriere, Claudin and Andreotti (J. Fluid Mech. 649, 2010) for the
+wavelength lambda of each mode, by the rational fit of a public dune code in ln(lambda/z0).
 
 The bed that the flow sees has separation streamlines where it falls too steeply or bends too
 sharply: cubics that leave it smoothly, land on it level and fall by 14 degrees at most. Under them
@@ -29,14 +29,12 @@ from itertools import pairwise
 from math import ceil, log, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.constants import KARMAN
-
-Array = NDArray[np.float64]
+from orchestrator.types import FloatArray
 
 FACES = 100
 """Faces of the bed, per h."""
@@ -54,20 +52,14 @@ SHARP_DEG = 15.0
 @cache
 def flat(line: BedLine) -> WallStress:
     """The undisturbed stress, tau = tau_0, on a bed line (m)."""
-    edges = _edges(line)
-    return _wall_stress(line, edges, np.ones(len(edges) - 1))
+    return _wall_stress(line, lambda edges: edges)
 
 
 @cache
 def hill(line: BedLine, roughness_m: float) -> WallStress:
     """The stress by the theory of one hill, averaged over each face.
 
-    Parameters
-    ----------
-    line : BedLine
-        m; it falls to half of its height before and behind its top.
-    roughness_m : float
-        z0, m.
+    The line (m) falls to half of its height before and behind its top; z0 is in m.
     """
     length = half_length(line)
     assert length is not None, "fidelity/limits.py refuses such a bed"
@@ -77,15 +69,7 @@ def hill(line: BedLine, roughness_m: float) -> WallStress:
 
 @cache
 def waves(line: BedLine, roughness_m: float) -> WallStress:
-    """The stress by the theory of each wavelength, averaged over each face.
-
-    Parameters
-    ----------
-    line : BedLine
-        m.
-    roughness_m : float
-        z0, m.
-    """
+    """The stress on a line (m) by the theory of each wavelength, averaged over each face."""
     return _stress(line, lambda wavelength: of_wavelength(wavelength / roughness_m))
 
 
@@ -100,7 +84,7 @@ def of_hill(length_over_roughness: float) -> tuple[float, float]:
     return 2 * b * middle**2 / depth**3, pi / b
 
 
-def of_wavelength(wavelength_over_roughness: Array) -> tuple[Array, Array]:
+def of_wavelength(wavelength_over_roughness: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A0 and B0 for wavelengths over z0; waves shorter than z0 have those of z0."""
     r = np.log(np.maximum(wavelength_over_roughness, 1))
     a = 1.0702 + 0.093069 * r + 0.10838 * r**2 + 0.024835 * r**3
@@ -123,12 +107,12 @@ class Seen:
         Where the flow leaves the bed and where it meets it again, m.
     """
 
-    x: Array
-    z: Array
+    x: FloatArray
+    z: FloatArray
     bubbles: tuple[tuple[float, float], ...]
 
     @property
-    def slopes(self) -> Array:
+    def slopes(self) -> FloatArray:
         """Slopes of the cells between the places."""
         return np.diff(self.z) / np.diff(self.x)
 
@@ -155,8 +139,8 @@ def seen_by_the_flow(line: BedLine) -> Seen:
 
 
 def _streamline(
-    x: Array, z: Array, start: float, top: float, slope: float
-) -> tuple[slice, Array] | None:
+    x: FloatArray, z: FloatArray, start: float, top: float, slope: float
+) -> tuple[slice, FloatArray] | None:
     """Places under a streamline that leaves the bed with a slope, and its heights there.
 
     It lands at the first place that it can reach without falling more steeply than it does. None
@@ -195,7 +179,7 @@ def half_length(line: BedLine) -> float | None:
     return float(down - up) / 2
 
 
-Coefficients = Callable[[Array], tuple[Array | float, Array | float]]
+Coefficients = Callable[[FloatArray], tuple[FloatArray | float, FloatArray | float]]
 """A and B of wavelengths, m."""
 
 
@@ -205,12 +189,11 @@ def _stress(line: BedLine, coefficients: Coefficients) -> WallStress:
     middle = (seen.x[1:] + seen.x[:-1]) / 2
     for start, end in seen.bubbles:
         tau[(middle > start + LASTS * line.h) & (middle < end)] = 0
-    edges = _edges(line)
     sums = np.append(0, np.cumsum(tau * np.diff(seen.x)))
-    return _wall_stress(line, edges, np.diff(np.interp(edges, seen.x, sums)) / np.diff(edges))
+    return _wall_stress(line, lambda edges: np.interp(edges, seen.x, sums))
 
 
-def response(slopes: Array, cell: float, coefficients: Coefficients) -> Array:
+def response(slopes: FloatArray, cell: float, coefficients: Coefficients) -> FloatArray:
     """Mean of A H + B f' over each of some equal cells (m), from the slope of each.
 
     Before and behind them the bed is level. H is exact for these slopes: each corner, where the
@@ -230,23 +213,20 @@ def response(slopes: Array, cell: float, coefficients: Coefficients) -> Array:
     return np.asarray(irfft((a * rfft(kernel) + b) * modes, size)[:count])
 
 
-def _edges(line: BedLine) -> Array:
-    height = line.h
+def _wall_stress(line: BedLine, integral: Callable[[FloatArray], FloatArray]) -> WallStress:
+    """The stress on faces of h/100 from its integral along x."""
     parts = [
-        np.linspace(start, end, ceil((end - start) / height * FACES) + 1)[:-1]
+        np.linspace(start, end, ceil((end - start) / line.h * FACES) + 1)[:-1]
         for start, end in pairwise(line.x)
     ]
-    return np.append(np.concatenate(parts), line.x[-1])
-
-
-def _wall_stress(line: BedLine, edges: Array, tau: Array) -> WallStress:
+    edges = np.append(np.concatenate(parts), line.x[-1])
+    tau = np.diff(integral(edges)) / np.diff(edges)
     z = line.height(edges)
     length = np.hypot(np.diff(edges), np.diff(z))
     ends = np.cumsum(length)
-    s = ends - length / 2 - ends[np.searchsorted(edges[1:], 0)]
     ustar = np.sqrt(tau)
     return WallStress(
-        s_m=s,
+        s_m=ends - length / 2 - ends[np.searchsorted(edges[1:], 0)],
         x_m=(edges[1:] + edges[:-1]) / 2,
         z_m=(z[1:] + z[:-1]) / 2,
         length_m=length,

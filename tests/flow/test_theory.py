@@ -10,12 +10,13 @@ from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS
 from orchestrator.flow.stress import WallStress
+from orchestrator.types import FloatArray
 from tests.flow.conftest import PILE, Solve
 
 HEIGHT = 0.02
 
 
-def hilbert(slopes: theory.Array, cell: float) -> theory.Array:
+def hilbert(slopes: FloatArray, cell: float) -> FloatArray:
     return theory.response(slopes, cell, lambda _: (1.0, 0.0))
 
 
@@ -51,7 +52,7 @@ def test_each_wave_is_answered_by_its_own_coefficients() -> None:
     wave = 2 * np.pi * middle[far]
     asked = np.array([4.0, 2.0])
 
-    def alone(length: theory.Array) -> tuple[theory.Array, theory.Array]:
+    def alone(length: FloatArray) -> tuple[FloatArray, FloatArray]:
         a, b = np.where(np.abs(length / wavelength - 1) < 0.2, asked[:, None], 0)
         return a, b
 

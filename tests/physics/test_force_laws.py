@@ -9,8 +9,6 @@ from orchestrator.errors import InputError
 from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.force_law import CLIFT_GAUVIN, SCHILLER_NAUMANN, Exposure, reasons
 from orchestrator.physics.laws import LAWS, law
-from orchestrator.physics.velocity import layer, shift
-from orchestrator.types import FloatArray
 
 FORCES = ("drag", "lift", "torque")
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -215,28 +213,3 @@ def test_claudin_and_andreotti_in_both_limits() -> None:
     # rough: C_D = 1 at the speed of the logarithm at d/2
     fast = LAWS["claudin-andreotti"].drag(1e5, unit())
     assert float(fast) == pytest.approx(np.pi / 8 * (1e5 * np.log(16) / 0.4) ** 2, rel=0.02)
-
-
-# threshold Shields numbers at ks = d by another program; its grain lay on the wall (no gap)
-ON_THE_WALL = {
-    60: (0.064, 0.054, 0.038, 0.019, 0.019, 0.028),
-    45: (0.109, 0.088, 0.058, 0.028, 0.029, 0.043),
-}
-
-
-@pytest.mark.parametrize("beta", ON_THE_WALL)
-def test_thresholds_of_the_profile_on_the_wall(beta: int) -> None:
-    reynolds = np.array([0.1, 1, 3, 10, 30, 100])
-    speed, slope = layer(0 * reynolds, reynolds, shift(reynolds))
-    drag = SCHILLER_NAUMANN.force(speed * reynolds, unit())
-    lift = LIFT_COEFFICIENT * speed * reynolds * np.sqrt(slope) * reynolds
-
-    def theta(drag: FloatArray, lift: FloatArray) -> FloatArray:
-        b = np.radians(beta)
-        moment = drag * np.sin(b) + lift * np.cos(b)
-        return np.asarray(np.pi / 6 * np.cos(b) * reynolds**2 / moment)
-
-    np.testing.assert_allclose(theta(drag, lift), ON_THE_WALL[beta], atol=8e-4)
-    profile = LAWS["profile"]
-    with_gap = theta(profile.drag(reynolds, unit()), profile.lift(reynolds, unit()))
-    assert np.all((with_gap < 0.98 * theta(drag, lift)) & (with_gap > 0.9 * theta(drag, lift)))
