@@ -40,15 +40,7 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class Queue:
-    """Where jobs are asked for, and how.
-
-    Attributes
-    ----------
-    system : str
-        One of SYSTEMS.
-    settings : mapping
-        The table ``[cluster]`` of the study file: arguments of dask-jobqueue's class.
-    """
+    """One of `SYSTEMS`, and the table ``[cluster]`` of the study file: arguments of its class."""
 
     system: str
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -58,16 +50,8 @@ class Queue:
 def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     """Jobs of a queue, for as long as the block runs; a job that is lost is asked for again.
 
-    Parameters
-    ----------
-    queue : Queue
-        Where the jobs are asked for.
-    cases : Path
-        The directory of the study's cases, which all machines see.
-    workers : int
-        How many solvers run at a time, in as many jobs as that takes.
-    limit_s : float
-        Wall time after which a run counts as hung, s.
+    The parameters are those of `engine.local`. All machines see the directory of the cases. There
+    are as many jobs as it takes to run so many solvers at a time.
 
     Raises
     ------

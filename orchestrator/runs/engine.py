@@ -38,18 +38,10 @@ Watch = Callable[[Collection[Case]], None]
 
 @dataclass(frozen=True)
 class Pool:
-    """Where cases run.
+    """Where cases run: an executor of threads or processes, here or elsewhere.
 
-    Attributes
-    ----------
-    executor : Executor
-        Threads or processes, here or elsewhere.
-    task : callable
-        Runs a case and returns what it took, s.
-    places : int
-        How many cases to hand to the executor at a time.
-    lost : tuple of exception types
-        What the executor raises for a case whose process it lost for good.
+    `task` runs a case and returns its time, s. So many cases as `places` are handed to the executor
+    at a time. It raises one of `lost` for a case whose process it lost for good.
     """
 
     executor: Executor
@@ -117,20 +109,10 @@ def execute(
     stop: threading.Event | None = None,
     cores: Cores | None = None,
 ) -> float:
-    """Run one case from its inputs to its marker of being done, and return what it took, s.
+    """Run one case, whose needs are done, to its marker of being done; its time, s.
 
-    Parameters
-    ----------
-    case : Case
-        The case; what it needs is done.
-    cases : Path
-        The directory of the study's cases.
-    limit_s : float
-        Wall time after which the run counts as hung, s.
-    stop : threading.Event, optional
-        Set by another thread to end the run early.
-    cores : Cores, optional
-        Those that the solver takes while it runs; the wait for them is not counted.
+    The solver holds `cores` while it runs, and the wait for them is not counted. `stop` ends the
+    run early; after `limit_s` it counts as hung.
 
     Raises
     ------

@@ -169,19 +169,9 @@ class Folder:
             self._way(name).unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
-        """Make way for a sub-directory; files of others in it are kept aside as they lie.
+        """Make way for a sub-directory, and return its place; files of others are kept aside.
 
-        Parameters
-        ----------
-        name : str
-            The sub-directory.
-        is_ours : callable
-            Whether a file in it is this program's, by its path from there.
-
-        Returns
-        -------
-        Path
-            Its place, which is empty now, in a directory that exists.
+        A file in it is this program's if `is_ours` says so of its path from there.
         """
         with self._naming(name):
             path = self.path(name)

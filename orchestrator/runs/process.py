@@ -215,15 +215,7 @@ def last_words(log: Path) -> str:
 
 @dataclass(frozen=True)
 class Reply:
-    """Output and end of a program that was asked for its version.
-
-    Attributes
-    ----------
-    text : str
-        Text of both streams; bytes that are not UTF-8 are replaced.
-    returncode : int
-        As `subprocess` gives it: negative where a signal ended the program.
-    """
+    """Text of both streams of a program that was asked for its version, and its exit code."""
 
     text: str
     returncode: int

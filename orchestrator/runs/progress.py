@@ -19,15 +19,7 @@ LOOK_S = 1.0
 
 
 class Display:
-    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends.
-
-    Parameters
-    ----------
-    forecast : Forecast
-        Forecast of the cases that are to be run.
-    cases : Path
-        Where they are run.
-    """
+    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends."""
 
     def __init__(self, forecast: "Forecast", cases: Path) -> None:
         self._console = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -82,14 +74,7 @@ class Display:
 class Forecast:
     """The time left: what the cases still cost, at the pace of those that have ended.
 
-    Parameters
-    ----------
-    todo : collection of Case
-        All that is to be run.
-    workers : int
-        Cores that the runs share.
-    after_s : float
-        Expected time of what follows the last run, s.
+    The runs share so many cores as `workers`; `after_s` is expected after the last run, s.
     """
 
     def __init__(self, todo: Collection[Case], workers: int, after_s: float = 0.0) -> None:

@@ -30,15 +30,10 @@ def _interrupt(number: int, frame: object) -> NoReturn:
 
 
 class Stream(io.FileIO):
-    """A standard stream that keeps its first failure instead of raising it: the study goes on.
-
-    Attributes
-    ----------
-    failure : OSError or None
-        Why something was lost; None if its reader has gone, who misses nothing.
-    """
+    """A standard stream that keeps its first failure instead of raising it: the study goes on."""
 
     failure: OSError | None = None
+    """Why something was lost; None if its reader has gone, who misses nothing."""
 
     def write(self, data: Any) -> int:
         """Write what can be written; the rest is lost."""
