@@ -145,7 +145,7 @@ def draw(results: Results) -> Iterator[Figure]:
             f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
             + ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling])),
             words(results, pile),
-            tuple(one.name for one in reversed(pile.runs)),
+            tuple(item.name for item in reversed(pile.runs)),
             None,
             _svg(steps, shown, results.cases).encode(),
             data(steps, shown),

@@ -48,7 +48,7 @@ MODELS = {
 }
 """Colours of the turbulence models."""
 SPEED = r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$"
-SOLVED = [name for name, one in fields.COLUMNS.items() if one.info.scope == "solved flows"]
+SOLVED = [name for name, item in fields.COLUMNS.items() if item.info.scope == "solved flows"]
 NOTABLE_RATIO = 1.5
 """Ratio of roughness lengths of one slope beyond which both have a panel."""
 GAP = 3.0
@@ -174,12 +174,12 @@ def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
     _shade_reversed(top, x / h, wall)
     top.set_ylim(top=1.25 * top.get_ylim()[1])
     grains = results.joined("pile_grain")
-    own = grains[grains["flow_case"] == pile.flow.name] if len(grains) else grains
-    if len(own):  # of the scenes that share the flow, the last
-        own = own.sort_values(["stress", "scene_id", "s_m"])
-        own = own[own["scene_id"] == own["scene_id"].iloc[-1]]
-        place, felt = (own[name].to_numpy(float) for name in ("x_m", "ustar_over_ustar0"))
-        step = np.diff(own["s_m"].to_numpy(float), prepend=np.nan)
+    group = grains[grains["flow_case"] == pile.flow.name] if len(grains) else grains
+    if len(group):  # of the scenes that share the flow, the last
+        group = group.sort_values(["stress", "scene_id", "s_m"])
+        group = group[group["scene_id"] == group["scene_id"].iloc[-1]]
+        place, felt = (group[name].to_numpy(float) for name in ("x_m", "ustar_over_ustar0"))
+        step = np.diff(group["s_m"].to_numpy(float), prepend=np.nan)
         behind_gap = np.flatnonzero(step > GAP * np.median(step[1:])) if len(step) > 1 else step[:0]
         place, felt = (np.insert(values, behind_gap, np.nan) for values in (place, felt))
         top.plot(place / h, felt, gid="grains", zorder=1.5, **GRAINS)
@@ -266,9 +266,7 @@ def over_u_e(
 
 def flow(results: Results) -> Iterator[Figure]:
     """Speed and streamlines: a panel for each slope and height, at its least z0."""
-    piles = drawn(results)
-    for number, start in enumerate(range(0, len(piles), style.PANELS)):
-        shown = piles[start : start + style.PANELS]
+    for name, title, shown in style.pages(drawn(results)):
         toe = max(pile.model.line.x[-2] / pile.bed.height for pile in shown)
         window = left, right, bottom, top = -2.0, toe + 8.0, 0.0, 3.0
         # as high as to scale, with a title over each panel
@@ -301,10 +299,9 @@ def flow(results: Results) -> Iterator[Figure]:
             speeds=values["solve_u_e_m_s"],
             lid=not any(pile.scene.flow.depth for pile in shown),
         )
-        name, title = (f"-{number + 1}", f", more panels ({number})") if number else ("", "")
         names = tuple(pile.flow.name for pile in shown)
         yield Figure(
-            f"flow{name}", f"Flow over the pile{title}", text, names, figure, fold=number > 0
+            f"flow{name}", f"Flow over the pile{title}", text, names, figure, fold=bool(name)
         )
 
 

@@ -31,13 +31,13 @@ def draw(results: Results) -> Iterator[Figure]:
     scenes = grains[held(grains)]
     flat = scenes[scenes["alpha_deg"] == 0]
     if theory.many(flat["force_law"]):
-        for _, own in split(flat, "z0_over_d"):
-            yield from _diagrams(results, own, "force_law")
+        for _, group in split(flat, "z0_over_d"):
+            yield from _diagrams(results, group, "force_law")
     elif len(flat):
         yield from _diagrams(results, flat, "beta_deg")
-    for _, own in split(scenes, "beta_deg"):
-        if (own["alpha_deg"] > 0).any():
-            yield from _diagrams(results, own, "alpha_deg")
+    for _, group in split(scenes, "beta_deg"):
+        if (group["alpha_deg"] > 0).any():
+            yield from _diagrams(results, group, "alpha_deg")
 
 
 def _dem(results: Results) -> pd.DataFrame:
@@ -53,12 +53,11 @@ def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figur
     if len(points):
         points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id")
     if points.empty:  # the closed form depends on nothing that is about its answer
-        choices = [one for one in choices if fields.COLUMNS[one].info.about == "question"]
+        choices = [item for item in choices if fields.COLUMNS[item].info.about == "question"]
     keys = ["beta_deg" if by == "force_law" else "z0_over_d", *choices]
     panels = [part for _, part in split(scenes, *keys)]
     panels = panels if by == "force_law" else panels[::-1]
-    for start in range(0, len(panels), style.PANELS):
-        chosen = panels[start : start + style.PANELS]
+    for name, _, chosen in style.pages(panels):
         every = pd.concat(chosen)
         shown = points[points["scene_id"].isin(every["scene_id"])] if len(points) else points
         figure, axes = style.grid(len(chosen), 2.4)
@@ -71,9 +70,9 @@ def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figur
         shields.prepare(axes, chosen, (low / 2, high * 2))
         looks: list[Sample] = [*shields.within(axes, published)]
         if by == "force_law":
-            for name in theory.drawn(every["force_law"]):
-                colour, dash = theory.look(name)
-                label = labels.value("force_law", name)
+            for law in theory.drawn(every["force_law"]):
+                colour, dash = theory.look(law)
+                label = labels.value("force_law", law)
                 looks.append(Line2D([], [], color=colour, ls=dash, lw=1.4, label=label))
         else:
             shields.mark_drag_law(axes, chosen)
@@ -84,11 +83,11 @@ def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figur
                 label = "crossed: diameter beyond the paper’s"
                 looks.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
         style.legends(figure, _colour_entries(every, by, colours), [*looks, *variants])
-        yield _named(every, shown, by, start // style.PANELS, figure)
+        yield _named(every, shown, by, name, figure)
 
 
 def _named(
-    scenes: pd.DataFrame, points: pd.DataFrame, by: str, number: int, canvas: Canvas
+    scenes: pd.DataFrame, points: pd.DataFrame, by: str, ending: str, canvas: Canvas
 ) -> Figure:
     """A diagram with its name, title and caption."""
     ratio = labels.ratio_of(float(scenes["z0_over_d"].iloc[0]), "d")
@@ -109,9 +108,8 @@ def _named(
         if len(points):
             about = shields.about(points)
             text += f" {caption('grain_dem', about=about, number=figure + 1)}"
-    fold = number > 0 or by == "alpha_deg"
-    name += f"-{number + 1}" if number else ""
-    return Figure(name, title, text, case_names(points), canvas, fold=fold)
+    fold = bool(ending) or by == "alpha_deg"
+    return Figure(f"{name}{ending}", title, text, case_names(points), canvas, fold=fold)
 
 
 def _panel(
@@ -132,11 +130,11 @@ def _panel(
             shields.draw_branch(ax, branch, shade, dash)
         if by == "alpha_deg":
             published = shields.draw_sloped_air(ax, series, colour)
-        own = points[points["scene_id"].isin(series["scene_id"])] if len(points) else points
-        if own.empty:
+        group = points[points["scene_id"].isin(series["scene_id"])] if len(points) else points
+        if group.empty:
             continue
-        shields.draw_points(ax, own, colour, DEM)
-        crossed = own[_beyond(own)] if by != "force_law" else own[:0]
+        shields.draw_points(ax, group, colour, DEM)
+        crossed = group[_beyond(group)] if by != "force_law" else group[:0]
         for filled, cross in ((True, "white"), (False, "0.4")):
             x, y = crossed.loc[valid(crossed) == filled, list(DEM[:2])].to_numpy(float).T
             ax.plot(x, y, "x", color=cross, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
@@ -173,9 +171,9 @@ def accuracy(results: Results) -> Iterator[Figure]:
     axes[0].set_xscale("log")
     for ax, part in zip(axes, panels, strict=True):
         ax.axhline(1, color="0.3", lw=0.8, zorder=1)
-        for (alpha,), own in split(part, "alpha_deg"):
+        for (alpha,), group in split(part, "alpha_deg"):
             colour = colours[float(str(alpha))]
-            shields.draw_points(ax, own, colour, ("reynolds", "value", "low", "high"))
+            shields.draw_points(ax, group, colour, ("reynolds", "value", "low", "high"))
         for bars in (line for line in ax.lines if line.get_gid() == "intervals"):
             bars.set_alpha(0.3)  # of hundreds of points the bars would hide the markers
         reach = 1.6 * float(np.nanmax(np.abs(part[["value", "low", "high"]] - 1)))

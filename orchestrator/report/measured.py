@@ -20,16 +20,16 @@ from orchestrator.report.theory import Bed
 from orchestrator.types import BoolArray, FloatArray
 
 BINS = BUFFINGTON_MONTGOMERY
-MIDDLES = np.array([one.middle for one in BINS])
-MEDIANS = np.array([one.median for one in BINS])
+MIDDLES = np.array([item.middle for item in BINS])
+MEDIANS = np.array([item.median for item in BINS])
 FACTORS_FROM = 0.3
 """Re* from which factors are taken: below it are a dozen measurements."""
 EDGES = np.geomspace(BINS[0].low, BINS[-1].high, 2001)
 GRID = np.sqrt(EDGES[1:] * EDGES[:-1])
 """Re* at which lines are compared with the measured ranges."""
-_AT = np.searchsorted([one.high for one in BINS], GRID, side="right")
-TENTHS = np.array([one.tenth for one in BINS])[_AT]
-NINETIETHS = np.array([one.ninetieth for one in BINS])[_AT]
+_AT = np.searchsorted([item.high for item in BINS], GRID, side="right")
+TENTHS = np.array([item.tenth for item in BINS])[_AT]
+NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
 DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
 """Decades of Re* in which there are measurements."""
 HEAD = (
@@ -125,8 +125,8 @@ def fits(results: Results) -> list[Fit]:
     grains = grains[~grains["force_law"].isin([n for n, law in LAWS.items() if law.unverified])]
     flat = grains[grains["alpha_deg"] == 0]
     combinations = [
-        Fit(str(law), theory.bed_of(own), *theory.span(own))
-        for (law, *_), own in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
+        Fit(str(law), theory.bed_of(group), *theory.span(group))
+        for (law, *_), group in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
     ]
     return sorted(combinations, key=lambda fit: (-round(fit.decades, 2), fit.median_factor))
 

@@ -32,7 +32,7 @@ def render(
     sections : sequence of Markup
         Sections of guests, before the figures.
     """
-    entries = [{**entry(one), "number": n} for n, one in enumerate(figures, 1)]
+    entries = [{**entry(item), "number": n} for n, item in enumerate(figures, 1)]
     return fill("page.html.j2", **parts, sections=sections, figures=entries)
 
 

@@ -39,17 +39,12 @@ HIDING = (
 )
 
 
-def _sixes(rows: pd.DataFrame, keys: list[str]) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
-    """Panels of at most six figures, those of the most piles first, in each by rising keys.
-
-    Yields what follows the name and the title of each figure, and its panels.
-    """
+def _pages(rows: pd.DataFrame, keys: list[str]) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
+    """As `style.pages`, the panels of the most piles first, in each figure by rising keys."""
     panels = [part for _, part in split(rows, *keys)]
     order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
-    for number, start in enumerate(range(0, len(panels), style.PANELS)):
-        chosen = [panels[i] for i in sorted(order[start : start + style.PANELS])]
-        name, title = (f"-{number + 1}", f", more panels ({number})") if number else ("", "")
-        yield name, title, chosen
+    for name, title, chosen in style.pages(order):
+        yield name, title, [panels[i] for i in sorted(chosen)]
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -57,14 +52,14 @@ def fractions(results: Results) -> Iterator[Figure]:
     curve = results.tables.get("pile_curve", pd.DataFrame())
     if len(curve):
         curve = curve[(curve["moved"] > 0) & drawable(curve, "shields")]
-    curves = {str(one): own for (one,), own in split(curve, "scene_id")}
+    curves = {str(item): group for (item,), group in split(curve, "scene_id")}
     scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
     for (alpha,), rows in split(scenes, "alpha_deg"):
         choices, rows, variants = parted(rows, *SHOWN)
         keys = ["z0_over_d", *choices]
-        for name, title, panels in _sixes(rows, keys):
+        for name, title, panels in _pages(rows, keys):
             shown = pd.concat(panels)
             figure, axes = style.grid(len(panels), 2.3)
             for ax, part in zip(axes, panels, strict=True):
@@ -74,7 +69,7 @@ def fractions(results: Results) -> Iterator[Figure]:
                 if (place := ax.get_subplotspec()) is None or place.is_first_col():
                     ax.set_ylabel("$n/N$")
             # the last grains of a pile may wait for a hundred times the stress of the others
-            stress = pd.concat([curves[one] for one in shown["scene_id"]])
+            stress = pd.concat([curves[item] for item in shown["scene_id"]])
             early = stress[stress["fraction_moved"] <= SHOWN_UP_TO]["shields"]
             early = early if len(early) else stress["shields"]
             axes[0].set(xscale="log", xlim=(early.min() / 1.2, 1.2 * early.max()), ylim=(0, 1))
@@ -120,7 +115,7 @@ def extended(results: Results) -> Iterator[Figure]:
         written = labels.ratio_of(float(str(ratio)), "d")
         choices, rows, variants = parted(rows, *SHOWN, "fraction")
         keys = ["alpha_deg", *choices]
-        for name, title, panels in _sixes(rows, keys):
+        for name, title, panels in _pages(rows, keys):
             shown = pd.concat(panels)
             figure, axes = style.grid(len(panels), 2.6 if len(panels) > 1 else 3.4)
             dashes = theory.dashes(shown["force_law"])
@@ -183,14 +178,14 @@ def wear(results: Results) -> Iterator[Figure]:
     if rows.empty:
         return
     colours = style.palette("d_m", sorted(set(rows["d_m"])))
-    for name, title, panels in _sixes(rows, list(WEAR)):
+    for name, title, panels in _pages(rows, list(WEAR)):
         figure, axes = style.grid(len(panels), 2.1)
         for ax, part in zip(axes, panels, strict=True):
-            for (d, _), own in split(part, "d_m", "scene_id"):
-                x, colour = own["fraction_moved"], colours[float(str(d))]
-                ax.plot(x, own["shields_frozen"], color=colour, ls="--", lw=0.9)
-                ax.plot(x, own["shields"], color=colour, lw=1.3)
-                end = own[x == own["holds_until"]]
+            for (d, _), group in split(part, "d_m", "scene_id"):
+                x, colour = group["fraction_moved"], colours[float(str(d))]
+                ax.plot(x, group["shields_frozen"], color=colour, ls="--", lw=0.9)
+                ax.plot(x, group["shields"], color=colour, lw=1.3)
+                end = group[x == group["holds_until"]]
                 ax.plot(end["fraction_moved"], end["shields"], "o", color=colour, ms=4)
             ax.set_title(labels.panel(part.iloc[0], list(WEAR)), loc="left")
         axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
@@ -204,7 +199,7 @@ def wear(results: Results) -> Iterator[Figure]:
             Line2D([], [], color="0.2", ls="", marker="o", ms=4, label="first 5 % apart"),
         ]
         style.legends(figure, entries, looks)
-        piles = (results.plan.piles[one] for one in pd.concat(panels)["scene_id"].unique())
+        piles = (results.plan.piles[item] for item in pd.concat(panels)["scene_id"].unique())
         cases = tuple(pile.runs[-1].name for pile in piles)
         heading = f"Frozen bed and bed that changes{title}"
         yield Figure(f"wear{name}", heading, caption("wear"), cases, figure)
@@ -223,8 +218,8 @@ def poured(results: Results) -> Iterator[Figure]:
     if len(reached):
         norm = LogNorm(reached.min(), reached.max() * 1.001)
         for scene_id in firsts:
-            own = shown[shown["scene_id"] == scene_id]
-            yield _poured_bed(results.plan.piles[str(scene_id)], own, norm)
+            group = shown[shown["scene_id"] == scene_id]
+            yield _poured_bed(results.plan.piles[str(scene_id)], group, norm)
     yield _pivots(results, rows[rows["pivot_deg"].notna()])
     classes = results.joined("size_class")
     if (classes["hiding"].notna() & (classes["size_over_d"] != 1)).any():
@@ -303,9 +298,9 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         part = part[part["hiding"] > 0]
         sizes = part["size_over_d"]
         number = np.rint(np.log(sizes) / np.log(np.sqrt(2)))
-        for (fraction,), own in split(part, "fraction"):
-            logs = own[["size_over_d", "hiding"]].map(np.log).groupby(number[own.index])
-            mean, low, high = (np.exp(one) for one in (logs.mean(), logs.min(), logs.max()))
+        for (fraction,), group in split(part, "fraction"):
+            logs = group[["size_over_d", "hiding"]].map(np.log).groupby(number[group.index])
+            mean, low, high = (np.exp(item) for item in (logs.mean(), logs.min(), logs.max()))
             reach = [mean["hiding"] - low["hiding"], high["hiding"] - mean["hiding"]]
             look: style.Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
             colour = colours[float(str(fraction))]

@@ -51,7 +51,7 @@ class Results:
         if name not in self._joins:
             table = self.tables.get(name, pd.DataFrame())
             if len(table):
-                extra = [one for one in self.scenes if one not in table or one == "scene_id"]
+                extra = [item for item in self.scenes if item not in table or item == "scene_id"]
                 table = table.merge(
                     self.scenes[extra], on="scene_id", how="left", validate="many_to_one"
                 )
@@ -88,12 +88,12 @@ class Results:
 
     def asked(self, pile: Pile) -> pd.Series:
         """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""
-        scene_id = next(asked for asked, one in self.plan.piles.items() if one is pile)
+        scene_id = next(asked for asked, item in self.plan.piles.items() if item is pile)
         return self.scenes[self.scenes["scene_id"] == scene_id].iloc[0]
 
     def has_files(self, pile: Pile) -> bool:
         """Whether the runs of a pile still have the files that pictures are drawn from."""
-        return all(is_whole(one, self.cases) for one in pile.runs)
+        return all(is_whole(item, self.cases) for item in pile.runs)
 
     @cached_property
     def flows(self) -> dict[str, Pile]:
@@ -183,5 +183,5 @@ def valid(table: pd.DataFrame) -> "pd.Series[bool]":
 def case_names(*tables: pd.DataFrame) -> tuple[str, ...]:
     """The cases behind the rows of tables, each once."""
     return tuple(
-        sorted({str(one) for table in tables if len(table) for one in table["case"].dropna()})
+        sorted({str(item) for table in tables if len(table) for item in table["case"].dropna()})
     )

@@ -75,7 +75,7 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame, l
     panels = [column for column in columns if fields.COLUMNS[column].info.about == "question"]
     looks = [column for column in columns if column not in panels]
     # without variants there is a marker for every law, the same in all figures
-    laws = [one for one in LAWS if one in {*theory.PAIR, *table["force_law"]} or not looks]
+    laws = [item for item in LAWS if item in {*theory.PAIR, *table["force_law"]} or not looks]
     while looks and len(table[looks].drop_duplicates()) * len(laws) > len(SHAPES):
         panels.append(looks.pop(0))
     variant = pd.Series(0, index=table.index)
@@ -86,11 +86,11 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame, l
     shape = variant * len(laws) + table["force_law"].map(laws.index)
     rows = table.assign(**{SHAPE: shape.map(lambda at: SHAPES[at % len(SHAPES)])})
     entries: list[Sample] = []
-    for _, own in rows.groupby(variant) if looks else ():
+    for _, group in rows.groupby(variant) if looks else ():
         # the fields of DEM have no effect on a pile that was answered without it
-        label = labels.panel(own.iloc[0], looks) or labels.methods(own)
-        shapes = dict.fromkeys(own.sort_values("force_law", ascending=False)[SHAPE])
-        entries.append(tuple(_mark(one, "0.2", label) for one in shapes))
+        label = labels.panel(group.iloc[0], looks) or labels.methods(group)
+        shapes = dict.fromkeys(group.sort_values("force_law", ascending=False)[SHAPE])
+        entries.append(tuple(_mark(item, "0.2", label) for item in shapes))
     return panels, rows, entries
 
 
@@ -139,7 +139,7 @@ def prepare(
     """
     marks = (*RESULT, WATER, MEASURED)
     lines = [line for ax in axes for line in ax.lines]
-    shown = [one for one in lines if (gid := str(one.get_gid())) in marks or gid.startswith(AIR)]
+    shown = [item for item in lines if (gid := str(item.get_gid())) in marks or gid.startswith(AIR)]
     xy = np.concatenate([np.asarray(line.get_xydata(), float) for line in shown])
     tau = xy[(xy[:, 0] >= xlim[0]) & (xy[:, 0] <= xlim[1]) & (xy[:, 1] > 0), 1]
     for ax, rows in zip(axes, panels, strict=True):
@@ -210,10 +210,12 @@ def draw_points(
     solid, shapes = valid(rows).to_numpy(), rows[SHAPE].to_numpy(str)
     for marker in sorted(set(shapes.tolist())):
         for filled, gid in ((True, RESULT[1]), (False, RESULT[2])):
-            own = (solid == filled) & (shapes == marker)
-            if own.any():
+            group = (solid == filled) & (shapes == marker)
+            if group.any():
                 face = colour if filled else "white"
-                ax.plot(x[own], y[own], marker, mfc=face, mec=colour, mew=0.8, zorder=3, gid=gid)
+                ax.plot(
+                    x[group], y[group], marker, mfc=face, mec=colour, mew=0.8, zorder=3, gid=gid
+                )
 
 
 def draw_water(ax: Axes) -> list[Artist]:
@@ -225,7 +227,7 @@ def draw_water(ax: Axes) -> list[Artist]:
         The entries of a legend.
     """
     gap = np.full((1, 2), np.nan)
-    lines = [part for one in curves.WATER for part in (np.column_stack(one.points()), gap)]
+    lines = [part for item in curves.WATER for part in (np.column_stack(item.points()), gap)]
     ax.plot(*np.concatenate(lines).T, color=style.WATER, lw=0.4, zorder=1, gid=WATER)
     reynolds = np.geomspace(0.01, 1000, 400)
     low, high = theory.water_band(reynolds)
@@ -237,10 +239,10 @@ def draw_water(ax: Axes) -> list[Artist]:
     band: style.Look = {"color": style.WATER, "alpha": 0.45, "lw": 0}
     ax.fill_between(reynolds, low, high, where=there.tolist(), zorder=1, gid="water band", **band)
     bins = BUFFINGTON_MONTGOMERY
-    x, y = [one.middle for one in bins], [one.median for one in bins]
+    x, y = [item.middle for item in bins], [item.median for item in bins]
     look: style.Look = {"color": "black", "lw": 0.7, "zorder": 2.2, "gid": MEASURED}
-    ax.vlines(x, [one.tenth for one in bins], [one.ninetieth for one in bins], **look)
-    ax.hlines(y, [one.low for one in bins], [one.high for one in bins], **look)
+    ax.vlines(x, [item.tenth for item in bins], [item.ninetieth for item in bins], **look)
+    ax.hlines(y, [item.low for item in bins], [item.high for item in bins], **look)
     ax.plot(x, y, "s", ms=3.5, **look)
     label = "measured in water: median, 10 to 90 %"
     return [
@@ -276,7 +278,7 @@ def draw_sloped_air(ax: Axes, scenes: pd.DataFrame, colour: str) -> list[Artist]
 def line_entries(rows: pd.DataFrame, dashes: Mapping[str, theory.Dash]) -> list[Artist]:
     """Legend of the closed form's line styles, for the laws of some rows."""
     pair = {theory.PAIR[0]: "Eqs. 3, 5"} if theory.PAIR[0] in dashes else {}
-    others = {one: labels.value("force_law", one) for one in dashes if one not in theory.PAIR}
+    others = {item: labels.value("force_law", item) for item in dashes if item not in theory.PAIR}
     look: style.Look = {"color": "0.2", "gid": RESULT[0]}
     entries: list[Artist] = [
         Line2D([], [], lw=1.1, ls=dashes[name], label=f"closed form: {label}", **look)
@@ -296,11 +298,11 @@ def point_entries(rows: pd.DataFrame, variants: Sequence[Sample] = ()) -> list[S
     names = [name for name in LAWS if (rows["force_law"] == name).any()]
     entries: list[Sample] = []
     for name in names if len(names) > 1 or not variants else ():
-        own = rows[rows["force_law"] == name]
-        label = f"{labels.methods(own)}, {labels.value('force_law', name)}"
-        shapes = sorted(set(own[SHAPE]))
-        shapes = shapes if len(shapes) <= BESIDE else [own[SHAPE].mode()[0]]
-        marks = tuple(_mark(one, "0.2", label) for one in shapes)
+        group = rows[rows["force_law"] == name]
+        label = f"{labels.methods(group)}, {labels.value('force_law', name)}"
+        shapes = sorted(set(group[SHAPE]))
+        shapes = shapes if len(shapes) <= BESIDE else [group[SHAPE].mode()[0]]
+        marks = tuple(_mark(item, "0.2", label) for item in shapes)
         entries.append(marks if len(marks) > 1 else marks[0])
     if not valid(rows).all():
         shape = rows.loc[~valid(rows), SHAPE].iloc[0]
@@ -326,7 +328,7 @@ def within(axes: Sequence[Axes], entries: Sequence[Artist]) -> list[Artist]:
                 x, y = np.asarray(path.vertices, float).T
                 if x.max() >= left and x.min() <= right and y.max() >= low and y.min() <= high:
                     seen.add(bars.get_gid())
-    return [one for one in entries if one.get_gid() in seen]
+    return [item for item in entries if item.get_gid() in seen]
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -350,7 +352,7 @@ def draw(results: Results) -> Iterator[Figure]:
     reynolds = np.geomspace(low / 2, high * 2, theory.POINTS)
     for at, fit in enumerate(lines):
         # a law on another bed has a thinner line
-        width = 1.4 / (1 + [one.law for one in lines[:at]].count(fit.law))
+        width = 1.4 / (1 + [item.law for item in lines[:at]].count(fit.law))
         entries.append(_law(ax, fit, reynolds, width))
     prepare([ax], [scenes], (low, high))
     bottom, top = ax.get_ylim()
@@ -398,11 +400,11 @@ def _lines(results: Results) -> list[Fit]:
     for the least and the largest. Other laws have one line, on the bed that fits the measurements
     best. The two laws of the paper are one model: both have the same bed.
     """
-    beds = [own for _, own in split(results.beds("pile").assign(alpha_deg=0.0), *BED)]
+    beds = [group for _, group in split(results.beds("pile").assign(alpha_deg=0.0), *BED)]
     of_piles = [
-        Fit(name, theory.bed_of(own), *theory.span(own))
-        for own in (beds if len(beds) <= 2 else [beds[0], beds[-1]])
-        for name in theory.drawn(own["force_law"])
+        Fit(name, theory.bed_of(group), *theory.span(group))
+        for group in (beds if len(beds) <= 2 else [beds[0], beds[-1]])
+        for name in theory.drawn(group["force_law"])
     ]
     best = measured.best(measured.fits(results))
     best = best if len(best) <= LINES else [fit for fit in best if fit.decades > 0] or best
@@ -430,16 +432,16 @@ def _points(
     threshold with the interval, why it is not usable, its case. Returns the entries of a legend.
     """
     shape, size = ("o", 2.4) if name == "single grain" else (SHAPES[1], 3.6)
-    extra = labels.varying(rows, *(one for one in (*TOLD, "fraction") if one in rows))
+    extra = labels.varying(rows, *(item for item in (*TOLD, "fraction") if item in rows))
     ends = [f"{column}_low", f"{column}_high"]
-    for (alpha, usable), own in split(rows.assign(valid=valid(rows)), "alpha_deg", "valid"):
+    for (alpha, usable), group in split(rows.assign(valid=valid(rows)), "alpha_deg", "valid"):
         colour, gid = shades[float(str(alpha))], f"{NAME}-{len(groups)}"
-        x, y, low, high = (own[c].to_numpy(float) for c in ("reynolds", column, *ends))
+        x, y, low, high = (group[c].to_numpy(float) for c in ("reynolds", column, *ends))
         ax.vlines(x, low, high, color=colour, lw=0.6, zorder=2.5)
         face = colour if usable else "white"
         look: style.Look = {"marker": shape, "ms": size, "mec": colour, "mew": 0.6, "mfc": face}
         ax.plot(x, y, ls="", zorder=3, gid=gid, **look)
-        groups[gid] = [_texts(row, column, extra) for _, row in own.iterrows()]
+        groups[gid] = [_texts(row, column, extra) for _, row in group.iterrows()]
     if name == "pile" and rows["fraction"].nunique() == 1:
         name += f" at n/N = {rows['fraction'].iloc[0]:.0%}"
     entries: list[Artist] = []

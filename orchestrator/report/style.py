@@ -1,10 +1,10 @@
 """How all figures look: sizes, colours by meaning, legends, files."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from matplotlib import colormaps
 from matplotlib.artist import Artist
@@ -34,6 +34,7 @@ DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "
 WATER = "#74aed6"
 AIR = "#8c6d46"
 BED = "#d9c9a3"
+Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
 Sample = Artist | tuple[Artist, ...]
@@ -107,13 +108,20 @@ def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
     return figure, list(axes[:count])
 
 
+def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]:
+    """At most six panels for each figure, after the endings of the figure's name and title."""
+    for number, start in enumerate(range(0, len(panels), PANELS)):
+        name, title = (f"-{number + 1}", f", more panels ({number})") if number else ("", "")
+        yield name, title, panels[start : start + PANELS]
+
+
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
     """Place the legend of colours above the panels and all other samples below them."""
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
         handles: list[Any] = list(looks)  # the stubs know no samples of two marks
-        names = [str((one[0] if isinstance(one, tuple) else one).get_label()) for one in looks]
+        names = [str((item[0] if isinstance(item, tuple) else item).get_label()) for item in looks]
         beside = {tuple: HandlerTuple(ndivide=None)}
         figure.legend(handles, names, loc="outside lower center", ncols=3, handler_map=beside)
 

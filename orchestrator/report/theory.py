@@ -122,10 +122,10 @@ def branches(scenes: pd.DataFrame) -> list[Branch]:
     low, high = span(scenes)
     reynolds = np.geomspace(low / WIDER, high * WIDER, POINTS)
     lines = []
-    for _, own in split(scenes, "alpha_s"):
-        bed = bed_of(own)
-        for law in drawn(own["force_law"]):
-            here = own[own["force_law"] == law]
+    for _, group in split(scenes, "alpha_s"):
+        bed = bed_of(group)
+        for law in drawn(group["force_law"]):
+            here = group[group["force_law"] == law]
             first, last = span(here) if len(here) else (np.inf, 0.0)
             valid = law_holds(law, reynolds, bed)
             near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
@@ -136,8 +136,8 @@ def branches(scenes: pd.DataFrame) -> list[Branch]:
 
 def bed_of(scenes: pd.DataFrame) -> Bed:
     """The bed of scenes that share it."""
-    one = scenes.iloc[0]
-    return Bed(*(float(one[c]) for c in ("alpha_deg", "beta_deg", "z0_over_d", "alpha_s")))
+    item = scenes.iloc[0]
+    return Bed(*(float(item[c]) for c in ("alpha_deg", "beta_deg", "z0_over_d", "alpha_s")))
 
 
 def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
@@ -165,7 +165,7 @@ def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
     groups = split(scenes[[*GRAIN, "force_law"]], "force_law")
-    every = [one.reynolds for (law,), own in groups for one in thresholds(own, str(law))]
+    every = [item.reynolds for (law,), group in groups for item in thresholds(group, str(law))]
     reynolds = np.array(every, float)
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min()), float(reynolds.max())
@@ -214,11 +214,11 @@ def air_lines(
     scenes = scenes[in_gas(scenes)]
     if scenes.empty:
         return {}
-    one = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
-    air = Air(one["rho_sol_kg_m3"], one["rho_f_kg_m3"], one["nu_m2_s"], one["g_m_s2"])
+    item = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
+    air = Air(item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"])
     ends = min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max())
     d = np.geomspace(*ends, POINTS)
-    factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), one["phi_deg"])
+    factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), item["phi_deg"])
     lines = {name: air.shields_diagram(d, factor * _ustar(name, air, *ends)) for name in curves.AIR}
     x, y = lines["Bagnold 1941"]
     lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]

@@ -65,23 +65,31 @@ def text(results: Results) -> str:
 def sentences(results: Results) -> list[str]:
     """The answer, from the least slope to the largest; a warning where little is usable."""
     piles, grains = results.joined("pile_threshold"), results.joined("single_grain")
-    if len(piles):
-        hills = list(_hills(results))
-        telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:TELLING]
-        ends = _ends(results) if valid(piles).any() or not hills else []
-        answers = [*hills, *(_pile(row, results, telling) for row in ends)]
-        notes = [*_frozen(piles), *_defaults(results), *_tolerance(piles, results.study.tolerance)]
-        return [*answers, *_usable(piles), *notes]
-    return [*_grains(grains), *_usable(grains)] if len(grains) else []
-
-
-def _ends(results: Results) -> list[pd.Series]:
-    """The piles of the least and of the largest slope in each fluid; pictures show them, too."""
-    ends = []
-    for _, piles in split(results.exemplars, "rho_f_kg_m3"):
-        firsts = piles.drop_duplicates("alpha_deg")
-        ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
-    return sorted(ends, key=lambda row: float(row["alpha_deg"]))
+    table = piles if len(piles) else grains
+    if table.empty:
+        return []
+    usable = int(valid(table).sum())
+    count = f"Usable: {usable} of {len(table)} thresholds."
+    warnings = [count] if usable < len(table) else []
+    if piles.empty:
+        return [*_grains(grains), *warnings]
+    hills, ends = list(_hills(results)), []
+    if usable or not hills:  # the least and the largest slope in each fluid, as in the pictures
+        for _, wet in split(results.exemplars, "rho_f_kg_m3"):
+            firsts = wet.drop_duplicates("alpha_deg")
+            ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
+    ends.sort(key=lambda row: float(row["alpha_deg"]))
+    telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:TELLING]
+    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
+    if len(beyond):
+        warnings.append(caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED))
+    chosen = [d for d in results.plan.decisions.values() if d.by_default]
+    if chosen:
+        names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
+        error = max(item.known.total for item in chosen)
+        warnings.append(caption("defaults", names=names, error=error, floor=lowest_floor()))
+    warnings += _tolerance(piles, results.study.tolerance)
+    return [*hills, *(_pile(row, results, telling) for row in ends), *warnings]
 
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
@@ -132,28 +140,6 @@ def _hills(results: Results) -> Iterator[str]:
             measured=rows["measured_reattachment_over_h"].iloc[0],
             verified=rows["measured_verified"].all(),
         )
-
-
-def _usable(table: pd.DataFrame) -> Iterator[str]:
-    usable = int(valid(table).sum())
-    if usable < len(table):
-        yield f"Usable: {usable} of {len(table)} thresholds."
-
-
-def _frozen(piles: pd.DataFrame) -> Iterator[str]:
-    """Where the flow of the whole pile is known to be too little to go by."""
-    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
-    if len(beyond):
-        yield caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED)
-
-
-def _defaults(results: Results) -> Iterator[str]:
-    """The levels that answered where the study file says nothing of them."""
-    chosen = [d for d in results.plan.decisions.values() if d.by_default]
-    if chosen:
-        names = ", ".join(dict.fromkeys(one.levels.text for one in chosen if one.levels))
-        error = max(one.known.total for one in chosen)
-        yield caption("defaults", names=names, error=error, floor=lowest_floor())
 
 
 def _tolerance(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
@@ -208,9 +194,9 @@ def _each(rows: pd.DataFrame) -> pd.DataFrame:
             "d": labels.millimetres(row["d_m"]),
             "forces": labels.value("force_law", row["force_law"]),
         }
-        for one in telling:
-            told = labels.is_told(one, row[one])
-            cell[labels.words(one).label] = labels.value(one, row[one]) if told else "—"
+        for item in telling:
+            told = labels.is_told(item, row[item])
+            cell[labels.words(item).label] = labels.value(item, row[item]) if told else "—"
         if (rows["of_seeds"] > 1).any():
             ends = f": {row['least']:.4f} … {row['largest']:.4f}" if row["seeds"] > 1 else ""
             cell["τ_c of each seed"] = f"{row['seeds']} of {row['of_seeds']}{ends}"
@@ -232,23 +218,23 @@ def _ranges(
     rows: pd.DataFrame, keys: list[str], tau: str, shields: str, ustar: str
 ) -> pd.DataFrame:
     """Ranges of usable thresholds by some columns; fluids are never merged."""
-    fluids = [one for one in ("rho_f_kg_m3", "nu_m2_s") if rows[one].nunique() > 1]
+    fluids = [item for item in ("rho_f_kg_m3", "nu_m2_s") if rows[item].nunique() > 1]
     cells = []
-    for _, own in split(rows, *keys, *fluids):
-        first, usable = own.iloc[0], own[valid(own)]
+    for _, group in split(rows, *keys, *fluids):
+        first, usable = group.iloc[0], group[valid(group)]
         cells.append(
             {
                 "slope": labels.value("alpha_deg", first["alpha_deg"]),
-                "d": f"{_span(own['d_m'] * 1e3, 'g')} mm",
+                "d": f"{_span(group['d_m'] * 1e3, 'g')} mm",
                 "forces": labels.value("force_law", first["force_law"]),
-                **{labels.words(one).symbol: labels.value(one, first[one]) for one in fluids},
+                **{labels.words(item).symbol: labels.value(item, first[item]) for item in fluids},
                 **({"by": first["by"]} if "by" in keys else {}),
                 tau: _span(usable[shields], ".4f"),
                 "interval": _interval(
                     usable[f"{shields}_low"].min(), usable[f"{shields}_high"].max()
                 ),
                 "u*₀, m/s": _span(usable[ustar], ".3f"),
-                "usable": f"{len(usable)} of {len(own)}",
+                "usable": f"{len(usable)} of {len(group)}",
             }
         )
     return pd.DataFrame(cells)
@@ -274,8 +260,8 @@ def piles(results: Results) -> pd.DataFrame | None:
         return None
     extra = labels.varying(rows, *SHOWN, "fraction")
     cells = []
-    for _, own in split(rows, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
-        row = own.iloc[0]
+    for _, group in split(rows, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
+        row = group.iloc[0]
         slope, ratio = labels.value("alpha_deg", row["alpha_deg"]), row["z0_over_d"]
         cell = {
             "pile: α, d, z₀": f"{slope}, {labels.millimetres(row['d_m'])},\n"
@@ -285,16 +271,16 @@ def piles(results: Results) -> pd.DataFrame | None:
             **({"other choices": "\n".join(labels.told(row, extra))} if extra else {}),
             "N": str(row["count"]),
         }
-        for _, one in own.sort_values("fraction").iterrows():
-            interval = _interval(one["shields_low"], one["shields_high"])
-            cell[f"τ_c at n/N = {one['fraction']:.0%}"] = (
-                str(one["why_not"])
-                if pd.isna(one["shields"])
-                else f"{one['shields']:.4f}\n({interval})\nu*₀ {one['ustar0_m_s']:.3f} m/s"
+        for _, item in group.sort_values("fraction").iterrows():
+            interval = _interval(item["shields_low"], item["shields_high"])
+            cell[f"τ_c at n/N = {item['fraction']:.0%}"] = (
+                str(item["why_not"])
+                if pd.isna(item["shields"])
+                else f"{item['shields']:.4f}\n({interval})\nu*₀ {item['ustar0_m_s']:.3f} m/s"
             )
         cells.append({**cell, "case": row["case"] if isinstance(row["case"], str) else ""})
     table = pd.DataFrame(cells).fillna("—")
-    return table[[*(one for one in table if one != "case"), "case"]]
+    return table[[*(item for item in table if item != "case"), "case"]]
 
 
 def single_grains(results: Results) -> pd.DataFrame | None:
@@ -312,16 +298,16 @@ def single_grains(results: Results) -> pd.DataFrame | None:
     )
     cells = [
         {
-            "forces": labels.value("force_law", own["force_law"].iloc[0]),
-            "law holds": own["holds"].iloc[0],
-            "protocol": own["protocol"].iloc[0],
-            "grains": str(len(own)),
-            "never moved": str(int(own["off"].isna().sum())),
-            "mean of u*/u*(closed form) − 1": f"{own['off'].mean():+.3%}",
-            "largest |u*/u*(closed form) − 1|": f"{own['off'].abs().max():.3%}",
-            "median half width of the interval": f"±{own['width'].median():.3%}",
+            "forces": labels.value("force_law", group["force_law"].iloc[0]),
+            "law holds": group["holds"].iloc[0],
+            "protocol": group["protocol"].iloc[0],
+            "grains": str(len(group)),
+            "never moved": str(int(group["off"].isna().sum())),
+            "mean of u*/u*(closed form) − 1": f"{group['off'].mean():+.3%}",
+            "largest |u*/u*(closed form) − 1|": f"{group['off'].abs().max():.3%}",
+            "median half width of the interval": f"±{group['width'].median():.3%}",
         }
-        for _, own in split(rows, "force_law", "holds", "protocol")
+        for _, group in split(rows, "force_law", "holds", "protocol")
     ]
     table = pd.DataFrame(cells)
     return table.sort_values(["forces", "law holds", "protocol"], ascending=False)
@@ -344,14 +330,14 @@ def force_laws(results: Results) -> pd.DataFrame:
 def parameters(results: Results) -> pd.DataFrame:
     """The values that each parameter of the scenes takes."""
     rows = []
-    for column, one in fields.COLUMNS.items():
+    for column, item in fields.COLUMNS.items():
         asked, run = _values(results.scenes[column]), fields.ANSWERED + column
         answered = _values(results.scenes[run]) if run in fields.ANSWERS else asked
         if asked or answered:
-            symbol = one.info.symbol.replace("_0", "₀")
-            name = f"{one.info.label}, {symbol}" if symbol else one.info.label
+            symbol = item.info.symbol.replace("_0", "₀")
+            name = f"{item.info.label}, {symbol}" if symbol else item.info.label
             other = "" if answered == asked else answered
-            rows.append((name, one.info.unit, one.name or column, asked or "default", other))
+            rows.append((name, item.info.unit, item.name or column, asked or "default", other))
     head = ["parameter", "unit", "in a study file", "asked for", "answered with, if otherwise"]
     return pd.DataFrame(rows, columns=head)
 
@@ -382,7 +368,7 @@ def programs(results: Results) -> pd.DataFrame:
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
     """Solvers with their versions, this package, and the libraries that are not among them."""
     rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
-    installed = {one.metadata["Name"].lower(): one.version for one in metadata.distributions()}
+    installed = {item.metadata["Name"].lower(): item.version for item in metadata.distributions()}
     rows += [
         (name, installed.get(name, "not installed")) for name in PACKAGES if name not in solvers
     ]
@@ -394,13 +380,13 @@ def times(timings: pd.DataFrame) -> pd.DataFrame | None:
     if timings.empty:
         return None
     rows = []
-    for name, own in [
-        *((str(kind), own) for (kind,), own in split(timings, "kind")),
+    for name, group in [
+        *((str(kind), group) for (kind,), group in split(timings, "kind")),
         ("all", timings),
     ]:
-        wall = own["solver_s"] + own["outside_s"]
-        seconds = (own["solver_s"].sum(), own["outside_s"].sum(), wall.max())
-        rows.append((name, str(len(own)), *(f"{value:.1f}" for value in seconds)))
+        wall = group["solver_s"] + group["outside_s"]
+        seconds = (group["solver_s"].sum(), group["outside_s"].sum(), wall.max())
+        rows.append((name, str(len(group)), *(f"{value:.1f}" for value in seconds)))
     head = ["kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s"]
     return pd.DataFrame(rows, columns=head)
 
@@ -409,14 +395,14 @@ def levels(results: Results) -> pd.DataFrame | None:
     """On which fidelity levels the piles were answered, why, and what is known of them."""
     table = results.joined("pile_threshold")
     rows = []
-    for (flow, grain, why), own in split(table, "flow_level", "grain_level", "why"):
-        error = own["error_estimate"].max()
+    for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
+        error = group["error_estimate"].max()
         rows.append(
             {
                 "flow | grains": f"{flow} | {grain}",
                 "description": fidelity.meaning([str(flow), str(grain)]),
                 "reason": str(why),
-                "piles": str(own["scene_id"].nunique()),
+                "piles": str(group["scene_id"].nunique()),
                 "known error of τ_c, up to": "not known"
                 if pd.isna(error)
                 else f"{100 * error:.1f} %",
@@ -429,18 +415,18 @@ def checks(results: Results) -> pd.DataFrame | None:
     """The piles that DEM answered as well: how far the cheap answers are from it."""
     rows = [
         {
-            "piles": f"{labels.amount(one['alpha_deg'], '°')}, {one['packing']}, "
-            f"{labels.value('force_law', one['force_law'])}",
-            "d": f"{1e3 * one['d_m']:g} mm",
-            "n/N": f"{one['fraction']:.0%}",
-            "τ_c": f"{one['shields']:.4g}",
-            "by DEM": f"{one['shields_dem']:.4g} "
-            f"({one['shields_dem_low']:.4g} … {one['shields_dem_high']:.4g})",
-            "difference": f"{100 * one['difference']:+.1f} %",
-            "agree": "yes" if one["agree"] else "no",
-            "case": str(one["case"]),
+            "piles": f"{labels.amount(item['alpha_deg'], '°')}, {item['packing']}, "
+            f"{labels.value('force_law', item['force_law'])}",
+            "d": f"{1e3 * item['d_m']:g} mm",
+            "n/N": f"{item['fraction']:.0%}",
+            "τ_c": f"{item['shields']:.4g}",
+            "by DEM": f"{item['shields_dem']:.4g} "
+            f"({item['shields_dem_low']:.4g} … {item['shields_dem_high']:.4g})",
+            "difference": f"{100 * item['difference']:+.1f} %",
+            "agree": "yes" if item["agree"] else "no",
+            "case": str(item["case"]),
         }
-        for one in results.tables.get("check", pd.DataFrame()).to_dict("records")
+        for item in results.tables.get("check", pd.DataFrame()).to_dict("records")
     ]
     return pd.DataFrame(rows) if rows else None
 

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics.laws import LAWS
-from orchestrator.report import flows, labels, piles, shields, style, theory, words
+from orchestrator.report import flows, labels, piles, shields, words
 from orchestrator.report.results import Results
 from orchestrator.report.shields import SHAPE
 from orchestrator.study import fields
@@ -60,14 +59,6 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     assert names == ["mobile layers = 1", "mobile layers = 2"]
 
 
-def test_each_force_law_has_a_marker(table: pd.DataFrame) -> None:
-    laws = table.assign(force_law=["high", "bridged", "zeng", "low"])
-    _, rows, _ = shields.parted(laws, *SHOWN, "force_law", "mobile_layers", "stiffness")
-    assert rows[SHAPE].tolist() == ["s", "^", "<", "o"]
-    every = pd.concat([table.iloc[[0]]] * len(LAWS)).assign(force_law=[*LAWS])
-    assert shields.parted(every, *SHOWN)[1][SHAPE].is_unique
-
-
 @pytest.fixture(scope="module")
 def two(results: Results) -> Results:
     """The study's pile, and the same on one layer more."""
@@ -112,15 +103,6 @@ def test_page_lists_every_parameter(results: Results) -> None:
     assert float(asked["flow.first_cell_height"][4]) > 0
 
 
-def test_legends_leave_out_curves_beyond_the_frame() -> None:
-    ax = style.canvas(2.0).subplots()
-    entries = shields.draw_water(ax)
-    ax.set(xlim=(10, 100), ylim=(0.01, 0.1))
-    assert shields.within([ax], entries) == entries
-    ax.set(xlim=(10, 100), ylim=(1, 10))
-    assert shields.within([ax], entries) == []
-
-
 @pytest.mark.parametrize(
     ("column", "value", "said"),
     [
@@ -138,12 +120,6 @@ def test_legends_leave_out_curves_beyond_the_frame() -> None:
 )
 def test_values_with_their_symbols(column: str, value: object, said: str) -> None:
     assert labels.plain(column, value) == said
-
-
-def test_each_force_law_has_a_look_of_its_own() -> None:
-    looks = [theory.look(name) for name in LAWS]
-    assert len({str(look) for look in looks}) == len(LAWS)
-    assert not {colour for colour, _ in looks} & {style.WATER, style.AIR}
 
 
 def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:

@@ -101,8 +101,7 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
 def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     thetas = (0.04, 0.05, 0.09)
     study = copies(
-        results,
-        *({"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas)),
+        results, *({"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas))
     )
     sheet = words.sheet(study)
     assert sheet is not None

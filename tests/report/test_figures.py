@@ -170,18 +170,6 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
     assert list(pile_figures(empty)) == list(flows.stress(empty)) == []
 
 
-def test_grains_that_hardly_ever_go_do_not_set_the_scale(results: Results) -> None:
-    curve = results.tables["pile_curve"]
-    last = curve[curve["moved"] > 0].tail(1).assign(fraction_moved=0.97, shields=120.0)
-    changed = {**results.tables, "pile_curve": pd.concat([curve, last])}
-    (ax,) = drawn(piles.fractions(replace(results, tables=changed)))["fractions-alpha15"]
-    assert ax.get_xscale() == "log"
-    low, high = ax.get_xlim()
-    early = curve[(curve["moved"] > 0) & (curve["fraction_moved"] <= piles.SHOWN_UP_TO)]
-    shown = early["shields"]
-    assert low < shown.min() <= shown.max() < high < 1
-
-
 def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
     several_piles: Results,
 ) -> None:

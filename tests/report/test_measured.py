@@ -84,22 +84,6 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     assert measured.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
 
 
-def test_combinations_are_those_of_the_study(several: Results, flat: pd.DataFrame) -> None:
-    found = measured.fits(several)
-    asked = flat[["force_law", "beta_deg", "z0_over_d"]].drop_duplicates()
-    assert {(f.law, f.bed.entrainment_angle_deg, f.bed.roughness_ratio) for f in found} == {
-        tuple(row) for row in asked.to_numpy().tolist()
-    }
-    assert [round(f.decades, 2) for f in found] == sorted(
-        (round(f.decades, 2) for f in found), reverse=True
-    )
-    firsts = measured.best(found)
-    assert {f.law for f in firsts} == set(flat["force_law"])
-    for one in firsts:
-        own = [f for f in found if f.law == one.law]
-        assert one is own[0]
-
-
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:
     (figure,) = shields.draw(several)
     assert figure.canvas is not None
