@@ -57,11 +57,6 @@ def test_mean_of_eq10_is_that_of_its_signed_square(stress: WallStress) -> None:
     assert stress.mean_over(0.01, 4e-3, "eq10") == pytest.approx(expected, rel=1e-12)
 
 
-def test_mean_within_one_face_is_its_value(stress: WallStress) -> None:
-    within = stress.mean_over(stress.s_m, 0.9 * stress.length_m)
-    np.testing.assert_allclose(within, stress.tau_wall, rtol=1e-9)
-
-
 def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStress:
     """A flat bed, then a slope from s = 0 on, of 20 faces each 1 mm long; tau of each from s."""
     s = np.arange(-19.5, 20) * 1e-3
@@ -97,22 +92,10 @@ def test_no_face_reaches_beyond_its_neighbours() -> None:
     assert read.max() <= 2.0 + 1e-9
 
 
-def test_mean_over_the_whole_bed(stress: WallStress) -> None:
-    start, end = stress.edges_m[0], stress.edges_m[-1]
-    whole = stress.mean_over((start + end) / 2.0, (end - start) * (1.0 - 1e-12))
-    assert whole == pytest.approx(np.average(stress.tau_wall, weights=stress.length_m))
-
-
 @pytest.mark.parametrize(("s", "length"), [(0.0, 0.0), (0.0, -1.0), (0.0, 1.0), (9.0, 1e-4)])
 def test_no_mean_beyond_the_bed(stress: WallStress, s: float, length: float) -> None:
     with pytest.raises(InputError, match="within the bed"):
         stress.mean_over(s, length)
-
-
-def test_friction_velocity_keeps_the_sign(stress: WallStress) -> None:
-    ustar = stress.ustar_over_ustar0_wall
-    assert np.any(ustar < 0.0)
-    np.testing.assert_allclose(ustar * np.abs(ustar), stress.tau_wall)
 
 
 def test_table_gives_the_same_numbers_back(stress: WallStress, tmp_path: Path) -> None:

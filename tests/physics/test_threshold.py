@@ -157,15 +157,6 @@ def test_the_shields_number_depends_on_the_scale_through_the_reynolds_number(
     assert float(large.reynolds) == pytest.approx(float(small.reynolds), rel=1e-11)
 
 
-def test_a_torque_and_a_lift_both_lower_the_threshold() -> None:
-    bare = water(3e-4, law="zeng").friction_velocity
-    assert float(water(3e-4, law="zeng-torque").friction_velocity) < float(bare)
-    without = Exposure(3e-4, 1e-5, 1000.0, 1e-6, 0.0)
-    grain = {"density": 2650.0, "slope_deg": 0, "entrainment_angle_deg": 50}
-    level = threshold(LAWS["bridged"], without, **grain).friction_velocity
-    assert float(water(3e-4).friction_velocity) < float(level)
-
-
 def test_without_resistance_there_is_no_threshold() -> None:
     found = threshold(
         LAWS["bridged"],
@@ -183,11 +174,6 @@ def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
     found = water(1e-3, beta=0, law="claudin-andreotti")
     assert float(found.friction_velocity) == float(found.shields) == np.inf
     assert not bool(found.valid)
-
-
-def test_gravel_is_beyond_one_drag_and_within_another() -> None:
-    assert not bool(water(0.02).valid)
-    assert bool(water(0.02, law="bridged-gravel").valid)
 
 
 @pytest.mark.parametrize(("lift", "reason"), [(10.0, "lift over the weight"), (1.615, "")])
