@@ -389,7 +389,7 @@ def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatA
     if lattice.pattern == "horizontal":
         yield _level_rows(top, lattice)
     for turn in (True, False) if lattice.pattern != "horizontal" else (False,):
-        for first, last in (part for part, own in zip(parts, carries, strict=True) if own == turn):
+        for first, last in (part for part, has in zip(parts, carries, strict=True) if has == turn):
             points = _rows_along(top, first, last, lattice, counted=turn)
             straight = first == last and lattice.pattern == "aligned"
             yield points[_depth(top, points)[1] >= -(TIE if straight else STRAY)]

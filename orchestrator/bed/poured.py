@@ -138,12 +138,12 @@ class Mould:
         # with no room to the sides each lane would stay a bed in a plane
         lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
         for lane in range(lanes):
-            own = slice(lane, None, lanes)
-            places[own, 0], places[own, 2] = self._lane(sizes[own], chance[own]).T
+            grains = slice(lane, None, lanes)
+            places[grains, 0], places[grains, 2] = self._lane(sizes[grains], chance[grains]).T
             if self.width:
                 wide = self.width / lanes
-                aside = (chance[own, 2] - 0.5) * (wide - sizes[own])
-                places[own, 1] = (lane + 0.5) * wide + aside
+                aside = (chance[grains, 2] - 0.5) * (wide - sizes[grains])
+                places[grains, 1] = (lane + 0.5) * wide + aside
         return places
 
     def _lane(self, sizes: FloatArray, chance: FloatArray) -> FloatArray:
@@ -216,8 +216,8 @@ class PouredBed(Case):
         """The bed line, what is poured, and the seed."""
         fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
         sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
-        own = {name: getattr(self, name) for name in fields}
-        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **own}
+        values = {name: getattr(self, name) for name in fields}
+        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **values}
 
     @cached_property
     def mould(self) -> Mould:

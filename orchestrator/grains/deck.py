@@ -224,8 +224,8 @@ def write(
     for place, axis in enumerate("xz"):
         _write_sets(directory / f"force.{axis}.txt", pushed, force[:, pushed, place])
         # in these units displacement is one in the grain's own diameter
-        own = grains.along[None, counted, place] / grains.sizes[counted]
-        _write_sets(directory / f"along.{axis}.txt", counted, own)
+        direction = grains.along[None, counted, place] / grains.sizes[counted]
+        _write_sets(directory / f"along.{axis}.txt", counted, direction)
 
 
 def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:

@@ -222,10 +222,10 @@ class Loads:
     @cached_property
     def loading(self) -> Loading:
         """The forces on the grains: exposed ones that may move carry one."""
-        of, packed = self.geometry, self.geometry.packing
-        drag, lift = forces(of.scene, packed.sizes, of.gaps)
-        normals = np.column_stack([-of.tangents[:, 1], of.tangents[:, 0]])
-        return Loading(drag, lift, np.where(packed.pushed, self.ratio, 0.0), of.tangents, normals)
+        bed, packed = self.geometry, self.geometry.packing
+        drag, lift = forces(bed.scene, packed.sizes, bed.gaps)
+        normals = np.column_stack([-bed.tangents[:, 1], bed.tangents[:, 0]])
+        return Loading(drag, lift, np.where(packed.pushed, self.ratio, 0.0), bed.tangents, normals)
 
     @property
     def along(self) -> FloatArray:
@@ -244,20 +244,20 @@ class Loads:
         InputError
             If no grain feels a flow.
         """
-        of, speed = self.geometry, self.speed
-        counted = of.packing.windward
+        bed, speed = self.geometry, self.speed
+        counted = bed.packing.windward
         if not np.any(speed != 0):
             raise InputError(
                 "no counted grain feels a flow",
-                where=f"scene {of.scene.id}: flow",
+                where=f"scene {bed.scene.id}: flow",
                 remedy="look at the flow case; the mesh or the stress is wrong",
             )
-        if of.pouring:
-            places, sizes = of.packing.places, of.packing.sizes
+        if bed.pouring:
+            places, sizes = bed.packing.places, bed.packing.sizes
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
-            return np.asarray(peeling.pivots(places, sizes, loading, of.force_tables)[counted])
-        slopes = np.degrees(np.arctan2(of.tangents[counted, 1], of.tangents[counted, 0]))
-        threshold = on_slopes(of.scene, np.where(speed < 0, -slopes, slopes))
+            return np.asarray(peeling.pivots(places, sizes, loading, bed.force_tables)[counted])
+        slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
+        threshold = on_slopes(bed.scene, np.where(speed < 0, -slopes, slopes))
         return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
 
     def leaving(self, present: BoolArray | None = None) -> FloatArray:
@@ -268,10 +268,10 @@ class Loads:
         present : ndarray of bool, shape (n,), optional
             The grains that have not left yet; by default all.
         """
-        of, packed = self.geometry, self.geometry.packing
-        criterion = of.scene.protocol.displacement_criterion
+        bed, packed = self.geometry, self.geometry.packing
+        criterion = bed.scene.protocol.displacement_criterion
         flows = peeling.flows(
-            packed.places, packed.sizes, self.loading, of.force_tables, criterion, present
+            packed.places, packed.sizes, self.loading, bed.force_tables, criterion, present
         )
         return np.asarray(flows[packed.windward])
 

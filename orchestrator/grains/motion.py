@@ -381,8 +381,8 @@ def _present(listed: BoolArray, directory: Path, ids: IntArray, samples: pd.Data
     present = np.empty_like(listed)
     groups = samples.reset_index(drop=True).groupby("load_step")
     for at_the_end, (_, group) in zip(left, groups, strict=True):
-        own = group.index
-        present[own] = np.logical_or.accumulate(listed[own][::-1])[::-1] | at_the_end
+        rows_of = group.index
+        present[rows_of] = np.logical_or.accumulate(listed[rows_of][::-1])[::-1] | at_the_end
     return present
 
 

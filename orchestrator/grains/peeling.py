@@ -169,21 +169,21 @@ def pivots(
 
     It is 0 for a grain that its contacts do not hold. The grains may lie in space.
     """
-    found = np.full(len(sizes), np.inf)
+    least = np.full(len(sizes), np.inf)
     pushed = loading.ratio != 0
     if not places.width:
         for i, roller in _rollers(places, sizes, loading, tables, pushed):
             pivot = _foremost(roller.start, roller.others, roller.others)
             start = roller.start[:2]
-            found[i] = 0.0 if pivot is None else roller.flow_over(start, roller.others[pivot])
-        return found
+            least[i] = 0.0 if pivot is None else roller.flow_over(start, roller.others[pivot])
+        return least
     for i, sides in _pyramids(places, sizes, pushed):
         ratio = float(loading.ratio[i])
         drag = -np.sign(ratio) * _in_plane(sides, loading.along[i])
         lift = -_in_plane(sides, loading.outward[i])
         arms = zip(drag.tolist(), lift.tolist(), (-sides[:, 2]).tolist(), strict=True)
-        found[i] = min((tables[i].reaching(*arm) for arm in arms), default=np.inf) / abs(ratio)
-    return found
+        least[i] = min((tables[i].reaching(*arm) for arm in arms), default=np.inf) / abs(ratio)
+    return least
 
 
 def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> FloatArray:
@@ -193,22 +193,22 @@ def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> Fl
     board is tilted until it rolls; `along` has the unit vector downstream along the bed at each
     grain, shape (n, 2). NaN for a grain without contacts, or that no force along the bed moves.
     """
-    found, every = np.full(len(sizes), np.nan), np.ones(len(sizes), bool)
+    angles, every = np.full(len(sizes), np.nan), np.ones(len(sizes), bool)
     if not places.width:
         discs = _discs(places, sizes, 1.0)
         for i, near in _neighbours(places, sizes, every):
             pivot = _foremost(discs[i], discs, near)
             if pivot is not None:
                 slope = math.atan2(along[i, 1], along[i, 0])
-                found[i] = math.degrees(_lean(discs[i][:2], discs[pivot][:2]) - slope)
-        return found
+                angles[i] = math.degrees(_lean(discs[i][:2], discs[pivot][:2]) - slope)
+        return angles
     outward = np.column_stack([-along[:, 1], along[:, 0]])
     for i, sides in _pyramids(places, sizes, every):
         forward, deep = _in_plane(sides, along[i]), -_in_plane(sides, outward[i])
         ahead = forward < 0
         if ahead.any():
-            found[i] = np.degrees(np.arctan2(deep[ahead], -forward[ahead]).min())
-    return found
+            angles[i] = np.degrees(np.arctan2(deep[ahead], -forward[ahead]).min())
+    return angles
 
 
 def _rollers(
@@ -284,13 +284,13 @@ def _pyramids(
     first, second, apart = places.contacts(sizes)
     directions = apart / np.linalg.norm(apart, axis=1)[:, None]
     for i, rows in _by_grain(first, second, chosen):
-        own, sides = directions[rows], []
-        for one, other in combinations(range(len(own)), 2):
-            normal = np.cross(own[one], own[other])
-            others = own @ normal
+        touching, sides = directions[rows], []
+        for a, b in combinations(range(len(touching)), 2):
+            normal = np.cross(touching[a], touching[b])
+            others = touching @ normal
             if (others > -FLAT).all() or (others < FLAT).all():
                 sides.append(normal * (1 if others.sum() > 0 else -1))
-        yield i, np.array(sides if len(own) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
+        yield i, np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
 
 
 def _in_plane(sides: FloatArray, direction: FloatArray) -> FloatArray:
