@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.errors import InputError
 from orchestrator.runs import workspace
 from orchestrator.runs.files import KEPT, RECORD, Folder
 
@@ -89,17 +89,6 @@ def test_no_name_leads_out(folder: Folder, name: str) -> None:
         folder.clear(name, lambda _: True)
 
 
-def test_another_name_of_a_file_keeps_its_content(folder: Folder, outside: Path) -> None:
-    folder.put("tables/a.csv", "one")
-    for name in ("tables/a.csv", RECORD):
-        os.link(folder.root / name, outside / "second")
-        before = (outside / "second").read_bytes()
-        folder.put("tables/a.csv", f"two {name}")
-        assert (outside / "second").read_bytes() == before
-        (outside / "second").unlink()
-    assert not (folder.root / KEPT).exists()
-
-
 def test_files_that_are_not_put_anew_are_removed_if_they_are_ours(folder: Folder) -> None:
     for name in ("tables/a.csv", "tables/b.csv", "tables/c.csv", "figures/a.png"):
         folder.put(name, "one")
@@ -178,21 +167,3 @@ def test_a_directory_of_others_is_not_entered(tmp_path: Path, outside: Path) -> 
         (tmp_path / "new" / kind.marker).unlink()
         (tmp_path / "new").rmdir()
     assert [path.name for path in outside.iterdir()] == ["a.csv"]
-
-
-def test_one_process_at_a_time(tmp_path: Path) -> None:
-    with (
-        workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"),
-        pytest.raises(OrchestratorError, match="in use by process"),
-        workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"),
-    ):
-        pass
-
-
-@pytest.mark.parametrize("name", [workspace.LOCK, workspace.RESULTS.marker, RECORD])
-def test_a_claim_follows_no_link(tmp_path: Path, outside: Path, name: str) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / name).symlink_to(outside / "a.csv")
-    with pytest.raises(InputError), workspace.claimed(tmp_path / "out", workspace.RESULTS, "mine"):
-        pass
-    assert (outside / "a.csv").read_text() == "precious"
