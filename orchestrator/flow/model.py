@@ -54,28 +54,15 @@ class FlowModel(ABC):
         """The stress along the bed; `cases` holds the finished runs."""
 
 
-class Flat(FlowModel):
-    """The undisturbed stress everywhere, as on a flat bed."""
+class Theory(FlowModel):
+    """The undisturbed stress, or a linear theory of the flow over low hills or waves."""
 
     def stress(self, cases: Path) -> WallStress:
-        """Tau = tau_0."""
-        return theory.flat(self.line)
-
-
-class Hill(FlowModel):
-    """Linear theory of the flow over a low hill."""
-
-    def stress(self, cases: Path) -> WallStress:
-        """The stress by `theory.hill`."""
-        return theory.hill(self.line, self.scene.solve_roughness)
-
-
-class Waves(FlowModel):
-    """Linear theory of the flow over low waves, each wavelength by itself."""
-
-    def stress(self, cases: Path) -> WallStress:
-        """The stress by `theory.waves`."""
-        return theory.waves(self.line, self.scene.solve_roughness)
+        """The stress by `theory.flat`, `theory.hill` or `theory.waves`."""
+        name, z0 = self.scene.flow.model, self.scene.solve_roughness
+        if name == "flat":
+            return theory.flat(self.line)
+        return (theory.hill if name == "hill" else theory.waves)(self.line, z0)
 
 
 class Solved(FlowModel):
@@ -120,15 +107,6 @@ def _shared(
     return case
 
 
-MODELS: dict[str, type[FlowModel]] = {
-    "flat": Flat,
-    "hill": Hill,
-    "waves": Waves,
-    "solve": Solved,
-}
-"""The models by their names in a study file, cheap to dear."""
-
-
 def model(scene: Scene) -> FlowModel:
     """The flow model that a scene of a pile asks for."""
-    return MODELS[scene.flow.model](scene)
+    return Solved(scene) if scene.flow.model == "solve" else Theory(scene)

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.physics.constants import GRAVITY
+from orchestrator.types import FloatArray
 
-FloatArray = NDArray[np.float64]
 Formula = Callable[[FloatArray], FloatArray]
 
 
