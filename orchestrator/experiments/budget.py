@@ -51,7 +51,6 @@ QUANTITIES = ("shields", "ustar0")
 at which they moved."""
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
-FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -132,15 +131,16 @@ def _packings(scene: Scene) -> dict[str, Fields]:
     }
 
 
-def _choices() -> Iterator[Choice]:
-    text = (FOLDER / "choices.toml").read_text(encoding="utf-8")
-    rows: list[dict[str, Any]] = tomllib.loads(text)["choice"]
-    for row in rows:
-        lists: dict[str, Any] = {key: tuple(v) for key, v in row.items() if isinstance(v, list)}
-        yield Choice(**{**row, **lists})
+def _choices() -> tuple[Choice, ...]:
+    rows = tomllib.loads(Path(__file__).with_name("choices.toml").read_text(encoding="utf-8"))
+    lists = ("values", "times", "beside")
+    return tuple(
+        Choice(**{**row, **{key: tuple(row.get(key, ())) for key in lists}})
+        for row in rows["choice"]
+    )
 
 
-CHOICES = tuple(_choices())
+CHOICES = _choices()
 """Every shared choice."""
 
 
@@ -268,9 +268,9 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
         if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
     ]
     if worn:
-        rows = moved[moved["choice"] == FROZEN]
-        table = rows[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
-        table = table.assign(**{"θ, %": 100 * rows["shields"], "u*₀, %": 100 * rows["ustar0"]})
+        frozen = moved[moved["choice"] == FROZEN]
+        table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
+        table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
         drawn = figures.curves(worn, runs.cases)
         chart = figure("wear", "Frozen bed and bed that changes", words["wear"], drawn)
         title = "The bed that changes"
@@ -287,7 +287,15 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     choices = pd.DataFrame(kept, columns=["choice", "alternatives", "why"])
-    lost = _lost(listed, runs)
+    # a flow model may refuse a bed
+    scenes = {key: change.scene for change in listed for key in (change.base, change.other)}
+    rows = []
+    for key, asked in scenes.items():
+        if not runs.are_done(key):
+            failed = (runs.failures.get(run.name) for run in piles[key].runs)
+            why = "; ".join(error.what for error in failed if error)
+            rows.append((label(asked), key.rpartition(" | ")[2], why))
+    lost = pd.DataFrame(rows, columns=["scene", "alternative", "why"]).drop_duplicates()
     text = "" if lost.empty else "The alternatives of the second table have no answer."
     sheets = [sheet(table) for table in (choices, lost) if len(table)]
     return [*sections, Section("The choices and their alternatives", text, tables=sheets)]
@@ -306,15 +314,3 @@ def _together(shared: pd.DataFrame) -> pd.DataFrame:
             row[f"{symbol}: largest share"] = str(widths.idxmax())
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _lost(listed: list[Change], runs: Runs) -> pd.DataFrame:
-    """The alternatives that have no answer, and why: a flow model may refuse a bed."""
-    scenes = {key: change.scene for change in listed for key in (change.base, change.other)}
-    rows = []
-    for key, scene in scenes.items():
-        if not runs.are_done(key):
-            failed = (runs.failures.get(run.name) for run in runs.planned.piles[key].runs)
-            why = "; ".join(error.what for error in failed if error)
-            rows.append((label(scene), key.rpartition(" | ")[2], why))
-    return pd.DataFrame(rows, columns=["scene", "alternative", "why"]).drop_duplicates()

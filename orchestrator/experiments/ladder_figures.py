@@ -83,8 +83,14 @@ def _chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for ax, (column, head) in zip(row, columns.items(), strict=True)
     ]
     for ax, head, rows in panels:
-        _points(ax, rows)
         ax.set_title(head)
+        for (colour, marker, same), alike in rows.groupby(["colour", "marker", "same_model"]):
+            face: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
+            ax.plot(alike["x"], alike["y"], ls="", ms=5, mew=0.9, zorder=3, gid="point", **face)
+        ends = (rows["reference_error"].max(), rows["model_floor"].min())
+        for end, look in zip(ends, BANDS.values(), strict=True):
+            if end > FLOOR:
+                ax.axhspan(0, float(end), **look)
     for ax, rows in zip(grid[:, 0], packings, strict=False):
         packing = rows["packing"].iloc[0]
         ax.set_ylabel("largest error of $τ_c$, %" if single else f"{packing}\nerror of $τ_c$, %")
@@ -92,7 +98,17 @@ def _chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
             piles = rows["piles"].max()
             title = f"{packing} packing; each pair of levels on at most {piles} piles"
             ax.set_title(title, loc="left")
-            ax.text(1, 1.02, _left_out(rows), ha="right", transform=ax.transAxes, **style.NOTE)
+            reasons = {
+                "cost not measured": rows["cost_core_s"].isna(),
+                "no fraction reached": rows["largest"].isna(),
+            }
+            lost = [
+                f"{why}: {'; '.join(dict.fromkeys(rows['name'][which]))}"
+                for why, which in reasons.items()
+                if which.any()
+            ]
+            place: Look = {"ha": "right", "transform": ax.transAxes}
+            ax.text(1, 1.02, "\n".join(lost), **place, **style.NOTE)
     if single:
         for ax, _, rows in panels:
             front = rows[rows["front"]].sort_values("x")
@@ -116,30 +132,6 @@ def _placed(rows: pd.DataFrame, column: str) -> pd.DataFrame:
         x=shown["cost_core_s"],
         y=shown[column].abs().clip(lower=FLOOR),
         marker=np.where(shown["complete"], sign, "X"),
-    )
-
-
-def _points(ax: Axes, rows: pd.DataFrame) -> None:
-    """The pairs of a panel, and the bands of what is uncertain."""
-    for (colour, marker, same), alike in rows.groupby(["colour", "marker", "same_model"]):
-        face: Look = {"mfc": colour if same else "white", "mec": colour, "marker": marker}
-        ax.plot(alike["x"], alike["y"], ls="", ms=5, mew=0.9, zorder=3, gid="point", **face)
-    ends = (rows["reference_error"].max(), rows["model_floor"].min())
-    for end, look in zip(ends, BANDS.values(), strict=True):
-        if end > FLOOR:
-            ax.axhspan(0, float(end), **look)
-
-
-def _left_out(rows: pd.DataFrame) -> str:
-    """Which pairs have no place in a panel, and why."""
-    reasons = {
-        "cost not measured": rows["cost_core_s"].isna(),
-        "no fraction reached": rows["largest"].isna(),
-    }
-    return "\n".join(
-        f"{why}: {'; '.join(dict.fromkeys(rows['name'][which]))}"
-        for why, which in reasons.items()
-        if which.any()
     )
 
 

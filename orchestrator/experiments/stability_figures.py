@@ -58,10 +58,11 @@ def sheet(maps: Sequence[Map], tables: Sequence[pd.DataFrame]) -> Canvas:
 
 
 def _drawn(maps: Sequence[Map], tables: Sequence[pd.DataFrame], size: Size) -> Canvas:
-    words = [
-        [textwrap.fill(text, size.letters) for text in (one.data["question"], _limit(one))]
-        for one in maps
-    ]
+    words = []
+    for one in maps:
+        limit = f"Limit: {' '.join(one.limits)}" if one.limits else ""
+        texts = (one.data["question"], limit)
+        words.append([textwrap.fill(text, size.letters) for text in texts])
     starts = range(0, len(maps), size.beside) or range(1)
     heights, ratios = [], []
     for start in starts:
@@ -99,10 +100,6 @@ def _drawn(maps: Sequence[Map], tables: Sequence[pd.DataFrame], size: Size) -> C
         looks.append(Line2D([], [], label="corner: the tool notices by itself", **corner))
     style.legends(figure, colours, looks)
     return figure
-
-
-def _limit(one: Map) -> str:
-    return f"Limit: {' '.join(one.limits)}" if one.limits else ""
 
 
 def _lines(text: str) -> int:
