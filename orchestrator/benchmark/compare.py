@@ -409,7 +409,10 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
     """
     answers, ours, scenes = [], [], []
     for name in names:
-        used, used_by_ours = (_used(folder / name) for folder in (results, results / OURS))
+        used, used_by_ours = (
+            value if isinstance(value := read_json(folder / name / USED), dict) else {}
+            for folder in (results, results / OURS)
+        )
         error = str(used.get("error") or "")
         answer = again = pd.DataFrame(columns=["quantity", "place", "answer"])
         if not error:
@@ -450,9 +453,14 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
     numbers["error"] = relative(numbers["answer"], numbers["value"])
     numbers["within"] = within(numbers, numbers["answer"], numbers["tolerance"])
     table = pd.DataFrame(scenes).set_index("scene")
-    table["message"] = _first(table["message"], _missing(numbers), _miscounted(numbers, chosen))
+
+    def or_else(faults: dict[str, str]) -> "pd.Series[str]":
+        more = pd.Series(faults, dtype=object).reindex(table.index, fill_value="")
+        return table["message"].where(table["message"] != "", more)
+
+    table["message"] = or_else({**_miscounted(numbers, chosen), **_missing(numbers)})
     table["answered"] = table["message"] == ""
-    table["message"] = _first(table["message"], _wrong(numbers))
+    table["message"] = or_else(_wrong(numbers))
     table["passed"] = table["message"] == ""
     judged = numbers[numbers["tolerance"].notna() & ~numbers["quantity"].isin(COUNTS)]
     signed = judged[judged["scene"].map(table["answered"])].set_index("scene")["error"]
@@ -463,11 +471,6 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
         table[ratio] = (table[time] / table[f"ours_{time}"]).where(table["answered"])
     name = printable(results.absolute().name)
     return Contender(name, table.reset_index(), numbers.drop(columns="place"))
-
-
-def _used(folder: Path) -> Row:
-    used = read_json(folder / USED)
-    return used if isinstance(used, dict) else {}
 
 
 def _known(value: Any) -> float:
@@ -484,14 +487,6 @@ def within(numbers: pd.DataFrame, answer: Any, tolerance: Any) -> Any:
     """Whether answers are in their intervals, widened by a tolerance; missing ones are not."""
     margin = (tolerance + ROUND) * numbers["value"].abs()
     return (answer >= numbers["low"] - margin) & (answer <= numbers["high"] + margin)
-
-
-def _first(messages: "pd.Series[str]", *faults: Mapping[str, str]) -> "pd.Series[str]":
-    """The messages, and where there is none the first of some faults, by scene."""
-    for fault in faults:
-        more = pd.Series([fault.get(name, "") for name in messages.index], messages.index)
-        messages = messages.where(messages != "", more)
-    return messages
 
 
 def _missing(numbers: pd.DataFrame) -> dict[str, str]:

@@ -4,7 +4,6 @@ docs/benchmark.md is the contract for solvers. A pack may come from anywhere: `r
 whose files are not those of its manifest, or whose names, links or numbers no export makes.
 """
 
-import contextlib
 import json
 import math
 import os
@@ -12,7 +11,7 @@ import platform
 import re
 import stat
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, NoReturn
@@ -263,7 +262,11 @@ def read(root: Path) -> Pack:
             where=str(root),
             remedy="write one with: python -m orchestrator benchmark export",
         )
-    manifest = _manifest(root / MANIFEST)
+    value = _json(root / MANIFEST)
+    schema = value.get("schema") if isinstance(value, dict) else None
+    if isinstance(schema, int) and schema != SCHEMA:
+        refuse_schema(f"its schema is {schema}, and this program reads {SCHEMA}", root / MANIFEST)
+    manifest: Manifest = _checked(Manifest.model_validate, value, root / MANIFEST)
     pack = Pack(root, {}, pd.DataFrame(), manifest)
     pack.verify()
     folders = {name.split("/")[1] for name in manifest.sha256 if name.startswith(f"{SCENES}/")}
@@ -286,25 +289,22 @@ def _refuse(what: str, where: Path) -> NoReturn:
 
 def _members(root: Path) -> dict[str, Path]:
     """Every file of a pack but the manifest, by its name; refuses links and strange names."""
-    paths = {name: root / name for name in FILES}
-    for folder in _entries(root / SCENES, _NAME, MAX_SCENES):
-        for path in _entries(folder, _MEMBER, MAX_MEMBERS):
-            paths[path.relative_to(root).as_posix()] = path
-    for path in paths.values():
+
+    def entries(folder: Path, pattern: str, most: int) -> list[Path]:
+        if folder.is_symlink() or not folder.is_dir():
+            _refuse("this is no directory", folder)
+        names = sorted(os.listdir(folder))
+        strange = [name for name in names if not re.fullmatch(pattern, name)]
+        if strange or len(names) > most:
+            _refuse("no pack holds such a file, or as many", folder / (strange or names)[0])
+        return [folder / name for name in names]
+
+    folders = entries(root / SCENES, _NAME, MAX_SCENES)
+    paths = [path for folder in folders for path in entries(folder, _MEMBER, MAX_MEMBERS)]
+    paths += [root / name for name in FILES]
+    for path in paths:
         _check_file(path)
-    return paths
-
-
-def _entries(folder: Path, pattern: str, most: int) -> Iterator[Path]:
-    if folder.is_symlink() or not folder.is_dir():
-        _refuse("this is no directory", folder)
-    names = sorted(os.listdir(folder))
-    if len(names) > most:
-        _refuse(f"it holds more than {most} entries", folder)
-    for name in names:
-        if not re.fullmatch(pattern, name):
-            _refuse("no file of a pack has such a name", folder / name)
-        yield folder / name
+    return {path.relative_to(root).as_posix(): path for path in paths}
 
 
 def _check_file(path: Path) -> None:
@@ -322,19 +322,8 @@ def _json(path: Path) -> Any:
     _check_file(path)
     try:
         return from_json(path.read_bytes(), allow_inf_nan=False)
-    except (ValueError, OSError) as error:
+    except ValueError as error:
         _refuse(f"it cannot be read: {error}", path)
-
-
-def _manifest(path: Path) -> Manifest:
-    value = _json(path)
-    schema = value.get("schema") if isinstance(value, dict) else None
-    if isinstance(schema, int) and schema != SCHEMA:
-        refuse_schema(f"its schema is {schema}, and this program reads {SCHEMA}", path)
-    try:
-        return Manifest.model_validate(value)
-    except ValidationError as error:
-        _refuse(_first_fault(error), path)
 
 
 def refuse_schema(what: str, where: Path) -> NoReturn:
@@ -346,17 +335,16 @@ def refuse_schema(what: str, where: Path) -> NoReturn:
     )
 
 
-def _first_fault(error: ValidationError) -> str:
-    fault = error.errors()[0]
-    field = ".".join(map(str, fault["loc"][:2]))
-    return f"{field}: {fault['msg']}" if field else str(fault["msg"])
+def _checked(check: Callable[[Any], Any], value: Any, path: Path) -> Any:
+    try:
+        return check(value)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        _refuse(f"{'.'.join(map(str, fault['loc'][:2]))}: {fault['msg']}", path)
 
 
 def _scene(path: Path, name: str) -> Row:
-    try:
-        parameters = _PARAMETERS.validate_python(_json(path))
-    except ValidationError as error:
-        _refuse(_first_fault(error), path)
+    parameters: Row = _checked(_PARAMETERS.validate_python, _json(path), path)
     kind = KINDS.get(str(parameters.get("kind")))
     head = [parameters.get(key) for key in ("schema", "scene", "level")]
     if kind is None or head != [SCHEMA, name, kind.level] or name[0] != str(kind.level):
@@ -368,8 +356,7 @@ def _scene(path: Path, name: str) -> Row:
             _refuse(f"{key} is no number of its kind", path)
     if "alpha_s" in kind.required and parameters.get("force_law") not in LAWS:
         _refuse(f"force_law is none of {', '.join(LAWS)}", path)
-    numbers: Mapping[str, Any] = parameters
-    if numbers.get("rho_f_kg_m3", 0.0) >= numbers.get("rho_sol_kg_m3", math.inf):
+    if parameters.get("rho_f_kg_m3", 0.0) >= parameters.get("rho_sol_kg_m3", math.inf):
         _refuse("the grains are not denser than the fluid", path)
     return parameters
 
@@ -472,9 +459,9 @@ def write(
     problems : iterable of Problem
         Its scenes.
     study : tuple of str
-        Name and text of the study file that they come from.
+        Name and text of their study file.
     programs : mapping of str to str
-        Programs that gave the expected answers, with versions.
+        Programs of the expected answers, with versions.
 
     Raises
     ------
@@ -489,41 +476,29 @@ def write(
         scenes = folder.clear(SCENES, lambda path: bool(re.fullmatch(f"{_NAME}/{_MEMBER}", path)))
         for one in listed:
             one.write(scenes / one.scene)
-        for file, table in _tables(listed).items():
-            folder.put(file, csv(table))
+        expected = pd.concat([p.expected.assign(scene=p.scene) for p in listed], ignore_index=True)
+        times = pd.DataFrame({"scene": p.scene, "seconds": p.seconds} for p in listed)
+        heads = pd.DataFrame({**p.head, **p.parameters} for p in listed)
+        folder.put("scenes.csv", csv(heads.astype(object)))
+        folder.put(TIMES, csv(times.dropna()))
+        folder.put(EXPECTED, csv(expected[["scene", *COLUMNS]]))
         folder.put(STUDY, text)
-        folder.put(
-            "README.md", README + "".join(f"- {n} {v}\n" for n, v in sorted(programs.items()))
-        )
+        versions = "".join(f"- {n} {v}\n" for n, v in sorted(programs.items()))
+        folder.put("README.md", README + versions)
+        processor = re.search("(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"))
         manifest = {
             **about,
             "schema": SCHEMA,
             "scenes": [one.scene for one in listed],
             "programs": dict(programs),
-            "machine": {"processor": _processor(), "cores": os.cpu_count()},
+            "machine": {
+                "processor": processor[1] if processor else platform.machine(),
+                "cores": os.cpu_count(),
+            },
             "sha256": digest_files(_members(root).values(), root=root),
         }
         folder.note(MANIFEST, text_of(manifest))
     return len(listed)
-
-
-def _tables(problems: Sequence[Problem]) -> dict[str, pd.DataFrame]:
-    expected = pd.concat([p.expected.assign(scene=p.scene) for p in problems], ignore_index=True)
-    times = [{"scene": p.scene, "seconds": p.seconds} for p in problems if p.seconds == p.seconds]
-    return {
-        "scenes.csv": pd.DataFrame({**p.head, **p.parameters} for p in problems).astype(object),
-        TIMES: pd.DataFrame(times, columns=["scene", "seconds"]),
-        EXPECTED: expected[["scene", *COLUMNS]],
-    }
-
-
-def _processor() -> str:
-    """The machine's processor, as far as it is stated."""
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.machine()
 
 
 README = """# A benchmark pack
