@@ -16,7 +16,7 @@ from orchestrator.study.closed_form import closed_form
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import LEAST_WIDTH, Scene
-from orchestrator.study.sizes import largest
+from orchestrator.study.sizes import extremes
 from orchestrator.study.study import make_scene
 
 Fields = Mapping[str, Any]
@@ -122,7 +122,7 @@ def _derived(name: str, scene: Scene) -> Fields:
         return {"flow.speed": speed, "flow.first_cell_height": scene.first_cell_height}
     if name == "paper_stiffness":
         return {"grain.stiffness": paper_stiffness(scene)}
-    least = math.ceil(LEAST_WIDTH * largest(scene.grain.sizes, scene.grain.diameter))
+    least = math.ceil(LEAST_WIDTH * extremes(scene.grain.sizes, scene.grain.diameter)[1])
     return {"bed.width": max(STRIP_WIDTH, float(least)) if scene.is_poured else 0.0}
 
 

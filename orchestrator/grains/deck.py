@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.bed.deck import write_grains, write_parameters
 from orchestrator.study.parts import Grain, Protocol
-from orchestrator.study.sizes import smallest
+from orchestrator.study.sizes import extremes
 from orchestrator.types import FloatArray, IntArray
 
 GONE, FIXED, MOBILE, COUNTED, PUSHED = 0, 1, 2, 3, 4
@@ -125,7 +125,7 @@ def cost_s(
     """
     length, rate = 2 * rules.waiting_time, 4.5e7
     if not math.isnan(exposed):
-        small = math.pow(smallest(grain.sizes, grain.diameter), 1.5)
+        small = math.pow(extremes(grain.sizes, grain.diameter)[0], 1.5)
         length, rate = rules.waiting_time * (1 + exposed / 700) / small, 6e6
     steps = load_steps * length * math.sqrt(grain.stiffness) / rules.time_step
     return 0.1 + steps * grains / rate

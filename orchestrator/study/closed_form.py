@@ -4,7 +4,7 @@ Thousands of scenes share few grains: thresholds are computed for many grains at
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache, partial
+from functools import partial
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -67,15 +67,10 @@ def thresholds(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold
     keys = [(name, tuple(grain)) for grain in grains]
     if new := [key for key in dict.fromkeys(keys) if key not in _CACHE]:
         columns = np.array([grain for _, grain in new]).T
-        columnwise = threshold(
-            LAWS[name],
-            Exposure(*columns[:5]),
-            **dict(zip(SingleGrain._fields[5:], columns[5:], strict=True)),
-        )
-        values = zip(
-            *(getattr(columnwise, field) for field in Threshold.__dataclass_fields__), strict=True
-        )
-        _CACHE.update(zip(new, (Threshold(*row) for row in values), strict=True))
+        rest = dict(zip(SingleGrain._fields[5:], columns[5:], strict=True))
+        columnwise = threshold(LAWS[name], Exposure(*columns[:5]), **rest)
+        rows = zip(*vars(columnwise).values(), strict=True)
+        _CACHE.update(zip(new, (Threshold(*row) for row in rows), strict=True))
     return [_CACHE[key] for key in keys]
 
 
@@ -111,27 +106,14 @@ def forces(
     gaps : array_like, optional
         Heights of their lowest points above the level at which the flow begins, m; by default z0.
     """
-    law = LAWS[scene.forces.law]
-    exposure = Exposure(
-        scene.grain.diameter * np.asarray(sizes, float),
-        scene.bed.roughness,
-        scene.fluid.density,
-        scene.fluid.viscosity,
-        scene.forces.lift_coefficient,
-        gaps,
-    )
+    law, grain = LAWS[scene.forces.law], single_grain(scene)
+    exposure = Exposure(grain.diameter * np.asarray(sizes, float), *grain[1:5], gaps)
     return partial(law.drag, exposure=exposure), partial(law.lift, exposure=exposure)
 
 
 def regime_of(scene: Scene) -> Regime:
     """Which of Eqs. 2 and 4 holds at the single-grain threshold of a scene."""
-    return _regime(single_grain(scene))
-
-
-@cache
-def _regime(grain: SingleGrain) -> Regime:
-    (low,), (high,) = (thresholds(name, [grain]) for name in ("low", "high"))
-    return cast(Regime, str(regime(low, high)))
+    return cast(Regime, str(regime(closed_form(scene, "low"), closed_form(scene, "high"))))
 
 
 def law_holds(scene: Scene) -> bool:
@@ -147,11 +129,10 @@ def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     for name in ("low", "high"):  # the tables have the regime of each scene, whatever its law
         thresholds(name, [single_grain(scene) for scene in scenes])
     for scene in scenes:
-        law = scene.forces.law
-        names = LAWS_OF[regime_of(scene)] if law == PAPER else (law,)
-        yield tuple(scene if name == law else _under(scene, name) for name in names)
-
-
-def _under(scene: Scene, law: str) -> Scene:
-    parts = {part: getattr(scene, part) for part in Scene.model_fields}
-    return Scene(**{**parts, "forces": scene.forces.model_copy(update={"law": law})})
+        if scene.forces.law != PAPER:
+            yield (scene,)
+            continue
+        parts = {part: getattr(scene, part) for part in Scene.model_fields}
+        laws = LAWS_OF[regime_of(scene)]
+        forces = (scene.forces.model_copy(update={"law": law}) for law in laws)
+        yield tuple(Scene(**{**parts, "forces": each}) for each in forces)

@@ -30,27 +30,17 @@ ANSWERED = "answered_"
 
 @dataclass(frozen=True)
 class Quantity:
-    """A field of a study file, or a quantity that follows from fields.
-
-    Attributes
-    ----------
-    name : str
-        As a study file writes it, such as ``bed.slope_deg``; empty for one that follows.
-    column : str
-        Its column in tables.
-    info : Info
-        Its words.
-    meaning : str
-        A phrase.
-    read : callable
-        Its value in a scene, None where that leaves it open.
-    """
+    """A field of a study file, or a quantity that follows from fields."""
 
     name: str
+    """As a study file writes it, such as ``bed.slope_deg``; empty for one that follows."""
     column: str
+    """Its column in tables."""
     info: Info
     meaning: str
+    """A phrase."""
     read: Callable[[Scene], Any]
+    """Its value in a scene, None where that leaves it open."""
 
     def asked(self, scene: Scene) -> Any:
         """Its value as a scene asks for it; None where it is left open or has no effect."""
@@ -122,17 +112,12 @@ FIELDS: tuple[Quantity, ...] = tuple(
 """Every field of a study file, in the order of the file."""
 DERIVED: tuple[Quantity, ...] = (
     Quantity(
-        "",
-        "z0_over_d",
-        Info("roughness length", "z_0", "d"),
-        "roughness length over diameter",
+        *("", "z0_over_d", Info("roughness length", "z_0", "d"), "roughness length over diameter"),
         # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
         lambda scene: round(scene.bed.roughness / scene.grain.diameter, 9),
     ),
     Quantity(
-        "",
-        "regime",
-        Info("regime"),
+        *("", "regime", Info("regime")),
         "forces that are valid at the threshold of a single grain of the scene, or transition",
         regime_of,
     ),

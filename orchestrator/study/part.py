@@ -50,33 +50,22 @@ class Info:
     """The words for a field, beside its name, its range and its default.
 
     The meaning of the field is the text under its declaration.
-
-    Attributes
-    ----------
-    label : str
-        A short name.
-    symbol, unit : str
-        As formulas write them, an index after an underscore; empty where there is none.
-    column : str
-        Its column in tables, with the unit, where that is not its name; "-" for none.
-    scope : str
-        The scenes on which it has an effect; for all others its column is empty.
-    about : {"question", "answer", "replica"}
-        A level of fidelity may change only fields about the answer.
-    choices : mapping of str to str
-        For a field of words, the meaning of each.
-    read : str
-        The property of a scene that has the value in use, where the field may be left open.
     """
 
     label: str
     symbol: str = ""
+    """As formulas write it, an index after an underscore; empty where there is none."""
     unit: str = ""
     column: str = ""
+    """Its column in tables, with the unit, where that is not its name; "-" for none."""
     scope: Scope = "every scene"
+    """The scenes on which it has an effect; for all others its column is empty."""
     about: About = "question"
+    """A level of fidelity may change only fields about the answer."""
     choices: Mapping[str, str] = field(default_factory=dict)
+    """For a field of words, the meaning of each."""
     read: str = ""
+    """The property of a scene that has the value in use, where the field may be left open."""
 
 
 class Part(BaseModel):

@@ -39,28 +39,19 @@ RESOLVED = 4
 
 @dataclass(frozen=True)
 class Profile:
-    """A bed line of n points, x rising, that begins at the origin.
-
-    Attributes
-    ----------
-    name : str
-        The file's name.
-    x, z : tuple of float
-        m, from the first point.
-    text : str
-        The file itself.
-    digest : str
-        Digest of the corners: two profiles with one digest are one bed.
-    lines : tuple of int
-        Number of the file's line that has each point; empty for a smoothed line.
-    """
+    """A bed line of n points, x rising, that begins at the origin."""
 
     name: str = field(compare=False)
+    """The file's name."""
     x: tuple[float, ...]
+    """m, from the first point; so is z."""
     z: tuple[float, ...]
     text: str = field(compare=False, repr=False)
+    """The file itself."""
     digest: str
+    """Digest of the corners: two profiles with one digest are one bed."""
     lines: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    """Number of the file's line that has each point; empty for a smoothed line."""
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -81,21 +72,14 @@ class Profile:
 
 @dataclass
 class Files:
-    """The profiles and sieve tables of a study.
-
-    Attributes
-    ----------
-    folder : Path
-        Folder of the study file.
-    texts : dict
-        Text of each file by its name, at first of the study's own table ``profiles``.
-    added : str
-        TOML with the texts that came from files: with it a study's text is whole without them.
-    """
+    """The profiles and sieve tables of a study."""
 
     folder: Path
+    """Folder of the study file."""
     texts: dict[str, Any]
+    """Text of each file by its name, at first of the study's own table ``profiles``."""
     added: str = field(default="", init=False)
+    """TOML with the texts that came from files: with it a study's text is whole without them."""
 
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
         """Fields of a bed that names a profile; `where` names the study file in messages.

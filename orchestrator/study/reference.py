@@ -3,7 +3,6 @@
 ``python -m orchestrator.study.reference > docs/study-file.md`` writes it.
 """
 
-from collections.abc import Iterator
 from typing import get_args
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -53,18 +52,15 @@ COLUMNS = "| field | symbol, unit | range | default | meaning | scope | column |
 
 def text() -> str:
     """The reference, in Markdown."""
-    return "\n".join([HEAD, *(line for part in fields.PARTS for line in _part(part))])
-
-
-def _part(part: str) -> Iterator[str]:
-    about = (fields.PARTS[part].__doc__ or "").partition("\n")[0]
-    if part == "bed":
-        about = "One grain on two others, or a pile of grains."
-    yield f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 7}|"
-    for quantity in fields.FIELDS:
-        if quantity.name.startswith(f"{part}."):
-            yield f"| {' | '.join(_row(quantity))} |"
-    yield ""
+    lines = [HEAD]
+    for part, model in fields.PARTS.items():
+        about = (model.__doc__ or "").partition("\n")[0]
+        if part == "bed":
+            about = "One grain on two others, or a pile of grains."
+        lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 7}|")
+        rows = (_row(each) for each in fields.FIELDS if each.name.startswith(f"{part}."))
+        lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
+    return "\n".join(lines)
 
 
 def _row(quantity: Quantity) -> list[str]:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import pairwise
 from math import acos, cos, degrees, radians
 from typing import Annotated, Any, Self
 
@@ -18,7 +18,7 @@ from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.part import Part, UnfitError
 from orchestrator.study.parts import Bed, Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.shapes import having
-from orchestrator.study.sizes import Sizes, largest, percentile
+from orchestrator.study.sizes import Sizes, extremes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)
 """Slopes of piles that can be meshed and packed."""
@@ -64,16 +64,11 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        misfits = self._misfits_of_grains()
-        if isinstance(self.bed, PileBed):
-            misfits = chain(
-                misfits, self._misfits_of_pile(self.bed), self._misfits_of_flow(self.bed)
-            )
-        for misfit in misfits:
+        for misfit in self._misfits():
             raise UnfitError(*misfit)
         return self
 
-    def _misfits_of_grains(self) -> Iterator[Misfit]:
+    def _misfits(self) -> Iterator[Misfit]:
         grain, bed, law = self.grain, self.bed, LAWS.get(self.forces.law)
         if grain.density <= self.fluid.density:
             yield (
@@ -81,7 +76,8 @@ class Scene(Part):
                 f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3",
                 "the grain would float; raise it, or lower fluid.density",
             )
-        bed_grains = grain.diameter / bed.relative_size * largest(grain.sizes, grain.diameter)
+        largest = extremes(grain.sizes, grain.diameter)[1]
+        bed_grains = grain.diameter / bed.relative_size * largest
         if bed.roughness > ROUGHEST * bed_grains * (1 + 1e-9):
             what = f"z0 = {bed.roughness:g} m is above a third of the bed's grains of"
             what = f"{what} {bed_grains:g} m, rougher than any grains lie"
@@ -106,6 +102,8 @@ class Scene(Part):
             what = f"{law.name} knows no height of a grain over the bed"
             yield "forces.exposure", what, f"laws that do: {laws}"
         if isinstance(bed, PileBed):
+            yield from self._misfits_of_pile(bed)
+            yield from self._misfits_of_flow(bed)
             return
         if bed.roughness >= grain.diameter:
             yield "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
@@ -121,7 +119,7 @@ class Scene(Part):
     def _misfits_of_pile(self, bed: PileBed) -> Iterator[Misfit]:
         d, method = self.grain.diameter, self.protocol.method
         if bed.width:  # a strip in space
-            least = LEAST_WIDTH * largest(self.grain.sizes, d)
+            least = LEAST_WIDTH * extremes(self.grain.sizes, d)[1]
             if bed.packing != "poured":
                 what = "a lattice is one layer in the plane of the flow"
                 yield "bed.width", what, 'bed.packing = "poured", or leave it out'
@@ -218,14 +216,9 @@ class Scene(Part):
     @property
     def weight(self) -> float:
         """Submerged weight W of a grain, N."""
-        return float(
-            weight(
-                diameter=self.grain.diameter,
-                density=self.grain.density,
-                fluid_density=self.fluid.density,
-                gravity=self.fluid.gravity,
-            )
-        )
+        sphere = {"diameter": self.grain.diameter, "density": self.grain.density}
+        fluid = {"fluid_density": self.fluid.density, "gravity": self.fluid.gravity}
+        return float(weight(**sphere, **fluid))
 
     @property
     def limiting_slope_deg(self) -> float:

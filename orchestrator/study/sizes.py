@@ -107,8 +107,8 @@ def check(sizes: Sizes, diameter: float) -> None:
         elif abs(diameter / median - 1) > 1e-9:
             field, remedy = "grain.diameter", "leave it out"
             what = f"the d50 of grain.sizes is {median:.9g} m"
-    ratio = largest(sizes, diameter) / smallest(sizes, diameter)
-    if not what and ratio > LARGEST_RATIO:
+    low, high = extremes(sizes, diameter)
+    if not what and (ratio := high / low) > LARGEST_RATIO:
         what = f"the largest grain is {ratio:.3g} times the smallest, more than {LARGEST_RATIO:g}"
     if what:
         raise UnfitError(field, what, remedy)
@@ -136,18 +136,13 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     return float(f"{np.exp(np.interp(part, finer, np.log(diameters))):.12g}")
 
 
-def largest(sizes: Sizes | None, diameter: float) -> float:
-    """The largest grain of a mixture over one diameter; 1 of equal grains."""
+def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
+    """The smallest and the largest grain of a mixture over one diameter; both 1 of equal grains."""
     if sizes is None:
-        return 1.0
-    return sizes.ends[1] if isinstance(sizes, LogNormal) else sizes[-1][0] / diameter
-
-
-def smallest(sizes: Sizes | None, diameter: float) -> float:
-    """The smallest grain of a mixture over one diameter; 1 of equal grains."""
-    if sizes is None:
-        return 1.0
-    return sizes.ends[0] if isinstance(sizes, LogNormal) else sizes[0][0] / diameter
+        return 1.0, 1.0
+    if isinstance(sizes, LogNormal):
+        return sizes.ends
+    return sizes[0][0] / diameter, sizes[-1][0] / diameter
 
 
 def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:

@@ -62,55 +62,35 @@ RENAMED = {
 
 @dataclass(frozen=True)
 class Group:
-    """Scenes of a study that belong together: the points of one experiment.
-
-    Attributes
-    ----------
-    name : str
-        As the file says.
-    scenes : tuple of Scene
-        In the file's order, each with its force law decided.
-    where : str
-        Its place in messages: the file, and which group of it.
-    """
+    """Scenes of a study that belong together: the points of one experiment."""
 
     name: str
     scenes: tuple[Scene, ...]
+    """In the file's order, each with its force law decided."""
     where: str
+    """Its place in messages: the file, and which group of it."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """The content of a study file.
-
-    Attributes
-    ----------
-    name : str
-        The file's name without its ending.
-    title : str
-        A line for the page.
-    groups : tuple of Group
-        In the file's order; every scene has its force law decided.
-    time_limit_s : float
-        Wall time after which one solver run counts as hung, s.
-    tolerance : float or None
-        Relative error that tau_c may have; 0: every scene as it is asked for; None: not given.
-    cluster : dict
-        Settings of the queue that runs the cases, if one does; `cluster.pool` knows them.
-    text : str
-        The file itself, and the profiles that it names.
-    file : str
-        Absolute path of the file; empty if the text came from elsewhere.
-    """
+    """The content of a study file."""
 
     name: str
+    """The file's name without its ending."""
     title: str
+    """A line for the page."""
     groups: tuple[Group, ...]
+    """In the file's order."""
     time_limit_s: float
+    """Wall time after which one solver run counts as hung, s."""
     tolerance: float | None
+    """Relative error that tau_c may have; 0: every scene as it is asked for; None: not given."""
     cluster: dict[str, Any]
+    """Settings of the queue that runs the cases, if one does; `cluster.pool` knows them."""
     text: str
+    """The file itself, and the profiles that it names."""
     file: str = ""
+    """Absolute path of the file; empty if the text came from elsewhere."""
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -180,7 +160,9 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError(f"not TOML: {error}", where=where) from None
     _check_keys(data, TOP_KEYS, where)
     limit, title = data.get("time_limit", TIME_LIMIT_S), data.get("title", name)
-    check_time(limit, f"{where}: time_limit")
+    if isinstance(limit, bool) or not isinstance(limit, int | float) or not 0 < limit <= LONGEST_S:
+        what, remedy = f"{limit!r} is not a time in seconds", f"above 0, and at most {LONGEST_S:g}"
+        raise InputError(what, where=f"{where}: time_limit", remedy=remedy)
     if not isinstance(title, str):
         raise InputError("the title is not a text", where=f"{where}: title")
     files = Files(Path(where).parent, _table(data, "profiles", where))
@@ -191,18 +173,10 @@ def parse(text: str, *, name: str, where: str) -> Study:
         Group(g.name, tuple(itertools.chain(*itertools.islice(under_laws, len(g.scenes)))), g.where)
         for g in groups
     ]
-    tolerance = data.get("tolerance")
-    if tolerance is not None:
+    if (tolerance := data.get("tolerance")) is not None:
         check_tolerance(tolerance, f"{where}: tolerance")
     cluster = _table(data, "cluster", where)
     return Study(name, title, tuple(groups), float(limit), tolerance, cluster, text + files.added)
-
-
-def check_time(value: Any, where: str) -> None:
-    """See that a time limit is a time that a machine can wait for; else an `InputError`."""
-    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 < value <= LONGEST_S:
-        what, remedy = f"{value!r} is not a time in seconds", f"above 0, and at most {LONGEST_S:g}"
-        raise InputError(what, where=where, remedy=remedy)
 
 
 def check_tolerance(value: Any, where: str) -> None:
