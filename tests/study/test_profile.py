@@ -102,8 +102,13 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
         ("height = 0.1", r"bed.profile: it has its own height \(leave out bed.height"),
         ("slope_deg = 10.0", "it has its own slope_deg"),
         ('shape = "dune"', "it has its own shape"),
+        ("forms = 3", "it has its own forms"),
+        ("spacing = 0.5", "it has its own spacing"),
+        ("length = 0.1", "it has its own length"),
         ("smoothing = -1.0", "bed.smoothing: -1.0 is not accepted"),
         ("smoothing = 0.1", r"smoothing over 0.1 m leaves nothing of 0.14 m"),
+        ("smoothing = 1e-300", r"leaves over 3000 points.*raise bed.smoothing"),
+        ("smoothing = 1e-9", r"leaves over 3000 points.*raise bed.smoothing"),
     ],
 )
 def test_what_does_not_go_with_a_profile_is_refused(fields: str, says: str, tmp_path: Path) -> None:
@@ -184,17 +189,3 @@ def test_points_nearer_than_mesh_or_grains_can_follow_are_refused_with_the_line(
         return
     with pytest.raises(InputError, match=rf"bed.profile: scan.csv, line {line}, x = 0.05.* nearer"):
         bed_of(tmp_path, text)
-
-
-@pytest.mark.parametrize("own", ["forms = 3", "spacing = 0.5", "length = 0.1"])
-def test_a_profile_takes_no_field_of_a_shape(own: str, tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD)
-    with pytest.raises(InputError, match=rf"bed.profile: it has its own {own.split()[0]}"):
-        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", {own}'))
-
-
-@pytest.mark.parametrize("smoothing", ["1e-300", "1e-9"])
-def test_a_smoothing_that_smooths_nothing_is_refused(smoothing: str, tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD)
-    with pytest.raises(InputError, match=r"leaves over 3000 points.*raise bed.smoothing"):
-        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", smoothing = {smoothing}'))
