@@ -25,14 +25,14 @@ GRAINS, LINE = 0.03, 0.10
 SCATTER = 0.10
 """Part of the count by which the number of moved grains may differ, besides one load step: three
 engines with one contact law do so by up to 13 % where a chain of grains goes at once
-(docs/benchmark.md)."""
+(docs/engines.md)."""
 LEVEL_ROWS = 0.35
 """Part of N: level rows are judged until so many have moved. Then a whole step goes at once or not,
 as the least detail decides: runs that differ in the time step, the dashpots or places by 1e-3 d
-are up to 20 % of N and six load steps apart (docs/benchmark.md)."""
+are up to 20 % of N and six load steps apart (docs/engines.md)."""
 POURED_SCATTER = 0.15
 """Part of N on poured beds. Runs that differ by round-off are 6 to 15 % apart beyond a load step in
-nine of ten pairs, where a grain that goes or stays holds up others (docs/benchmark.md)."""
+nine of ten pairs, where a grain that goes or stays holds up others (docs/engines.md)."""
 LIFT_OFF, LIFT_OFF_SCATTER = 0.20, 0.25
 """The same tolerances where grains are carried off, which collide on their way: runs that differ by
 round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond a load step."""
