@@ -29,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # numpy raises at import where this variable is not an integer
     if not re.fullmatch("[0-9]{1,11}", os.environ.get("SOURCE_DATE_EPOCH", "0")):
         del os.environ["SOURCE_DATE_EPOCH"]
+    # matplotlib raises where this one names no backend; figures are drawn without a window
+    os.environ.pop("MPLBACKEND", None)
     warnings.showwarning = _show_warning
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
