@@ -12,7 +12,7 @@ from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.report import Guest
-from orchestrator.runs import case, cluster, engine, workspace
+from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
@@ -201,6 +201,7 @@ def draw(
         tables.write({"timings": times}, space.folder, "timings")
         report.write(study, planned, results, times, causes, space.folder, guests)
     if not failures:
+        terminal.check()
         space.folder.put(STATE, text_of(_state(study, planned, space)))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.errors import OrchestratorError
+from orchestrator.runs import terminal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,6 +84,7 @@ def write(
     for name, text in (item for part in added for item in part.files.items()):
         folder.put(name, text)
     parts = {**words.contents(results, timings, failures), "faults": faults}
+    terminal.check()
     folder.put(PAGE, page.render(parts, figures, [part.section for part in added]))
 
 
@@ -106,6 +108,7 @@ def _drawn(results: "Results", folder: "Folder", faults: list[str]) -> "Iterator
                 yield replace(figure, canvas=None, image=image)
         except Exception as error:
             faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
+        terminal.check()
 
 
 def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":

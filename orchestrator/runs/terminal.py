@@ -5,6 +5,7 @@ import io
 import os
 import signal
 import sys
+import threading
 from typing import Any, NoReturn, TextIO
 
 ENDING = (
@@ -15,8 +16,12 @@ ENDING = (
 are a queue's, before it kills, and the system's at a limit of processor time."""
 
 
+_interrupted = threading.Event()
+
+
 def listen() -> None:
     """Let each of `ENDING` interrupt the command; an ignored one, as under nohup, stays so."""
+    _interrupted.clear()
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
@@ -26,7 +31,23 @@ def _interrupt(number: int, frame: object) -> NoReturn:
     # a closing terminal asks several times: only the keyboard may break into the end of the command
     for each in ENDING:
         signal.signal(each, signal.SIG_DFL if each == signal.SIGINT else signal.SIG_IGN)
+    _interrupted.set()
     raise KeyboardInterrupt
+
+
+def check() -> None:
+    """Raise the interruption again if one has come.
+
+    Python drops an exception that is raised in a callback of compiled code, as it may be while
+    matplotlib draws.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If a signal of `ENDING` has come since `listen`.
+    """
+    if _interrupted.is_set():
+        raise KeyboardInterrupt
 
 
 class Stream(io.FileIO):
