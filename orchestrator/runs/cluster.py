@@ -2,6 +2,7 @@
 
 import contextlib
 import fcntl
+import logging
 import math
 import shlex
 import shutil
@@ -142,6 +143,8 @@ def _submit(cluster: Any, jobs: int, system: str) -> None:
     """Ask for the jobs, and wait until the queue has taken them."""
     from distributed import Status
 
+    # a connection that closes with its job is no news: distributed logs it with a traceback
+    logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     while len(cluster.worker_spec) < jobs:
         cluster.worker_spec.update(cluster.new_worker_spec())
     try:
