@@ -150,7 +150,7 @@ def _beyond(points: pd.DataFrame) -> "pd.Series[bool]":
 
 def _colour_entries(rows: pd.DataFrame, by: str, colours: dict[float, str]) -> list[Artist]:
     used = set(rows[by])
-    return [style.entry(labels.written(by, v), c) for v, c in colours.items() if v in used]
+    return [style.entry(labels.plain(by, v), c) for v, c in colours.items() if v in used]
 
 
 def accuracy(results: Results) -> Iterator[Figure]:

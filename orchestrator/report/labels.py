@@ -1,9 +1,8 @@
 """How values are written in figures and on the page, and which of them tell rows apart."""
 
-import math
 import re
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
@@ -28,24 +27,14 @@ def words(column: str) -> Info:
     return FRACTION if column == "fraction" else fields.COLUMNS[column].info
 
 
-def written(column: str, value: Any) -> str:
-    """A value with its symbol in mathematics, for panels and legends."""
-    symbol = re.sub(r"_(\w+)", r"_{\1}", words(column).symbol)
-    return _with_symbol(column, value, f"${symbol}$" if symbol else "", power_of_ten)
-
-
 def plain(column: str, value: Any) -> str:
-    """A value with its symbol, without mathematics."""
-    return _with_symbol(column, value, words(column).symbol.replace("_0", "₀"), "{:g}".format)
-
-
-def _with_symbol(column: str, value: Any, symbol: str, number: Callable[[float], str]) -> str:
+    """A value with its symbol or its label, such as ``d = 0.7 mm``."""
     info = words(column)
     if isinstance(value, str):
         return info.choices.get(value, f"{info.label} {value}")
     if pd.isna(value):
         return f"no {info.label}"
-    return f"{symbol or info.label} = {amount(float(value), info.unit, number)}"
+    return f"{info.symbol.replace('_0', '₀') or info.label} = {amount(float(value), info.unit)}"
 
 
 def value(column: str, value: Any) -> str:
@@ -68,12 +57,11 @@ def is_told(column: str, value: Any) -> bool:
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
     """The values of a row as a title, broken into lines that fit beside another panel."""
-    shared = (column for column in columns if is_told(column, row[column]))
-    text = ", ".join(written(column, row[column]) for column in shared)
-    return textwrap.fill(text, WIDTH, break_long_words=False)
+    text = textwrap.fill(", ".join(told(row, columns)), WIDTH, break_long_words=False)
+    return re.sub(r"(\w)_(\w+) =", r"$\1_{\2}$ =", text)  # an index in mathematics
 
 
-def amount(value: float, unit: str, number: Callable[[float], str] = "{:g}".format) -> str:
+def amount(value: float, unit: str) -> str:
     """A value with its unit; one in metres is written in millimetres."""
     match unit:
         case "m":
@@ -84,8 +72,7 @@ def amount(value: float, unit: str, number: Callable[[float], str] = "{:g}".form
             return f"{100 * value:.3g} %"
         case "°":
             return f"{value:.4g}°"
-    wide = value and not 1e-3 < abs(value) < 1e5
-    return f"{number(value) if wide else f'{value:g}'} {unit}".rstrip()
+    return f"{value:g} {unit}".rstrip()
 
 
 def ratio_of(ratio: float, length: str) -> str:
@@ -100,14 +87,6 @@ def millimetres(metres: float) -> str:
     return f"{metres * 1e3:.6g} mm"
 
 
-def power_of_ten(value: float) -> str:
-    """A number for mathematics, such as ``$10^{-5}$``."""
-    exponent = math.floor(math.log10(value) + 1e-12)
-    factor = f"{value / 10**exponent:.4g}"
-    head = "" if factor == "1" else rf"{factor}\times "
-    return f"${head}10^{{{exponent}}}$"
-
-
 def methods(rows: pd.DataFrame) -> str:
     """The methods that answered rows of a table."""
     names = fields.ANSWERS["answered_method"].info.choices
@@ -117,20 +96,19 @@ def methods(rows: pd.DataFrame) -> str:
 def varying(table: pd.DataFrame, *shown: str) -> list[str]:
     """The fields in which rows differ that agree in all columns that are shown.
 
-    One of several fields that vary together is enough: questions come first, then the method, then
+    Of several fields that vary together one is enough: questions come first, then the method, then
     fields that only some methods have. The seed of one packing among many does not count.
     """
 
     def rank(column: str) -> int:
-        if column == "method" or column not in fields.COLUMNS:
-            return 1
         info = fields.COLUMNS[column].info
         return 3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
 
+    columns = [column for column in fields.others(table, *shown) if column in fields.COLUMNS]
     listed: list[str] = []
     groups = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
-    for column in sorted(fields.others(table, *shown), key=rank):
-        if column in fields.COLUMNS and fields.COLUMNS[column].info.about != "replica":
+    for column in sorted(columns, key=lambda column: 1 if column == "method" else rank(column)):
+        if fields.COLUMNS[column].info.about != "replica":
             codes, values = pd.factorize(table[column], use_na_sentinel=False)
             finer, names = pd.factorize(groups * len(values) + codes)
             if len(names) > groups.max(initial=-1) + 1:

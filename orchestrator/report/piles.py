@@ -78,7 +78,7 @@ def fractions(results: Results) -> Iterator[Figure]:
             shields.label_lowest(axes, labels.TAU_AXIS)
             used = set(shown["d_m"])
             entries = [
-                style.entry(labels.written("d_m", d), c) for d, c in colours.items() if d in used
+                style.entry(labels.plain("d_m", d), c) for d, c in colours.items() if d in used
             ]
             style.legends(figure, entries, [*shields.point_entries(shown, variants), *variants])
             yield Figure(
@@ -127,7 +127,7 @@ def extended(results: Results) -> Iterator[Figure]:
                 axes, panels, (shown["reynolds"].min() / 5, shown["reynolds"].max() * 2)
             )
             shields.mark_drag_law(axes, panels)
-            entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
+            entries = [style.entry(labels.plain("fraction", f), c) for f, c in colours.items()]
             looks = [
                 *shields.within(axes, shields.line_entries(shown, dashes)),
                 *shields.point_entries(shown, variants),
@@ -192,7 +192,7 @@ def wear(results: Results) -> Iterator[Figure]:
         shields.label_lowest(axes, "$n/N$")
         for ax in axes[::2]:
             ax.set_ylabel("Shields number $θ$")
-        entries = [style.entry(labels.written("d_m", d), colour) for d, colour in colours.items()]
+        entries = [style.entry(labels.plain("d_m", d), colour) for d, colour in colours.items()]
         looks = [
             Line2D([], [], color="0.2", ls="--", lw=0.9, label="flow of the whole pile"),
             Line2D([], [], color="0.2", lw=1.3, label="flow of the bed as it is"),
@@ -313,7 +313,7 @@ def _hiding(rows: pd.DataFrame) -> Figure:
     for ax in axes:
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-    entries = [style.entry(labels.written("fraction", f), c) for f, c in colours.items()]
+    entries = [style.entry(labels.plain("fraction", f), c) for f, c in colours.items()]
     looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in HIDING]
     style.legends(figure, entries, looks)
     return Figure("hiding", "Hiding and exposure of sizes", caption("hiding"), (), figure)

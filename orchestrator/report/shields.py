@@ -447,7 +447,7 @@ def _points(
     entries: list[Artist] = []
     for alpha, colour in shades.items():
         if (rows["alpha_deg"] == alpha).any():
-            label = f"{name}, {labels.written('alpha_deg', alpha)}"
+            label = f"{name}, {labels.plain('alpha_deg', alpha)}"
             entries.append(Line2D([], [], ls="", marker=shape, color=colour, ms=4, label=label))
     if not valid(rows).all():
         entries.append(_mark(shape, "white", f"{name}, hollow: not usable"))
