@@ -19,23 +19,14 @@ Formula = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Curve:
-    """One published curve for water.
+    """One published curve for water: the Shields number as a function of Re* or D*.
 
-    Attributes
-    ----------
-    name : str
-        Authors and year.
-    variable : {"reynolds", "dimensionless_diameter"}
-        What the formula is a function of.
-    low, high : float
-        Range of that variable in which the curve was published; where its source gives none, the
-        range in which it is drawn.
-    formula : callable
-        Shields number of that variable.
+    ``low`` and ``high`` are the range of that variable in which the curve was published; where its
+    source gives none, the range in which it is drawn.
     """
 
     name: str
-    variable: Literal["reynolds", "dimensionless_diameter"]
+    variable: Literal["Re*", "D*"]
     low: float
     high: float
     formula: Formula
@@ -44,7 +35,7 @@ class Curve:
         """Re* and theta_c along the curve, arrays of shape (count,)."""
         x = np.geomspace(self.low, self.high, count)
         theta = self.formula(x)
-        return (x if self.variable == "reynolds" else np.sqrt(theta) * x**1.5), theta
+        return (x if self.variable == "Re*" else np.sqrt(theta) * x**1.5), theta
 
 
 def soulsby_whitehouse(dstar: FloatArray) -> FloatArray:
@@ -85,12 +76,12 @@ def van_rijn(dstar: FloatArray) -> FloatArray:
 
 
 WATER = (
-    Curve("Soulsby & Whitehouse 1997", "dimensionless_diameter", 0.1, 1000.0, soulsby_whitehouse),
-    Curve("Paphitis 2001, mean", "reynolds", 0.01, 1e5, paphitis),
-    Curve("Brownlie 1981", "dimensionless_diameter", 3 ** (2 / 3), 9000 ** (2 / 3), brownlie),
-    Curve("Mantz 1977", "reynolds", 0.03, 1.0, mantz),
-    Curve("Yalin & Karahan 1979", "reynolds", 0.03, 1000.0, yalin_karahan),
-    Curve("van Rijn 1984", "dimensionless_diameter", 1.0, 1000.0, van_rijn),
+    Curve("Soulsby & Whitehouse 1997", "D*", 0.1, 1000.0, soulsby_whitehouse),
+    Curve("Paphitis 2001, mean", "Re*", 0.01, 1e5, paphitis),
+    Curve("Brownlie 1981", "D*", 3 ** (2 / 3), 9000 ** (2 / 3), brownlie),
+    Curve("Mantz 1977", "Re*", 0.03, 1.0, mantz),
+    Curve("Yalin & Karahan 1979", "Re*", 0.03, 1000.0, yalin_karahan),
+    Curve("van Rijn 1984", "D*", 1.0, 1000.0, van_rijn),
 )
 """Curves fitted to grains in liquids."""
 
@@ -104,12 +95,10 @@ class Air:
     viscosity: float
     gravity: float = GRAVITY
 
-    def shields_diagram(
-        self, diameter: FloatArray, ustar: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def shields_diagram(self, d: FloatArray, ustar: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Re* and theta_c of grains of a diameter (m) that move at a friction velocity (m/s)."""
-        excess = (self.density - self.fluid_density) * self.gravity * diameter
-        return ustar * diameter / self.viscosity, self.fluid_density * ustar**2 / excess
+        excess = (self.density - self.fluid_density) * self.gravity * d
+        return ustar * d / self.viscosity, self.fluid_density * ustar**2 / excess
 
 
 def bagnold(diameter: FloatArray, air: Air) -> FloatArray:

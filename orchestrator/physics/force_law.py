@@ -1,8 +1,4 @@
-"""Force laws: the forces of the flow on an exposed grain at a friction velocity, and their range.
-
-`Exposure` holds the surroundings of a grain, `SphereDrag` the drag of a sphere, `ForceLaw` is the
-interface of all laws, and `DragAndSaffman` the base of those that follow Eqs. 2 and 4.
-"""
+"""Force laws: the forces of the flow on an exposed grain, and the range that they hold in."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
@@ -24,23 +20,11 @@ SMOOTH_END = 1.25
 
 @dataclass(frozen=True, init=False, eq=False)
 class Exposure:
-    """An exposed grain and the fluid around it; the fields broadcast together.
+    """An exposed grain and the fluid around it in SI units; the fields broadcast together.
 
-    Parameters
-    ----------
-    diameter : array_like
-        d, m.
-    roughness : array_like
-        Roughness length z0 of the bed, m.
-    fluid_density : array_like
-        rho_f, kg/m3.
-    viscosity : array_like
-        Kinematic viscosity nu, m2/s.
-    lift_coefficient : array_like
-        alpha_s of Eqs. 2 and 4; laws with a lift of their own ignore it.
-    gap : array_like, optional
-        Height of the grain's lowest point over the level at which the flow begins, m; by default
-        z0. Laws that do not `protrude` ignore it.
+    Laws with a lift of their own ignore the `lift_coefficient` alpha_s of Eqs. 2 and 4. `gap` is
+    the height of the grain's lowest point over the level at which the flow begins, by default z0;
+    laws that do not `protrude` ignore it.
     """
 
     diameter: FloatArray
@@ -69,10 +53,9 @@ class Exposure:
         """The six fields in their order, for calls that pass them on as arguments."""
         return tuple(getattr(self, name) for name in self.__dataclass_fields__)
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape that the fields broadcast to."""
-        return np.broadcast_shapes(*(field.shape for field in self.fields))
+    def zeros(self, ustar: ArrayLike) -> FloatArray:
+        """Zeros of the shape that the fields and a friction velocity broadcast to."""
+        return np.zeros(np.broadcast_shapes(np.shape(ustar), *(f.shape for f in self.fields)))
 
     @property
     def ratio(self) -> FloatArray:
@@ -90,24 +73,11 @@ class Exposure:
 
 @dataclass(frozen=True)
 class SphereDrag:
-    """Drag of a sphere in a uniform stream, C_D = (24/Re) factor(Re), Re = V d/nu.
-
-    Attributes
-    ----------
-    name : str
-        Authors.
-    factor : callable
-        Factor on Stokes' drag, of the particle Reynolds number; 1 at zero.
-    highest : float
-        Particle Reynolds number at which the law ends.
-    reference : str
-        Where it was published.
-    """
+    """Drag of a sphere in a uniform stream, C_D = (24/Re) factor(Re), for Re = V d/nu < highest."""
 
     name: str
     factor: Callable[[FloatArray], FloatArray]
     highest: float
-    reference: str
 
     def force(self, speed: FloatArray, exposure: Exposure) -> FloatArray:
         """Drag (N) of a stream at a speed (m/s): 3 pi rho nu d V factor."""
@@ -126,21 +96,11 @@ def _clift_gauvin(reynolds: FloatArray) -> FloatArray:
     return np.asarray(_schiller_naumann(reynolds) + newton)
 
 
-STOKES = SphereDrag("Stokes", np.ones_like, np.inf, "G. G. Stokes, 1851")
+STOKES = SphereDrag("Stokes", np.ones_like, np.inf)
 """The drag of Eq. 2, which ends with the range of Re* of that equation."""
-SCHILLER_NAUMANN = SphereDrag(
-    "Schiller and Naumann",
-    _schiller_naumann,
-    1000.0,
-    "L. Schiller and A. Naumann, Z. VDI 77, 1933",
-)
-"""The drag of Eq. 4; the paper's expression, which is in common use up to Re = 1000."""
-CLIFT_GAUVIN = SphereDrag(
-    "Clift and Gauvin",
-    _clift_gauvin,
-    3e5,
-    "R. Clift and W. H. Gauvin, Can. J. Chem. Eng. 49, 1971, doi:10.1002/cjce.5450490403",
-)
+SCHILLER_NAUMANN = SphereDrag("Schiller and Naumann", _schiller_naumann, 1000.0)
+"""The drag of Eq. 4 (Z. VDI 77, 1933), in common use up to Re = 1000."""
+CLIFT_GAUVIN = SphereDrag("Clift and Gauvin", _clift_gauvin, 3e5)
 """Schiller and Naumann's drag and a term of inertia, up to the drag crisis at 3e5. Coefficients and
 limit agree in several public codes."""
 
@@ -159,12 +119,8 @@ class Validity:
         """Whether the quantity is in its range; NaN is not."""
         return np.asarray((self.value >= self.low) & (self.value < self.high))
 
-    @property
-    def texts(self) -> list[str]:
-        """Which limit each value is beyond, in words; empty for those in the range."""
-        return [self._text(float(value)) for value in np.ravel(self.value)]
-
-    def _text(self, value: float) -> str:
+    def text(self, value: float) -> str:
+        """Which limit a value is beyond, in words; empty for one in the range."""
         if self.low <= value < self.high:
             return ""
         if np.isnan(value):
@@ -175,7 +131,7 @@ class Validity:
 
 def reasons(ranges: Iterable[Validity], count: int) -> list[str]:
     """The limits that each of some grains is beyond, in words; empty where all ranges hold."""
-    texts = [one.texts if np.ndim(one.value) else one.texts * count for one in ranges]
+    texts = [map(each.text, np.broadcast_to(each.value, count).tolist()) for each in ranges]
     return ["; ".join(filter(None, row)) for row in zip(*texts, strict=True)]
 
 
@@ -183,35 +139,25 @@ class ForceLaw(ABC):
     """Drag along the bed, lift normal to it and a torque, as functions of the friction velocity.
 
     All methods are vectorised: `ustar` (m/s, >= 0) and the fields of the exposure broadcast.
-
-    Attributes
-    ----------
-    name, label : str
-        Key of the registry and of study files; name in legends.
-    reference : str
-        Source, with a DOI where one could be verified.
-    unverified : str
-        What of the law was not confirmed by its source; empty if all was. An unverified law takes
-        part in no score, and its answers are not usable.
-    reynolds : tuple of float
-        Range of Re* in which the law holds: low <= Re* < high.
-    drag_law, drag_end : str, float
-        Whose drag it is and the particle Reynolds number at which that ends.
-    turns : bool
-        Whether the flow also turns the grain about its centre.
-    protrudes : bool
-        Whether a grain's own height over the bed matters to its forces.
     """
 
     name: ClassVar[str]
+    """Key of the registry and of study files."""
     label: ClassVar[str]
+    """Name in legends."""
     reference: ClassVar[str]
+    """Source, with a DOI where one could be verified."""
     unverified: ClassVar[str] = ""
+    """What its source did not confirm. Such a law takes part in no score; no answer is usable."""
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
+    """Range of Re* in which the law holds: low <= Re* < high."""
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
+    """Particle Reynolds number at which the drag law ends."""
     turns: ClassVar[bool] = False
+    """Whether the flow also turns the grain about its centre."""
     protrudes: ClassVar[bool] = False
+    """Whether a grain's own height over the bed matters to its forces."""
 
     @abstractmethod
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
@@ -227,7 +173,7 @@ class ForceLaw(ABC):
 
     def torque(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Torque of the flow about the grain's centre, forwards, N m; none by default."""
-        return np.zeros(np.broadcast_shapes(np.shape(ustar), exposure.shape))
+        return exposure.zeros(ustar)
 
     def particle_reynolds(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Particle Reynolds number V d/nu."""
@@ -261,8 +207,8 @@ class ForceLaw(ABC):
 
     def valid(self, ustar: ArrayLike, exposure: Exposure) -> BoolArray:
         """Whether the law holds: in its range of Re* and in all its other ranges."""
-        every = np.broadcast_arrays(*(one.holds for one in self.ranges(ustar, exposure)))
-        return np.asarray(np.logical_and.reduce(every))
+        every = (each.holds for each in self.ranges(ustar, exposure))
+        return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*every)))
 
 
 class DragAndSaffman(ForceLaw):

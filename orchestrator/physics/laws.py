@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
+from orchestrator.physics import velocity
 from orchestrator.physics.constants import INVERSE_KARMAN
 from orchestrator.physics.force_law import (
     CLIFT_GAUVIN,
@@ -16,15 +17,6 @@ from orchestrator.physics.force_law import (
     Exposure,
     ForceLaw,
     Validity,
-)
-from orchestrator.physics.velocity import (
-    ROUGHEST,
-    bridge,
-    layer,
-    rough_gradient,
-    rough_speed,
-    shift,
-    viscous_length,
 )
 from orchestrator.types import FloatArray
 
@@ -46,7 +38,9 @@ class Low(DragAndSaffman):
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Mean speed from z0 to z0 + d, m/s."""
         e = exposure
-        return np.asarray(np.square(ustar) * viscous_length(e.diameter, e.gap) / e.viscosity)
+        return np.asarray(
+            np.square(ustar) * velocity.viscous_length(e.diameter, e.gap) / e.viscosity
+        )
 
     def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """ustar^2/nu, 1/s."""
@@ -69,12 +63,12 @@ class High(DragAndSaffman):
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Mean speed from z0 to z0 + d, m/s."""
         e = exposure
-        return np.multiply(ustar, rough_speed(e.diameter, e.roughness, e.gap))
+        return np.multiply(ustar, velocity.rough_speed(e.diameter, e.roughness, e.gap))
 
     def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Mean shear from z0 to z0 + d, 1/s."""
         e = exposure
-        return np.multiply(ustar, rough_gradient(e.diameter, e.roughness, e.gap))
+        return np.multiply(ustar, velocity.rough_gradient(e.diameter, e.roughness, e.gap))
 
 
 class Bridged(DragAndSaffman):
@@ -94,15 +88,15 @@ class Bridged(DragAndSaffman):
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Mean speed around the grain, m/s."""
         e = exposure
-        viscous = np.asarray(e.viscosity / viscous_length(e.diameter, e.gap))
-        rough = rough_speed(e.diameter, e.roughness, e.gap)
-        return bridge(np.asarray(ustar, float), viscous, rough)
+        viscous = np.asarray(e.viscosity / velocity.viscous_length(e.diameter, e.gap))
+        rough = velocity.rough_speed(e.diameter, e.roughness, e.gap)
+        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
 
     def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Mean shear around the grain, 1/s."""
         e = exposure
-        rough = rough_gradient(e.diameter, e.roughness, e.gap)
-        return bridge(np.asarray(ustar, float), e.viscosity, rough)
+        rough = velocity.rough_gradient(e.diameter, e.roughness, e.gap)
+        return velocity.bridge(np.asarray(ustar, float), e.viscosity, rough)
 
 
 class BridgedGravel(Bridged):
@@ -114,7 +108,10 @@ class BridgedGravel(Bridged):
 
     name: ClassVar[str] = "bridged-gravel"
     label: ClassVar[str] = "bridged, drag of Clift & Gauvin"
-    reference: ClassVar[str] = f"{MODEL}; drag: {CLIFT_GAUVIN.reference}"
+    reference: ClassVar[str] = (
+        f"{MODEL}; drag: R. Clift and W. H. Gauvin, Can. J. Chem. Eng. 49, 1971, "
+        "doi:10.1002/cjce.5450490403"
+    )
     sphere = CLIFT_GAUVIN
 
 
@@ -145,14 +142,14 @@ class Profile(DragAndSaffman):
     def ranges(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Validity, ...]:
         """The ranges of every law, and that of the correlation of the shift."""
         roughness = SAND_GRAIN * exposure.ratio * exposure.reynolds(ustar)
-        rough = Validity("roughness ks u*/nu (Cebeci and Chang)", roughness, 0.0, ROUGHEST)
+        rough = Validity("roughness ks u*/nu (Cebeci and Chang)", roughness, 0.0, velocity.ROUGHEST)
         return (*super().ranges(ustar, exposure), rough)
 
     def _layer(self, ustar: ArrayLike, exposure: Exposure) -> tuple[FloatArray, FloatArray]:
         # a mean over no height at all is the limit of that over little
         d = np.maximum(exposure.reynolds(ustar), 1e-100)
         base = exposure.ratio * d
-        return layer(base, base + d, shift(SAND_GRAIN * base))
+        return velocity.layer(base, base + d, velocity.shift(SAND_GRAIN * base))
 
 
 class ClaudinAndreotti(ForceLaw):
@@ -177,7 +174,7 @@ class ClaudinAndreotti(ForceLaw):
         """Speed at the height d/2, m/s."""
         viscous = np.asarray(2 * exposure.viscosity / exposure.diameter)
         rough = np.asarray(np.log1p(0.5 / exposure.ratio) / self.karman)
-        return bridge(np.asarray(ustar, float), viscous, rough)
+        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
 
     def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Drag, N."""
@@ -187,7 +184,7 @@ class ClaudinAndreotti(ForceLaw):
 
     def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """No lift, N."""
-        return np.zeros(np.broadcast_shapes(np.shape(ustar), exposure.shape))
+        return exposure.zeros(ustar)
 
 
 class Zeng(ForceLaw):
@@ -215,9 +212,9 @@ class Zeng(ForceLaw):
     def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Speed at the grain's centre, m/s."""
         e = exposure
-        viscous = np.asarray(e.viscosity / viscous_length(e.diameter, e.gap))
+        viscous = np.asarray(e.viscosity / velocity.viscous_length(e.diameter, e.gap))
         rough = np.asarray(INVERSE_KARMAN * np.log1p(0.5 / e.ratio))
-        return bridge(np.asarray(ustar, float), viscous, rough)
+        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
 
     def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
         """Drag, N."""
@@ -258,19 +255,8 @@ class ZengTorque(Zeng):
         return np.asarray(self.arm * exposure.diameter * self.drag(ustar, exposure))
 
 
-LAWS: dict[str, ForceLaw] = {
-    one.name: one
-    for one in (
-        Low(),
-        High(),
-        Bridged(),
-        BridgedGravel(),
-        Profile(),
-        ClaudinAndreotti(),
-        Zeng(),
-        ZengTorque(),
-    )
-}
+_EVERY = (Low, High, Bridged, BridgedGravel, Profile, ClaudinAndreotti, Zeng, ZengTorque)
+LAWS: dict[str, ForceLaw] = {law_class.name: law_class() for law_class in _EVERY}
 """Every force law by its name."""
 
 

@@ -10,17 +10,9 @@ from orchestrator.types import FloatArray
 
 @dataclass(frozen=True)
 class Bin:
-    """Measured threshold Shields numbers in a range of Re*.
+    """Measured threshold Shields numbers for low <= Re* < high: count, median and percentiles.
 
-    Attributes
-    ----------
-    low, high : float
-        Range of the friction Reynolds number, low <= Re* < high.
-    count : int
-        How many measurements.
-    median, tenth, ninetieth : float
-        Median and percentiles of their threshold Shields numbers: the order statistics of rank
-        int(n/10) + 1 and int(9 n/10) + 1.
+    The percentiles are the order statistics of rank int(n/10) + 1 and int(9 n/10) + 1.
     """
 
     low: float
@@ -64,13 +56,6 @@ def kirchner_pivot(percentile: ArrayLike, relative_diameter: ArrayLike = 1.0) ->
     J. W. Kirchner, W. E. Dietrich, F. Iseya and H. Ikeda, Sedimentology 37, 1990, as in the code
     of E. Yager et al., 2018 (taucrcalc); the article was not at hand. The entrainment angle is 90
     deg less the pivot: beta 60 and 45 are the percentiles 0 and 30 of grains of the median size.
-
-    Parameters
-    ----------
-    percentile : array_like
-        n, 0 to 100.
-    relative_diameter : array_like
-        Diameter of the grain over the median of the bed.
     """
     n, size = np.asarray(percentile, float), np.asarray(relative_diameter, float)
     return np.asarray((30 + 0.5 * n) * size**-0.3)
@@ -108,18 +93,10 @@ HEIGHT_OVER_ROUGHNESS = 0.117 / 1.57e-4
 
 @dataclass(frozen=True)
 class MeasuredHill:
-    """Measurements behind a hill.
+    """Where reversed flow ends behind the top of a hill, in heights; 0: there was none in the mean.
 
-    Attributes
-    ----------
-    aspect : float
-        Half length over height.
-    reattachment : float
-        Where reversed flow ends behind the top, heights; 0: there was none in the mean.
-    source : str
-        Where the number is from.
-    verified : bool
-        Whether the number was read in its source; others are shown as unverified.
+    ``aspect`` is the half length over the height; ``verified`` says whether the number was read in
+    its source.
     """
 
     aspect: float

@@ -34,18 +34,8 @@ without drag the pivot itself is at 1."""
 class Threshold:
     """The threshold of motion of one grain; all arrays have the broadcast shape of the inputs.
 
-    Attributes
-    ----------
-    friction_velocity : ndarray
-        u* at the threshold, m/s.
-    reynolds : ndarray
-        Friction Reynolds number u* d/nu.
-    shields : ndarray
-        tau_c/((rho_sol - rho_f) g d).
-    drag, lift : ndarray
-        Forces on the grain at the threshold, N.
-    valid : ndarray of bool
-        Whether the law holds there: its range of Re*, that of its drag, and no lift-off.
+    u* (m/s), Re* = u* d/nu, tau_c/((rho_sol - rho_f) g d), the forces there (N), and whether the
+    law holds there: its range of Re*, that of its drag, and no lift-off.
     """
 
     friction_velocity: FloatArray
@@ -78,12 +68,7 @@ def pivot_resistance(slope_deg: ArrayLike, entrainment_angle_deg: ArrayLike) -> 
 def standing_out(relative_size: ArrayLike, entrainment_angle_deg: ArrayLike) -> FloatArray:
     """Part of a single grain's height that lies above the tops of its two neighbours.
 
-    Parameters
-    ----------
-    relative_size : array_like
-        D/d, its diameter over that of the neighbours, whose centres are 2 d cos(beta) apart.
-    entrainment_angle_deg : array_like
-        beta.
+    Its diameter is D/d times that of the neighbours, whose centres are 2 d cos(beta) apart.
     """
     size = np.asarray(relative_size, float)
     half = np.cos(np.radians(np.asarray(entrainment_angle_deg, float)))
@@ -106,22 +91,8 @@ def friction_velocity_at(
     The sum is ``along drag + outward lift + turning torque`` at the local friction velocity, which
     is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` < 0) drag
     and torque change their sign. About a contact, `along` and `outward` are the arms of drag and
-    lift over a length, `turning` is one over it, and the target is the moment of the weight alike.
-
-    Parameters
-    ----------
-    law : ForceLaw
-        The forces.
-    exposure : Exposure
-        The grains.
-    target : array_like
-        Value of the sum that is to be reached, N.
-    along, outward : array_like
-        Weights of drag and lift.
-    turning : array_like
-        Weight of the torque, 1/m.
-    speed_up : array_like
-        Local over undisturbed friction velocity, signed.
+    lift over a length, `turning` is one over it (1/m), and the target (N) is the moment of the
+    weight alike.
 
     Returns
     -------
@@ -176,38 +147,16 @@ def threshold(
     Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta)``, the third of Eqs. 1
     with the torque T of the flow about the grain's centre, for the least u*.
 
-    Parameters
-    ----------
-    law : ForceLaw
-        The forces.
-    exposure : Exposure
-        The grains and the fluid.
-    density : array_like
-        Density of the grain, kg/m3.
-    slope_deg : array_like
-        alpha, positive where the flow goes up the slope.
-    entrainment_angle_deg : array_like
-        beta.
-    gravity : array_like
-        g, m/s2.
-
-    Returns
-    -------
-    Threshold
-        Inputs are not validated here; a resistance that is not positive gives NaN, and a grain
-        that no flow moves an infinite friction velocity.
+    The slope alpha is positive where the flow goes up it. Inputs are not validated here; a
+    resistance that is not positive gives NaN, and a grain that no flow moves an infinite friction
+    velocity.
     """
     e, beta = exposure, np.radians(np.asarray(entrainment_angle_deg, float))
     grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
     submerged = weight(diameter=e.diameter, **grain)
-    ustar = friction_velocity_at(
-        law,
-        e,
-        submerged * pivot_resistance(slope_deg, entrainment_angle_deg),
-        along=np.sin(beta),
-        outward=np.cos(beta),
-        turning=2 / e.diameter,
-    )
+    moment = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
+    arms = {"along": np.sin(beta), "outward": np.cos(beta), "turning": 2 / e.diameter}
+    ustar = friction_velocity_at(law, e, moment, **arms)
     # where no flow moves the grain the forces are those of an infinite one: not a number
     with np.errstate(invalid="ignore"):
         lift = law.lift(ustar, e)
@@ -281,13 +230,6 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
 
     The ranges of Re* decide, Re* < 3 and Re* >= 30, and not the end of the drag of Eq. 4: gravel is
     in the high regime, if beyond its drag law.
-
-    Raises
-    ------
-    ArithmeticError
-        If both hold somewhere; no such grain is known.
     """
     slow, fast = low.reynolds < LAWS["low"].reynolds[1], high.reynolds >= LAWS["high"].reynolds[0]
-    if np.any(slow & fast):
-        raise ArithmeticError("both force laws hold for one grain")
     return np.where(slow, "low", np.where(fast, "high", "transition"))

@@ -106,18 +106,9 @@ def rough_gradient(diameter: FloatArray, roughness: FloatArray, gap: FloatArray)
 def bridge(ustar: FloatArray, viscous: FloatArray, rough: FloatArray) -> FloatArray:
     """The positive root x of ``ustar^2 = viscous x + (x/rough)^2``.
 
-    It is written without the difference of two near numbers, so that it is right to the last
-    digits where either term is negligible.
-
-    Parameters
-    ----------
-    ustar : ndarray
-        Friction velocity, m/s.
-    viscous : ndarray
-        Stress over density that viscosity carries at x = 1: nu over a length for a speed (m/s),
-        nu for a gradient (m2/s).
-    rough : ndarray
-        x/ustar where turbulence carries the whole stress.
+    `viscous` is nu over a length (m/s) for a speed x, nu (m2/s) for a gradient; `rough` is x/ustar
+    where turbulence carries the whole stress. Without the difference of two near numbers the root
+    is right to the last digits where either term is negligible.
     """
     return np.asarray(2 * ustar**2 / (viscous + np.hypot(viscous, 2 * ustar / rough)))
 
@@ -131,19 +122,9 @@ def shift(roughness: FloatArray) -> FloatArray:
 
 
 def layer(base: FloatArray, top: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean speed and mean shear of van Driest's profile between two heights.
+    """Mean speed U/ustar and mean shear nu U'/ustar^2 of van Driest's profile over a layer.
 
-    Parameters
-    ----------
-    base, top : ndarray
-        Heights above the bed, wall units, base < top.
-    moved : ndarray
-        The shift of the wall, wall units.
-
-    Returns
-    -------
-    tuple of ndarray
-        U/ustar and nu U'/ustar^2.
+    Its ends above the bed and the shift of the wall are in wall units.
     """
     depth = top - base
     speed = (_speed_integral(top + moved) - _speed_integral(base + moved)) / depth - _speed(moved)
