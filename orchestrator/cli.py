@@ -176,9 +176,9 @@ def _on_directory(name: str, options: argparse.Namespace) -> int:
     if name == "status":
         from orchestrator.runs import workspace
 
-        found = workspace.status(options.directory)
-        print(workspace.status_text(found))
-        return 3 if found.failed else 0
+        text, has_failed = workspace.status(options.directory)
+        print(text)
+        return 3 if has_failed else 0
     from orchestrator import face, gallery, pipeline
 
     if name == "report":

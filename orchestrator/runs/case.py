@@ -13,17 +13,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any, ClassVar
 
 from orchestrator.errors import OrchestratorError, SolverError
-from orchestrator.runs.files import (
-    Folder,
-    canonical_json,
-    digest_file,
-    digest_files,
-    digest_text,
-    read_json,
-    size_of,
-    write_durably,
-    write_json,
-)
+from orchestrator.runs import files
+from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json, write_json
 
 PACKAGE = Path(__file__).resolve().parents[1]
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
@@ -49,26 +40,17 @@ def templates() -> Path:
 
 @cache
 def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
-    """Path, mode and content of each file of a template, read once.
-
-    Raises
-    ------
-    OrchestratorError
-        If the package lacks it.
-    """
+    """Path, mode and content of each file of a template, read once."""
     root = templates() / name
     if not root.is_dir():
-        raise OrchestratorError(
-            "the package lacks this directory of templates",
-            where=str(root),
-            remedy="install the package again",
-        )
-    files = []
-    for path in sorted(path for path in root.rglob("*") if path.is_file()):
-        parts = path.relative_to(root).parts
-        if not any(fnmatchcase(part, pattern) for part in parts for pattern in GENERATED):
-            files.append(("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes()))
-    return tuple(files)
+        what, remedy = "the package lacks this directory of templates", "install the package again"
+        raise OrchestratorError(what, where=str(root), remedy=remedy)
+    return tuple(
+        ("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes())
+        for path in sorted(path for path in root.rglob("*") if path.is_file())
+        if (parts := path.relative_to(root).parts)
+        if not any(fnmatchcase(part, pattern) for part in parts for pattern in GENERATED)
+    )
 
 
 @cache
@@ -145,17 +127,14 @@ class Case(ABC):
     @cached_property
     def id(self) -> str:
         """Digest of all that the results depend on."""
-        return digest_text(
-            canonical_json(
-                {
-                    "kind": self.kind,
-                    "recipe": self.recipe,
-                    "template": template_digest(self.template),
-                    "parameters": self.parameters,
-                    "needs": [case.id for case in self.needs],
-                }
-            )
-        )
+        depends = {
+            "kind": self.kind,
+            "recipe": self.recipe,
+            "template": template_digest(self.template),
+            "parameters": self.parameters,
+            "needs": [case.id for case in self.needs],
+        }
+        return digest_text(canonical_json(depends))
 
     @property
     def name(self) -> str:
@@ -178,7 +157,9 @@ def prepare(case: Case, cases: Path) -> Path:
 
     def is_ours(name: str) -> bool:
         if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
-            return bool(inputs[name] == _digest(old / name))
+            with contextlib.suppress(OSError):
+                return bool(inputs[name] == files.digest_file(old / name))
+            return False
         path = PurePosixPath(name)
         final = path.with_name(re.sub(r"^\.(.+)\.tmp$", r"\1", path.name)).as_posix()
         return final in names or _fits(final, patterns)
@@ -199,32 +180,35 @@ def prepare(case: Case, cases: Path) -> Path:
         "template_sha256": template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
-        "inputs_sha256": digest_files(written, root=directory),
+        "inputs_sha256": files.digest_files(written, root=directory),
         "programs": case.versions(),
     }
     write_json(directory / IDENTITY, identity)
     return directory
 
 
-def finish(case: Case, directory: Path, *, solver_s: float, cpu_s: float, wall_s: float) -> None:
-    """Mark a case as done: the last file written, with digests of all that it vouches for."""
-    results = digest_files(_matching(directory, case.results), root=directory)
-    derived = digest_files(_matching(directory, case.derived), root=directory)
-    bulky = (path.relative_to(directory).as_posix() for path in _matching(directory, case.bulky))
-    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
+def finish(case: Case, directory: Path, **times: float) -> None:
+    """Mark a case as done: the last file written, with digests of all that it vouches for.
+
+    The times of the run, s, are `solver_s`, `cpu_s` and `wall_s`.
+    """
+    results, derived = (
+        files.digest_files(_matching(directory, patterns), root=directory)
+        for patterns in (case.results, case.derived)
+    )
+    bulky = [path.relative_to(directory).as_posix() for path in _matching(directory, case.bulky)]
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
-    write_durably(directory / CHECKSUMS, sums)
+    files.write_durably(directory / CHECKSUMS, sums)
     (directory / FAILED).unlink(missing_ok=True)
     marker = {
         "id": case.id,
         "ended": "done",
-        "solver_s": solver_s,
-        "cpu_s": cpu_s,
-        "wall_s": wall_s,
+        **times,
         "results_sha256": results,
         "derived_sha256": derived,
-        "stamps": stamps,
-        "bytes": size_of(directory),
+        "bulky": bulky,
+        "stamps": {name: _stamp(directory / name) for name in {*results, *derived, *bulky}},
+        "bytes": files.size_of(directory),
     }
     write_json(directory / DONE, marker)
 
@@ -250,45 +234,42 @@ def failure(directory: Path) -> str | None:
 
     The word for its end comes first where it says more than that it failed.
     """
-    if not os.path.isfile(directory / FAILED):
-        return None
     word, cause = ended(directory)
-    return cause if word in ("", SolverError.ended) else f"{word}: {cause}"
+    return (cause if word in ("", SolverError.ended) else f"{word}: {cause}") or None
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
-    """The marker of a finished case, or None where anything about it cannot be trusted.
+    """The marker of a finished case, or None where anything about it cannot be trusted."""
+    return marker_of(cases / case.name, case.id)
+
+
+def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
+    """The marker of the finished case of an id, or None where anything cannot be trusted.
 
     A bulky file may be missing: `prune` drops it, and no table is made of it.
     """
-    directory = cases / case.name
-    identity, state = read_json(directory / IDENTITY), read_json(directory / DONE)
-    if not (isinstance(identity, dict) and isinstance(state, dict)):
+    about, state = read_json(directory / IDENTITY), read_json(directory / DONE)
+    if not (isinstance(about, dict) and isinstance(state, dict)):
         return None
-    if not identity.get("id") == state.get("id") == case.id:
+    if not about.get("id") == state.get("id") == identity:
         return None
     digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
     try:
         marked = (directory / DONE).stat().st_mtime_ns
         for name, digest in digests.items():
             path = directory / name
-            if _fits(name, case.bulky) and not os.path.lexists(path):
+            if name in state["bulky"] and not os.path.lexists(path):
                 continue
             # Digests of a thousand piles are those of 7 GB: they are compared only if size or time
             # have changed. A file written in the same tick of the clock as the marker may have
             # changed since without a trace, so its digest decides.
             size, changed = _stamp(path)
             untouched = [size, changed] == stamps.get(name) and changed < marked
-            if not untouched and digest_file(path) != digest:
+            if not untouched and files.digest_file(path) != digest:
                 return None
     except OSError:
         return None
     return state if digests else None
-
-
-def is_done(case: Case, cases: Path) -> bool:
-    """Whether the case's directory holds its finished results, unharmed."""
-    return done_state(case, cases) is not None
 
 
 def is_whole(case: Case, cases: Path) -> bool:
@@ -307,13 +288,12 @@ def prune(case: Case, cases: Path) -> None:
     directory, state = cases / case.name, done_state(case, cases)
     if state is None:
         return
-    for path in _matching(directory, case.bulky):
-        if path.relative_to(directory).as_posix() in state["stamps"]:
-            path.unlink()
-            with contextlib.suppress(OSError):  # it is not empty
-                os.removedirs(path.parent)
+    for path in _matching(directory, tuple(state["bulky"])):
+        path.unlink()
+        with contextlib.suppress(OSError):  # it is not empty
+            os.removedirs(path.parent)
     marker = directory / DONE
-    size_without_marker = size_of(directory) - marker.stat().st_size
+    size_without_marker = files.size_of(directory) - marker.stat().st_size
     if state["bytes"] != size_without_marker:
         write_json(marker, {**state, "bytes": size_without_marker})
 
@@ -321,7 +301,7 @@ def prune(case: Case, cases: Path) -> None:
 def size(directory: Path, state: Mapping[str, Any]) -> int:
     """Bytes on disk of the case in a directory, whose marker has its size at its end."""
     size = state.get("bytes")
-    return size + size_of(directory / DONE) if type(size) is int else size_of(directory)
+    return size + files.size_of(directory / DONE) if type(size) is int else files.size_of(directory)
 
 
 def names_in(cases: Path) -> list[str]:
@@ -347,11 +327,11 @@ def _stamp(path: Path) -> tuple[int, int]:
     return state.st_size, state.st_mtime_ns
 
 
-def _matching(directory: Path, patterns: tuple[str, ...]) -> list[Path]:
+def _matching(directory: Path, patterns: Iterable[str]) -> list[Path]:
     """The files in a directory that fit a pattern; no link is followed."""
-    walked = (Path(path) / file for path, _, files in os.walk(directory) for file in files)
-    files = (path for path in walked if path.is_file() and not path.is_symlink())
-    return sorted(path for path in files if _fits(path.relative_to(directory).as_posix(), patterns))
+    walked = (Path(path) / file for path, _, names in os.walk(directory) for file in names)
+    paths = (path for path in walked if path.is_file() and not path.is_symlink())
+    return sorted(path for path in paths if _fits(path.relative_to(directory).as_posix(), patterns))
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:
@@ -359,10 +339,3 @@ def _fits(name: str, patterns: Iterable[str]) -> bool:
     parts = name.split("/")
     split = (pattern.split("/") for pattern in patterns)
     return any(len(each) == len(parts) and all(map(fnmatchcase, parts, each)) for each in split)
-
-
-def _digest(path: Path) -> str | None:
-    try:
-        return digest_file(path)
-    except OSError:
-        return None

@@ -20,13 +20,8 @@ from orchestrator.runs.case import PACKAGE, Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 
 SYSTEMS = {
-    "htcondor": "HTCondorCluster",
-    "lsf": "LSFCluster",
-    "moab": "MoabCluster",
-    "oar": "OARCluster",
-    "pbs": "PBSCluster",
-    "sge": "SGECluster",
-    "slurm": "SLURMCluster",
+    name.lower(): f"{name}Cluster"
+    for name in ("HTCondor", "LSF", "Moab", "OAR", "PBS", "SGE", "SLURM")
 }
 """Names of the queues, and dask-jobqueue's classes for them."""
 AHEAD = 2
@@ -64,28 +59,21 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
     try:
         libraries: list[Any] = [*map(import_module, ("dask", "dask_jobqueue", "distributed"))]
     except ImportError as error:
-        raise InputError(
-            f"a cluster needs the package's extra [cluster]: {error.name} is not installed",
-            where="--cluster",
-            remedy="pip install 'dask-jobqueue>=0.9', with the Python that runs this",
-        ) from None
+        what = f"a cluster needs the package's extra [cluster]: {error.name} is not installed"
+        remedy = "pip install 'dask-jobqueue>=0.9', with the Python that runs this"
+        raise InputError(what, where="--cluster", remedy=remedy) from None
     dask, jobqueue, distributed = libraries
     kind = getattr(jobqueue, SYSTEMS[queue.system])
     submit = kind.job_cls.submit_command.split()[0]
     if not shutil.which(submit):
-        raise OrchestratorError(
-            f"there is no {submit} on this machine",
-            where="--cluster",
-            remedy="run the command on a machine that may ask the queue for jobs",
-        )
+        remedy = "run the command on a machine that may ask the queue for jobs"
+        raise OrchestratorError(f"there is no {submit} on this machine", "--cluster", remedy)
     cases.mkdir(exist_ok=True)
     logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
     if awkward := sorted(AWKWARD.intersection(logs)):
-        raise InputError(
-            f"jobs cannot write logs into {logs}: it has {' '.join(map(repr, awkward))} in it",
-            where="cluster.log_directory",
-            remedy="name a directory without these there; the study's own may stay as it is",
-        )
+        what = f"jobs cannot write logs into {logs}: it has {' '.join(map(repr, awkward))} in it"
+        remedy = "name a directory without these there; the study's own may stay as it is"
+        raise InputError(what, where="cluster.log_directory", remedy=remedy)
     name = queue.settings.get("config_name", kind.job_cls.config_name)
     given = {**dask.config.get(f"jobqueue.{name}"), **queue.settings}
     # a job begins in an environment of its own, where this package need not be installed
@@ -102,11 +90,9 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
     try:
         cluster = kind(**settings)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
-        raise InputError(
-            f"these settings make no jobs: {str(error).splitlines()[0]}",
-            where="cluster",
-            remedy="see [cluster] in the study file, and dask's own configuration of jobqueue",
-        ) from None
+        what = f"these settings make no jobs: {str(error).splitlines()[0]}"
+        remedy = "see [cluster] in the study file, and dask's own configuration of jobqueue"
+        raise InputError(what, where="cluster", remedy=remedy) from None
     cores = int(given["cores"])
     jobs = math.ceil(workers / cores)
     with cluster, distributed.Client(cluster) as client:
@@ -115,12 +101,9 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
         _await_first(client, Path(logs))
-        yield Pool(
-            client.get_executor(pure=False),
-            partial(execute_unless_done, cases=cases, limit_s=limit_s),
-            places=AHEAD * jobs * cores,
-            lost=(distributed.KilledWorker,),
-        )
+        task = partial(execute_unless_done, cases=cases, limit_s=limit_s)
+        places, executor = AHEAD * jobs * cores, client.get_executor(pure=False)
+        yield Pool(executor, task, places, (distributed.KilledWorker,))
     for name in names_in(cases):
         (cases / f".{name}.lock").unlink(missing_ok=True)
 
@@ -154,11 +137,8 @@ def _submit(cluster: Any, jobs: int, system: str) -> None:
         for job in cluster.workers.values():
             # else the cluster's end trips over jobs that never began
             job.status = Status.failed
-        raise OrchestratorError(
-            f"{system} does not take the job: {' '.join(str(error).split())}",
-            where="--cluster",
-            remedy="see [cluster] in the study file",
-        ) from None
+        what = f"{system} does not take the job: {' '.join(str(error).split())}"
+        raise OrchestratorError(what, "--cluster", "see [cluster] in the study file") from None
 
 
 def _await_first(client: Any, logs: Path) -> None:
@@ -171,9 +151,6 @@ def _await_first(client: Any, logs: Path) -> None:
         except TimeoutError:
             newest = sorted(logs.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
             words = ((path.name, process.last_words(path)) for path in newest)
-            hint = next((f"{name} says: {text}" for name, text in words if text), "")
-            print(
-                f"no job has begun for {patience:.0f} s; {hint or 'ask the queue why'}",
-                file=sys.stderr,
-            )
+            hint = next((f"{name} says: {text}" for name, text in words if text), "ask the queue")
+            print(f"no job has begun for {patience:.0f} s; {hint}", file=sys.stderr)
             patience *= 2

@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from graphlib import TopologicalSorter
@@ -30,10 +29,6 @@ class Outcome:
     case: Case
     seconds: float = 0.0
     error: OrchestratorError | None = None
-
-
-Report = Callable[[Outcome], None]
-Watch = Callable[[Collection[Case]], None]
 
 
 @dataclass(frozen=True)
@@ -76,19 +71,11 @@ class Cores:
 
 @contextlib.contextmanager
 def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
-    """Threads of this process, each with one solver at a time.
+    """Threads of this process, whose solvers take so many cores as there are workers.
 
     While solvers hold all cores, other threads prepare the next cases and read what the last ones
-    left, so that no solver waits for Python. An exception ends all children before it goes on.
-
-    Parameters
-    ----------
-    cases : Path
-        The directory of the study's cases.
-    workers : int
-        How many cores the solvers take, most of them one each.
-    limit_s : float
-        Wall time after which a run counts as hung, s.
+    left, so that no solver waits for Python. A run of more than `limit_s` counts as hung. An
+    exception ends all children before it goes on.
     """
     stop = threading.Event()
     task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, cores=Cores(workers))
@@ -124,13 +111,13 @@ def execute(
     """
     began = time.monotonic()
     directory = case_states.prepare(case, cases)
-    outside_s = time.monotonic() - began
+    outside_s, log = time.monotonic() - began, directory / case_states.LOG
     try:
-        with cores.held(case.ranks) if cores else nullcontext():
+        with cores.held(case.ranks) if cores else contextlib.nullcontext():
             ended = process.run(
                 ["sh", "Allrun"],  # a disk may forbid to run files, or know no right to
                 cwd=directory,
-                log=directory / case_states.LOG,
+                log=log,
                 limit_s=limit_s,
                 stop=stop,
                 env=ONE_THREAD,
@@ -139,25 +126,22 @@ def execute(
         began = time.monotonic()
         if ended.over == "disk":
             what = "no space is left on the disk, and the solver did not end"
-            remedy = "make room, then the same command continues"
-            raise SolverError(what, where=str(directory), remedy=remedy)
+            raise SolverError(what, str(directory), "make room, then the same command continues")
         if ended.over:
             what = f"the solver did not end within {limit_s:g} s and was killed"
             remedy = "see its logs; raise time_limit in the study file if it was still at work"
-            raise SolverError(what, where=str(directory), remedy=remedy)
+            raise SolverError(what, str(directory), remedy)
         # the case's own look at its logs knows more than the exit code: it comes first
         case.collect(directory)
         if ended.returncode != 0:
-            what, log = f"./Allrun ended with {ended.returncode}", directory / case_states.LOG
-            raise SolverError(what, where=str(log), remedy="see it")
-        took_s = outside_s + ended.seconds + time.monotonic() - began
-        case_states.finish(
-            case, directory, solver_s=ended.seconds, cpu_s=ended.cpu_s, wall_s=took_s
-        )
+            raise SolverError(f"./Allrun ended with {ended.returncode}", str(log), "see it")
+        wall_s = outside_s + ended.seconds + time.monotonic() - began
+        times = {"solver_s": ended.seconds, "cpu_s": ended.cpu_s, "wall_s": wall_s}
+        case_states.finish(case, directory, **times)
     except SolverError as error:
         case_states.fail(directory, error)
         raise
-    return took_s
+    return wall_s
 
 
 def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
@@ -177,7 +161,10 @@ def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
 
 
 def run(
-    todo: Mapping[str, Case], pool: Pool, report: Report, watch: Watch = lambda _: None
+    todo: Mapping[str, Case],
+    pool: Pool,
+    report: Callable[[Outcome], None],
+    watch: Callable[[Collection[Case]], None] = lambda _: None,
 ) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet.
 
@@ -190,10 +177,8 @@ def run(
         By name; the needs of each case are either here too or done already.
     pool : Pool
         Where they run.
-    report : callable
-        Receives the outcome of each case as it ends.
-    watch : callable, optional
-        Receives the cases that are running, a few times a second.
+    report, watch : callable
+        Receive the outcome of each case as it ends, and, a few times a second, the cases that run.
 
     Returns
     -------
@@ -206,7 +191,11 @@ def run(
         If the pool was stopped.
     """
     needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
-    chains = _chains(todo, needs)
+    behind, chains = dict.fromkeys(todo, 0.0), {}  # costs, s, of the cases that wait for each
+    for name in reversed([*TopologicalSorter(needs).static_order()]):
+        chains[name] = todo[name].cost_s + behind[name]
+        for need in needs[name]:
+            behind[need] = max(behind[need], chains[name])
     sorter = TopologicalSorter(needs)
     sorter.prepare()
     ready: list[tuple[float, int, str]] = []
@@ -242,17 +231,6 @@ def run(
     return failed
 
 
-def _chains(todo: Mapping[str, Case], needs: Mapping[str, Collection[str]]) -> dict[str, float]:
-    """Cost of each case and of the most expensive chain of cases that need it, s."""
-    behind = dict.fromkeys(todo, 0.0)
-    chains = {}
-    for name in reversed([*TopologicalSorter(needs).static_order()]):
-        chains[name] = todo[name].cost_s + behind[name]
-        for need in needs[name]:
-            behind[need] = max(behind[need], chains[name])
-    return chains
-
-
 def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
     try:
         return Outcome(case, future.result())
@@ -265,8 +243,5 @@ def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
 
 
 def _loss(error: Exception, where: str) -> SolverError:
-    return SolverError(
-        f"the processes that ran it were lost: {error}",
-        where=where,
-        remedy="the logs of their jobs say more: out of memory, or of time?",
-    )
+    what = f"the processes that ran it were lost: {error}"
+    return SolverError(what, where, "the logs of their jobs say more: out of memory, or of time?")

@@ -14,7 +14,13 @@ from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from orchestrator.errors import InputError, OrchestratorError, of_system
+from orchestrator.errors import InputError, OrchestratorError
+
+RECORD = "written.sha256"
+"""Digests of the files that were put, as `sha256sum` reads them. A line is added before its file
+is written: a killed process leaves no file that is not listed."""
+KEPT = "kept"
+"""Where files are moved that stand in the way and that this program did not write."""
 
 
 def canonical_json(value: Any) -> str:
@@ -67,7 +73,10 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def write_durably(path: Path, content: str | bytes) -> None:
-    """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
+    """Replace a file as one step: a reader, or a crash, sees the old or the new content whole.
+
+    An empty directory in its place is removed. An OSError names the file.
+    """
     temporary = path.with_name(f".{path.name}.tmp")
     try:
         temporary.unlink(missing_ok=True)
@@ -75,22 +84,16 @@ def write_durably(path: Path, content: str | bytes) -> None:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
-        remove_empty_directory(path)
+        if path.is_dir() and not path.is_symlink():
+            path.rmdir()
         os.replace(temporary, path)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
-    handle = os.open(path.parent, os.O_RDONLY)
-    try:
+        handle = os.open(path.parent, os.O_RDONLY)
         os.fsync(handle)  # the name, too, survives a crash
-    finally:
         os.close(handle)
-
-
-def remove_empty_directory(path: Path) -> None:
-    """Clear the way for a file where something has put a directory; one that holds files stays."""
-    if path.is_dir() and not path.is_symlink():
-        path.rmdir()
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        error.filename, error.filename2 = str(path), None
+        raise
 
 
 def size_of(path: Path) -> int:
@@ -103,28 +106,13 @@ def size_of(path: Path) -> int:
     return 0
 
 
-RECORD = "written.sha256"
-"""Digests of the files that were put, as `sha256sum` reads them. A line is added before its file
-is written: a killed process leaves no file that is not listed."""
-KEPT = "kept"
-"""Where files are moved that stand in the way and that this program did not write."""
-_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
-
-
 class Folder:
     """A directory that this program writes: the one way for files to get into it and out of it.
 
     Only files that this program wrote are replaced or removed. Anything else that stands in their
-    place is moved to `KEPT` with a warning, and no link is followed.
-
-    Names are relative to the directory, with ``/`` between their parts. All methods raise
-    InputError where a link stands in the way, naming it, and OrchestratorError where the system
-    refuses.
-
-    Parameters
-    ----------
-    root : Path
-        The directory; it may itself be reached through a link.
+    place is moved to `KEPT` with a warning, and no link is followed. Names are relative to `root`,
+    which may itself be reached through a link. All methods raise InputError where a link stands in
+    the way, naming it.
     """
 
     def __init__(self, root: Path) -> None:
@@ -137,51 +125,38 @@ class Folder:
             raise InputError(f"{name!r} leads out of the directory", where=str(self.root))
         for path in itertools.accumulate(parts, Path.joinpath, initial=self.root):
             if path != self.root and path.is_symlink():
-                raise InputError(
-                    f"it is a link to {os.readlink(path)}, and this program writes through none",
-                    where=str(path),
-                    remedy="remove the link; the directory as a whole may lie elsewhere: --out",
-                )
+                what = f"it is a link to {os.readlink(path)}, and this program writes through none"
+                remedy = "remove the link; the directory as a whole may lie elsewhere: --out"
+                raise InputError(what, where=str(path), remedy=remedy)
         return path
 
     def put(self, name: str, content: str | bytes) -> None:
         """Write a file in one step; a file of its name that was not put there is kept aside."""
         data = content.encode() if isinstance(content, str) else content
-        with self._naming(RECORD):
-            record = self._way(RECORD, is_ours=True)
-            text = self._text()
-            if text and record.stat().st_nlink > 1:  # a backup may have a second name of the file
-                write_durably(record, os.fsencode(text))
-            end = "" if text.endswith("\n") or not text else "\n"
-            with record.open("ab", buffering=0) as stream:  # processes may add side by side
-                stream.write(f"{end}{hashlib.sha256(data).hexdigest()}  {name}\n".encode())
-        with self._naming(name):
-            write_durably(self._way(name), data)
+        self._record([*self._listed(), (hashlib.sha256(data).hexdigest(), name)])
+        write_durably(self._place(name), data)
 
     def note(self, name: str, content: str | bytes) -> None:
         """Write a file whose name is this program's whatever it holds; it is not recorded."""
-        with self._naming(name):
-            write_durably(self._way(name, is_ours=True), content)
+        write_durably(self._place(name, is_ours=True), content)
 
     def drop(self, name: str) -> None:
         """Remove a file; one that was not put, or has changed since, is kept aside."""
-        with self._naming(name):
-            self._way(name).unlink(missing_ok=True)
+        self._place(name).unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
         """Make way for a sub-directory, and return its place; files of others are kept aside.
 
         A file in it is this program's if `is_ours` says so of its path from there.
         """
-        with self._naming(name):
-            path = self.path(name)
-            for place, _, files in os.walk(path, topdown=False):
-                for file in (Path(place, each) for each in files):
-                    if not file.is_symlink() and is_ours(file.relative_to(path).as_posix()):
-                        file.unlink()
-                with contextlib.suppress(OSError):
-                    os.rmdir(place)
-            return self._way(name)
+        path = self.path(name)
+        for place, _, files in os.walk(path, topdown=False):
+            for file in (Path(place, each) for each in files):
+                if not file.is_symlink() and is_ours(file.relative_to(path).as_posix()):
+                    file.unlink()
+            with contextlib.suppress(OSError):
+                os.rmdir(place)
+        return self._place(name)
 
     @contextlib.contextmanager
     def renewed(self, *places: str, but: Sequence[str] = ()) -> Iterator[None]:
@@ -191,10 +166,9 @@ class Folder:
         file that has changed since it was put stays. If the block ends with an exception, nothing
         is removed.
         """
-        before = list(dict.fromkeys(self._lines()))
-        self._write_record(before)
+        before = self._listed()
         yield
-        new = self._lines()[len(before) :]
+        new = self._listed()[len(before) :]
         old = {
             (digest, name)
             for digest, name in before
@@ -204,11 +178,11 @@ class Folder:
         for digest, name in old:
             if name not in again and self._digest(name) == digest:
                 self.drop(name)
-        self._write_record([*(line for line in before if line not in old), *new])
+        self._record(dict.fromkeys([*(line for line in before if line not in old), *new]))
 
     def written(self, but: Sequence[str] = ()) -> dict[str, str]:
         """Digests of all files that were put, except for `but`, by name."""
-        return {name: digest for digest, name in self._lines() if name not in but}
+        return {name: digest for digest, name in self._listed() if name not in but}
 
     def is_whole(self, but: Sequence[str] = ()) -> bool:
         """Whether all files that were put, except for `but`, are unchanged."""
@@ -216,17 +190,15 @@ class Folder:
 
     def read(self, name: str) -> bytes:
         """Read a file that was put; OrchestratorError if it is not there as it was put."""
-        with self._naming(name), opened(self.path(name)) as stream:
+        path = self.path(name)
+        with opened(path) as stream:
             data = stream.read()
         if hashlib.sha256(data).hexdigest() != self.written().get(name):
-            raise OrchestratorError(
-                "it is not as it was written",
-                where=str(self.root / name),
-                remedy="`orchestrator report` writes it again",
-            )
+            remedy = "`orchestrator report` writes it again"
+            raise OrchestratorError("it is not as it was written", where=str(path), remedy=remedy)
         return data
 
-    def _way(self, name: str, *, is_ours: bool = False) -> Path:
+    def _place(self, name: str, *, is_ours: bool = False) -> Path:
         """The path of a name, with its directory made and anything of others moved away.
 
         A file of that name stays if it is this program's: it was put, or `is_ours`.
@@ -238,7 +210,8 @@ class Folder:
             (self.root / folder).mkdir(exist_ok=True)
         with contextlib.suppress(OSError):
             path.rmdir()
-        if os.path.lexists(path) and not (path.is_file() and (is_ours or self._is_put(name))):
+        is_put = is_ours or (self._digest(name), name) in self._listed()
+        if os.path.lexists(path) and not (path.is_file() and is_put):
             self._keep(name)
         return path
 
@@ -255,9 +228,6 @@ class Folder:
         what = f"{self.root / name} is not what this program wrote: it is kept as {kept}/{name}"
         warnings.warn(what, stacklevel=2)
 
-    def _is_put(self, name: str) -> bool:
-        return (self._digest(name), name) in self._lines()
-
     def _digest(self, name: str) -> str | None:
         """Digest of a file; None where it is missing or cannot be read."""
         try:
@@ -265,22 +235,12 @@ class Folder:
         except (OSError, InputError):
             return None
 
-    def _text(self) -> str:
-        record = self.path(RECORD)
-        return os.fsdecode(record.read_bytes()) if record.is_file() else ""
-
-    def _lines(self) -> list[tuple[str, str]]:
+    def _listed(self) -> list[tuple[str, str]]:
         """Digests and names of the record, as far as it can be read."""
-        lines = map(_LINE.fullmatch, self._text().split("\n"))
-        return [(line[1], line[2]) for line in lines if line]
+        record = self.path(RECORD)
+        text = os.fsdecode(record.read_bytes()) if record.is_file() else ""
+        return re.findall(r"(?m)^([0-9a-f]{64})  (.+)$", text)
 
-    def _write_record(self, lines: Iterable[tuple[str, str]]) -> None:
-        self.note(RECORD, "".join(f"{digest}  {name}\n" for digest, name in dict.fromkeys(lines)))
-
-    @contextlib.contextmanager
-    def _naming(self, name: str) -> Iterator[None]:
-        """Name the file in an error of the system."""
-        try:
-            yield
-        except OSError as error:
-            raise of_system(error, str(self.root / name)) from None
+    def _record(self, lines: Iterable[tuple[str, str]]) -> None:
+        """Write the record; a name has several lines while its file is being replaced."""
+        self.note(RECORD, os.fsencode("".join(f"{digest}  {name}\n" for digest, name in lines)))

@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from orchestrator.errors import Interrupted, SolverError
 
@@ -67,13 +67,6 @@ class Ended:
     over: str = ""
     peak_mib: float = 0.0
 
-    @property
-    def may_pass(self) -> bool:
-        """Whether its end may not come again: it was killed from outside, and did not fail."""
-        # a shell reports 128 + n of a program that signal n ended
-        code = -self.returncode if self.returncode < 0 else self.returncode - 128
-        return code in _OUTSIDE and not self.over
-
 
 def run(
     command: Sequence[str],
@@ -120,7 +113,7 @@ def run(
     given = {**os.environ, "PATH": path, "PWD": str(cwd), **(env or {})}
     blocks = "" if file_limit is None else str(file_limit // 512)
     for _ in range(tries):
-        began, over, usage = time.monotonic(), "", None
+        began, over, cpu_s, peak_mib = time.monotonic(), "", 0.0, 0.0
         with log.open("wb") as stream:
             process = subprocess.Popen(
                 ["sh", "-c", _GUARD, "sh", blocks, *command],
@@ -136,12 +129,13 @@ def run(
                 if not over:
                     _, status, usage = os.wait4(process.pid, 0)
                     process.returncode = os.waitstatus_to_exitcode(status)
+                    cpu_s, peak_mib = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
             finally:
                 _end_group(process)
-        cpu_s = usage.ru_utime + usage.ru_stime if usage else 0.0
-        peak_mib = usage.ru_maxrss / 1024 if usage else 0.0
         ended = Ended(process.returncode, time.monotonic() - began, cpu_s, over, peak_mib)
-        if not ended.may_pass:
+        # a shell reports 128 + n of a program that signal n ended
+        code = -ended.returncode if ended.returncode < 0 else ended.returncode - 128
+        if over or code not in _OUTSIDE:
             break
     return ended
 
@@ -213,48 +207,15 @@ def last_words(log: Path) -> str:
     return lines[-1][-200:] if lines else ""
 
 
-@dataclass(frozen=True)
-class Reply:
-    """Text of both streams of a program that was asked for its version, and its exit code."""
+class Reply(NamedTuple):
+    """Text of both streams of a program, and how it ended with its most telling line."""
 
     text: str
-    returncode: int
-
-    @property
-    def gist(self) -> str:
-        """How it ended and its most telling line, for a message."""
-        lines = [line.strip() for line in self.text.splitlines() if line.strip()]
-        telling = [line for line in lines if re.search("error|cannot|fail", line, re.IGNORECASE)]
-        line = f"“{[*telling, *lines[-1:]][0]}”" if lines else "nothing"
-        if self.returncode < 0:
-            return f"it was killed by {signal.Signals(-self.returncode).name} and printed {line}"
-        return f"it ended with {self.returncode} and printed {line}"
-
-
-def find(name: str, *, remedy: str) -> str:
-    """The path of the program that a name stands for.
-
-    Raises
-    ------
-    SolverError
-        If there is none that may be run.
-    """
-    path = shutil.which(name)
-    if path is None:
-        if path := shutil.which(name, os.F_OK):
-            raise SolverError(f"{path} may not be run", remedy=f"chmod +x {path}")
-        raise SolverError(f"the program {name} is not in PATH", remedy=remedy)
-    return os.path.abspath(path)
+    gist: str
 
 
 def ask(path: str, *arguments: str, env: Mapping[str, str | None] | None = None) -> Reply:
-    """Run a program that ends at once, and return what it prints.
-
-    Raises
-    ------
-    SolverError
-        If it does not end.
-    """
+    """Run a program that ends at once, for what it prints; SolverError if it does not end."""
     command = [path, *arguments]
     with tempfile.TemporaryDirectory() as folder:
         here, log = Path(folder), Path(folder, "log")
@@ -262,11 +223,20 @@ def ask(path: str, *arguments: str, env: Mapping[str, str | None] | None = None)
         with log.open("rb") as stream:
             text = stream.read(QUERY_BYTES).decode(errors="replace")
     if ended.over == "time":
-        raise SolverError(
-            f"{' '.join(command)} did not end within {QUERY_S:g} s",
-            remedy="try it by hand: what does it wait for?",
-        )
-    return Reply(text, ended.returncode)
+        what = f"{' '.join(command)} did not end within {QUERY_S:g} s"
+        raise SolverError(what, remedy="try it by hand: what does it wait for?")
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    telling = [line for line in lines if re.search("error|cannot|fail", line, re.IGNORECASE)]
+    line = f"“{[*telling, *lines[-1:]][0]}”" if lines else "nothing"
+    return Reply(text, f"it ended with {ended.returncode} and printed {line}")
+
+
+def find(name: str, *, remedy: str) -> str:
+    """The path of the program that a name stands for; SolverError if there is none."""
+    path = shutil.which(name)
+    if path is None:
+        raise SolverError(f"the program {name} is not in PATH", remedy=remedy)
+    return os.path.abspath(path)
 
 
 def shortage() -> str:
@@ -274,12 +244,11 @@ def shortage() -> str:
 
     A small study on two cores took 40 files; and 1.9e6 kB of addresses, a tenth of it in use.
     """
-    least = (
+    for what, number, least, unit, option in (
         ("open files", resource.RLIMIT_NOFILE, 64, 1, "n"),
         ("memory", resource.RLIMIT_AS, 2_000_000, 1024, "v"),
-    )
-    for what, number, value, unit, option in least:
+    ):
         soft, _ = resource.getrlimit(number)
-        if soft != resource.RLIM_INFINITY and soft < value * unit:
-            return f"the limit of {what} is {soft // unit}: raise it, ulimit -{option} {value}"
+        if soft != resource.RLIM_INFINITY and soft < least * unit:
+            return f"the limit of {what} is {soft // unit}: raise it, ulimit -{option} {least}"
     return ""

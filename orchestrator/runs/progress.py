@@ -3,8 +3,7 @@
 import math
 import sys
 import time
-from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Self
 
@@ -22,7 +21,7 @@ class Display:
     """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends."""
 
     def __init__(self, forecast: "Forecast", cases: Path) -> None:
-        self._console = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
         self._forecast, self._cases = forecast, cases
         self._ended, self._looked = 0, -math.inf
         self._bar = Progress(
@@ -30,17 +29,18 @@ class Display:
             BarColumn(),
             TextColumn("{task.percentage:.0f}% of the work, {task.fields[left]}"),
             console=self._console,
-            disable=not sys.stderr.isatty(),
         )
         left = self._time_left()
         self._task = self._bar.add_task("", total=1.0, ended=0, count=forecast.count, left=left)
 
     def __enter__(self) -> Self:
-        self._bar.start()
+        if sys.stderr.isatty():
+            self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        if sys.stderr.isatty():
+            self._bar.stop()
 
     def __call__(self, outcome: Outcome) -> None:
         """Take note of a case that has ended."""
@@ -49,19 +49,16 @@ class Display:
         self._console.print(
             f"[{self._ended}/{self._forecast.count}] {'failed' if outcome.error else 'done'}  "
             f"{outcome.case.name}  {self._forecast.done:.0%} of the work, {self._time_left()}",
-            markup=False,
+            *([f"\n  {outcome.error}"] if outcome.error else []),
         )
-        if outcome.error:
-            self._console.print(f"  {outcome.error}", markup=False)
         self._show()
 
     def watch(self, running: Collection[Case]) -> None:
         """Look how far the running cases are, once a second, for the bar of a terminal."""
-        if self._bar.disable or time.monotonic() < self._looked + LOOK_S:
-            return
-        self._looked = time.monotonic()
-        self._forecast.going((case, case.share(self._cases / case.name)) for case in running)
-        self._show()
+        if sys.stderr.isatty() and time.monotonic() > self._looked + LOOK_S:
+            self._looked = time.monotonic()
+            self._forecast.going((case, case.share(self._cases / case.name)) for case in running)
+            self._show()
 
     def _show(self) -> None:
         done, left = self._forecast.done, self._time_left()
@@ -80,51 +77,34 @@ class Forecast:
     def __init__(self, todo: Collection[Case], workers: int, after_s: float = 0.0) -> None:
         self.count = len(todo)
         self._workers, self._after_s = workers, after_s
-        self._left: defaultdict[str, float] = defaultdict(float)
-        self._ended: defaultdict[str, float] = defaultdict(float)
-        self._took: defaultdict[str, float] = defaultdict(float)
-        self._going: dict[str, tuple[str, float]] = {}
-        for case in todo:
-            self._left[case.kind] += case.cost_s
-        self._whole = sum(self._left.values()) / workers + after_s
+        self._left = sum(case.cost_s for case in todo)
+        self._whole = self._left / workers + after_s
+        self._expected = self._took = 0.0  # costs and times of the cases that have ended, s
+        self._going: dict[str, float] = {}
 
     def going(self, running: Iterable[tuple[Case, float]]) -> None:
         """Take note of how much the running cases have done, each a share of its own work."""
-        self._going = {case.name: (case.kind, part * case.cost_s) for case, part in running}
+        self._going = {case.name: part * case.cost_s for case, part in running}
 
     def ended(self, outcome: Outcome) -> None:
-        """Take note of a case that has ended: it shows the pace of its kind."""
-        kind, cost = outcome.case.kind, outcome.case.cost_s
+        """Take note of a case that has ended."""
         self._going.pop(outcome.case.name, None)
-        self._left[kind] -= cost
+        self._left -= outcome.case.cost_s
         if not outcome.error:
-            self._ended[kind] += cost
-            self._took[kind] += outcome.seconds * outcome.case.ranks
+            self._expected += outcome.case.cost_s
+            self._took += outcome.seconds * outcome.case.ranks
 
     @property
     def done(self) -> float:
         """Share of the work that is done, 0 to 1."""
-        if not self._whole:
-            return 1.0
-        return 1 - (self._costs(lambda _: 1.0) + self._after_s) / self._whole
+        return 1 - self.left_s(1.0) / self._whole if self._whole else 1.0
 
-    def left_s(self) -> float:
-        """Time until all is done, s."""
-        return self._costs(self._pace) + self._after_s
-
-    def _costs(self, pace: Callable[[str], float]) -> float:
-        """Time left of the runs, s, at a pace for each kind."""
-        left = sum(cost * pace(kind) for kind, cost in self._left.items())
-        past = sum(cost * pace(kind) for kind, cost in self._going.values())
-        return max(0.0, left - past) / self._workers
-
-    def _pace(self, kind: str) -> float:
-        """Time of a case over its expected cost; a new kind goes as the others do."""
-        if not self._ended:
-            return 1.0
-        if kind in self._ended:
-            return self._took[kind] / self._ended[kind]
-        return sum(self._took.values()) / sum(self._ended.values())
+    def left_s(self, pace: float | None = None) -> float:
+        """Time until all is done, s, at a pace: that of the cases so far, over their costs."""
+        if pace is None:
+            pace = self._took / self._expected if self._took else 1.0
+        left = max(0.0, self._left - sum(self._going.values()))
+        return pace * left / self._workers + self._after_s
 
 
 def human(seconds: float) -> str:

@@ -14,8 +14,6 @@ ENDING = (
 )
 """The signals by which a user, a closing terminal or a queue asks a command to end. The last three
 are a queue's, before it kills, and the system's at a limit of processor time."""
-
-
 _interrupted = threading.Event()
 
 
@@ -36,15 +34,10 @@ def _interrupt(number: int, frame: object) -> NoReturn:
 
 
 def check() -> None:
-    """Raise the interruption again if one has come.
+    """Raise KeyboardInterrupt again if a signal of `ENDING` has come since `listen`.
 
     Python drops an exception that is raised in a callback of compiled code, as it may be while
     matplotlib draws.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If a signal of `ENDING` has come since `listen`.
     """
     if _interrupted.is_set():
         raise KeyboardInterrupt
@@ -80,15 +73,12 @@ def take() -> None:
 
 
 def _text(number: int, given: TextIO | None) -> TextIO:
-    stream = Stream(number, "w", closefd=False)
+    stream, encoding = Stream(number, "w", closefd=False), "utf-8"
     if given is not None:
         given.flush()
-    return io.TextIOWrapper(
-        io.BufferedWriter(stream),
-        encoding=given.encoding if given is not None else "utf-8",
-        errors="backslashreplace",
-        line_buffering=number == 2 or stream.isatty(),
-    )
+        encoding = given.encoding
+    by_line = number == 2 or stream.isatty()
+    return io.TextIOWrapper(io.BufferedWriter(stream), encoding, "backslashreplace", None, by_line)
 
 
 def lost() -> OSError | None:

@@ -5,6 +5,7 @@ import csv
 import fcntl
 import os
 import socket
+from collections import Counter
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +14,11 @@ from typing import Any, NamedTuple
 from filelock import FileLock, Timeout
 
 from orchestrator import __version__
-from orchestrator.errors import InputError, OrchestratorError, of_system, printable
+from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process
 from orchestrator.runs.case import DONE, Case, failure, names_in, size
-from orchestrator.runs.files import (
-    RECORD,
-    Folder,
-    opened,
-    read_json,
-    remove_empty_directory,
-    size_of,
-    text_of,
-)
+from orchestrator.runs.files import RECORD, Folder, opened, read_json, size_of, text_of
 
 LOCK = ".lock"
 WAIT_S = 1.0
@@ -66,10 +59,8 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     ----------
     root : Path
         The directory: new, empty, or of the same kind and name.
-    kind : Kind
-        Kind of its contents.
-    name : str
-        Name of its contents: of a study its name, of results their solver.
+    kind, name : Kind, str
+        Kind and name of its contents: the name of a study, or the solver of results.
     new : bool, optional
         Whether a directory without a marker gets one.
 
@@ -90,11 +81,9 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
             _check(folder, kind, name)
             stack.enter_context(_held(folder.path(LOCK)))
         except OSError as error:
-            raise InputError(
-                f"the output directory cannot be used: {error.strerror or error}",
-                where=str(error.filename or root),
-                remedy=f"choose another{kind.option}",
-            ) from None
+            what = f"the output directory cannot be used: {error.strerror or error}"
+            remedy = f"choose another{kind.option}"
+            raise InputError(what, where=str(error.filename or root), remedy=remedy) from None
         _check(folder, kind, name)  # another process may have been first
         if new and read_marker(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
@@ -109,16 +98,12 @@ def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
 
 def _check(folder: Folder, kind: Kind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
-    root = folder.root
+    root, what = folder.root, ""
     for other in KINDS:
         marker = read_marker(root, other)
         if marker and (marker["kind"], marker["name"]) != (kind.word, name):
-            raise InputError(
-                f"the directory holds the {marker['kind']} {marker['name']}, "
-                f"not the {kind.word} {name}",
-                where=str(root),
-                remedy=f"choose another{kind.option}",
-            )
+            holds = f"the directory holds the {marker['kind']} {marker['name']}"
+            what = f"{holds}, not the {kind.word} {name}"
     # a study whose marker is lost still has its cases
     has_cases = kind.marker == STUDY.marker and names_in(root / "cases")
     if read_marker(root, kind) is None and not has_cases:
@@ -128,35 +113,26 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
             if path.is_dir() and not path.is_symlink():
                 is_nothing = not any(path.iterdir())
             if not is_nothing:
-                raise InputError(
-                    f"the output directory holds something that is not a {kind.word}: {path.name}",
-                    where=str(root),
-                    remedy=f"choose an empty or a new one{kind.option}",
-                )
+                holds = "the output directory holds something that is not a"
+                what = what or f"{holds} {kind.word}: {path.name}"
+    if what:
+        raise InputError(what, str(root), f"choose an empty or a new one{kind.option}")
     for place in (LOCK, RECORD, kind.marker, "cases", *folder.written()):
         folder.path(place)
 
 
 @contextlib.contextmanager
 def _held(path: Path) -> Iterator[None]:
-    """Hold a lock file; the system frees it however this process ends.
-
-    Raises
-    ------
-    OrchestratorError
-        If another process holds it.
-    """
-    remove_empty_directory(path)
+    """Hold a lock file, which the system frees however this process ends; else an error."""
+    with contextlib.suppress(OSError):
+        path.rmdir()
     lock = FileLock(path, timeout=WAIT_S)
     try:
         lock.acquire()
     except Timeout:
-        holder = path.read_text(errors="replace").strip()
-        raise OrchestratorError(
-            f"it is in use by {holder or 'another process'}",
-            where=str(path.parent),
-            remedy="wait for its end, or choose another directory with --out",
-        ) from None
+        holder = path.read_text(errors="replace").strip() or "another process"
+        remedy = "wait for its end, or choose another directory with --out"
+        raise OrchestratorError(f"it is in use by {holder}", str(path.parent), remedy) from None
     with lock:
         with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
             path.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
@@ -205,102 +181,56 @@ class Workspace:
         try:
             with opened(self.root / LOCK) as stream:
                 fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            pass
+        except OSError as error:
+            return isinstance(error, BlockingIOError)
         return False
 
     def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
-        """Write which study this is, and of which cases; only the holder may.
-
-        `about` is kept with it.
-        """
+        """Write which study this is, of which cases, and more about it; only the holder may."""
         whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
         value = {**whose, **about, "cases": cases}
         if read_marker(self.root, kind) != value:
             self.folder.put(kind.marker, text_of(value))
 
     def description(self) -> dict[str, Any]:
-        """Read the text that `describe` wrote.
-
-        Raises
-        ------
-        InputError
-            If the directory holds no study.
-        OrchestratorError
-            If the text may not be read.
-        """
-        path = self.root / STUDY.marker
-        try:
-            opened(path).close()
-        except PermissionError as error:
-            raise of_system(error) from None
-        except OSError:
-            pass
-        value = read_json(path)
+        """Read what `describe` wrote; InputError if the directory holds no study."""
+        value = read_json(self.root / STUDY.marker)
         if isinstance(value, dict) and isinstance(value.get("cases"), list):
             texts = [value.get("name"), value.get("study", ""), *value["cases"]]
             if all(isinstance(text, str) for text in texts):
                 return value
-        raise InputError(
-            "there is no study in this directory",
-            where=str(self.root),
-            remedy="name the directory that a study was written to",
-        )
+        remedy = "name the directory that a study was written to"
+        raise InputError("there is no study in this directory", str(self.root), remedy)
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """The cases that are there without being asked for: an earlier study file did."""
         return tuple(name for name in names_in(self.cases) if name not in asked)
 
     def check_cases_of_tables(self, done: Container[str]) -> None:
-        """See that the cases that the tables were made of are still done.
+        """Refuse to replace tables whose cases are not all done: new ones would lack results.
 
         Raises
         ------
         OrchestratorError
-            If any is not: new tables would lack its results.
+            With the number of these cases.
         """
         table = self.root / "timings" / "timings.csv"
         if not table.is_file():
             return
         with table.open(encoding="utf-8", errors="replace", newline="") as stream:
             names = [row.get("case", "") for row in csv.DictReader(stream)]
-        lost = [name for name in names if name not in done]
-        if lost:
+        if lost := [name for name in names if name not in done]:
             raise OrchestratorError(
                 f"{len(lost)} of the {len(names)} cases that the tables were made of are not here "
                 f"as this version makes them, {lost[0]} for one: the tables stay as they are",
-                where=str(self.root),
-                remedy="`orchestrator study` runs them again; to draw the others, first move "
-                "tables and timings elsewhere",
+                str(self.root),
+                "`orchestrator study` runs them again; to draw the others, first move tables and "
+                "timings elsewhere",
             )
 
 
-@dataclass(frozen=True)
-class Status:
-    """How far a study came.
-
-    `done`, `unfinished` and `waiting` (not begun) name cases; `failed` has those that failed with
-    the cause, and `left` those of an earlier study file with their bytes. `sizes` are the bytes on
-    disk by kind of case, and of tables, figures and page; those of a finished case are of the time
-    when it ended, or was pruned. `page` is the page, once it is drawn; `running` is whether a
-    process holds the study.
-    """
-
-    name: str
-    running: bool
-    done: tuple[str, ...]
-    unfinished: tuple[str, ...]
-    waiting: tuple[str, ...]
-    failed: dict[str, str]
-    page: Path | None
-    sizes: dict[str, int]
-    left: dict[str, int]
-
-
-def status(directory: Path) -> Status:
-    """Read from its directory alone how far a study came.
+def status(directory: Path) -> tuple[str, bool]:
+    """How far a study came, for people, and whether a case has failed; from its directory alone.
 
     Raises
     ------
@@ -308,47 +238,27 @@ def status(directory: Path) -> Status:
         If the directory holds no study.
     """
     space = Workspace(directory.absolute())
-    about = space.description()
-    states = ((name, read_json(space.cases / name / DONE)) for name in names_in(space.cases))
-    markers = {name: state if isinstance(state, dict) else {} for name, state in states}
-    begun = [name for name in about["cases"] if name in markers and not markers[name]]
-    failed = {name: failure(space.cases / name) for name in begun}
-    bytes_of = {name: size(space.cases / name, state) for name, state in markers.items()}
-    sizes: dict[str, int] = {}
-    for name, number in bytes_of.items():
-        kind = f"{name.partition('-')[0]} cases"
-        sizes[kind] = sizes.get(kind, 0) + number
-    beside = (path for path in space.root.iterdir() if path != space.cases)
-    sizes["tables, figures and page"] = sum(map(size_of, beside))
-    return Status(
-        name=about["name"],
-        running=space.is_held(),
-        done=tuple(name for name in about["cases"] if markers.get(name)),
-        unfinished=tuple(name for name, cause in failed.items() if cause is None),
-        waiting=tuple(name for name in about["cases"] if name not in markers),
-        failed={name: cause for name, cause in failed.items() if cause is not None},
-        page=space.page if space.drawn.is_file() and space.page.is_file() else None,
-        sizes=sizes,
-        left={name: bytes_of[name] for name in space.left(about["cases"])},
-    )
-
-
-def status_text(status: Status) -> str:
-    """The status for people."""
-    begun = "running" if status.running else "unfinished"
+    about, is_running = space.description(), space.is_held()
+    there = {name: read_json(space.cases / name / DONE) for name in names_in(space.cases)}
+    asked = {name: there[name] for name in about["cases"] if name in there}
+    causes = {name: failure(space.cases / name) for name in asked if not asked[name]}
+    failed = [f"  failed: {name}: {cause}" for name, cause in causes.items() if cause is not None]
+    begun = [name for name, cause in causes.items() if cause is None]
+    word = "running" if is_running else "unfinished"
     lines = [
-        f"study {status.name}: {len(status.done)} done, {len(status.unfinished)} {begun}, "
-        f"{len(status.waiting)} not begun, {len(status.failed)} failed",
-        *(f"  {begun}: {name}" for name in status.unfinished),
-        *(f"  failed: {name}: {cause}" for name, cause in status.failed.items()),
-        f"size: {_size_text(status.sizes)}",
+        f"study {about['name']}: {len(asked) - len(causes)} done, {len(begun)} {word}, "
+        f"{len(about['cases']) - len(asked)} not begun, {len(failed)} failed",
+        *(f"  {word}: {name}" for name in begun),
+        *failed,
+        f"size: {_sizes(space)}",
+        *_left_lines(space),
     ]
-    lines += _left_lines(status.left)
-    if status.page:
-        lines.append(f"page: {status.page}")
-    elif not status.running:
+    if space.drawn.is_file() and space.page.is_file():
+        lines.append(f"page: {space.page}")
+    elif not is_running:
         lines.append("the same study command continues it")
-    return "\n".join(map(printable, lines))  # a study's name may come from anywhere
+    # a study's name may come from anywhere
+    return "\n".join(map(printable, lines)), bool(failed)
 
 
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
@@ -371,35 +281,48 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
     str
         Summary for people, with the sizes before and after.
     """
-    before = status(space.root).sizes
-    pruned = [case for name, case in done.items() if name not in shown]
+    before, pruned = _sizes(space), [case for name, case in done.items() if name not in shown]
     for case in pruned:
         case_states.prune(case, space.cases)
-    after = status(space.root)
-    lines = [
-        f"before: {_size_text(before)}",
-        f"after:  {_size_text(after.sizes)}",
+    whole = ", ".join(name for name in done if name in shown)
+    lines = (
+        f"before: {before}",
+        f"after:  {_sizes(space)}",
         f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew",
-    ]
-    if whole := [name for name in done if name in shown]:
-        lines.append(f"whole, for the pictures of the page: {', '.join(whole)}")
-    return "\n".join([*lines, *_left_lines(after.left)])
+        *([f"whole, for the pictures of the page: {whole}"] if whole else []),
+        *_left_lines(space),
+    )
+    return "\n".join(lines)
 
 
-def _left_lines(left: Mapping[str, int]) -> list[str]:
-    """The cases that are not asked for, for people, with their size."""
+def _bytes_of(space: Workspace, name: str) -> int:
+    state = read_json(space.cases / name / DONE)
+    return size(space.cases / name, state if isinstance(state, dict) else {})
+
+
+def _left_lines(space: Workspace) -> list[str]:
+    """The cases that an earlier study file asked for, for people, with their size."""
+    left = space.left(space.description()["cases"])
     if not left:
         return []
-    named = ", ".join(list(left)[:NAMED]) + (", ..." if len(left) > NAMED else "")
-    what = f"{len(left)} cases of an earlier study file, {_human(sum(left.values()))}: {named}"
+    total = _human(sum(_bytes_of(space, name) for name in left))
+    named = ", ".join(left[:NAMED]) + (", ..." if len(left) > NAMED else "")
+    what = f"{len(left)} cases of an earlier study file, {total}: {named}"
     return [f"not asked for: {what}; they stay until you remove them"]
 
 
-def _size_text(sizes: Mapping[str, int]) -> str:
-    """Sizes for people: the total, then its parts, the largest first."""
-    parts = sorted(sizes.items(), key=lambda item: -item[1])
-    named = ", ".join(f"{_human(size)} {name}" for name, size in parts if size)
-    return f"{_human(sum(sizes.values()))} ({named})"
+def _sizes(space: Workspace) -> str:
+    """Bytes on disk for people: the total, then cases by kind and the rest, the largest first.
+
+    The size of a finished case is that at its end, or after it was pruned.
+    """
+    sizes: Counter[str] = Counter()
+    for name in names_in(space.cases):
+        sizes[f"{name.partition('-')[0]} cases"] += _bytes_of(space, name)
+    beside = (path for path in space.root.iterdir() if path != space.cases)
+    sizes["tables, figures and page"] = sum(map(size_of, beside))
+    named = ", ".join(f"{_human(size)} {name}" for name, size in sizes.most_common() if size)
+    return f"{_human(sizes.total())} ({named})"
 
 
 def _human(size: float) -> str:

@@ -66,7 +66,7 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
     planned = plan.make(asked)
     for one in planned.cases.values():
         engine.execute(one, tmp_path, 300.0, threading.Event())
-        assert case.is_done(one, tmp_path)
+        assert case.done_state(one, tmp_path)
     results = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
     names = scene_names(plan.make(paper), paper)
     beds = measured.beds(planned.piles.values(), results, tmp_path)

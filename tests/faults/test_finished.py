@@ -76,11 +76,11 @@ def test_every_case_can_be_pruned_and_run_again_by_hand(pile: Bench) -> None:
     cases = pile.out / "cases"
     for run in plan.make(study.load(str(pile.source))).cases.values():
         case.prune(run, cases)
-        assert case.is_done(run, cases)
+        assert case.done_state(run, cases)
         assert not case.is_whole(run, cases)
         subprocess.run(["./Allrun"], cwd=cases / run.name, check=True)
         assert case.is_whole(run, cases)
-        assert case.is_done(run, cases)
+        assert case.done_state(run, cases)
         (cases / run.name / case.DONE).unlink()
         case.prune(run, cases)  # it is not done: nothing is dropped
         assert list((cases / run.name).glob("*.dump")) or run.kind == "flow"
@@ -111,7 +111,7 @@ def test_a_marker_vouches_for_its_own_case_alone(
     shutil.copytree(there, here)
     (here / case.IDENTITY).write_bytes(identity)
     (run,) = plan.make(study.load(str(source))).cells
-    assert not case.is_done(run, finished.out / "cases")
+    assert not case.done_state(run, finished.out / "cases")
     assert cli.main(["study", str(source), "--out", str(finished.out)]) == 0
     assert same_tables(finished.out, finished.undisturbed)
     capsys.readouterr()

@@ -56,7 +56,7 @@ def solve(shared: Shared) -> Solve:
 
     def to_its_end(flow: FlowCase) -> Path:
         with shared("flows") as cases:
-            if not case.is_done(flow, cases):
+            if not case.done_state(flow, cases):
                 directory = case.prepare(flow, cases)
                 ended = allrun(directory)
                 flow.collect(directory)

@@ -37,7 +37,7 @@ def windward_mean(directory: Path, flow: FlowCase) -> float:
 
 def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     directory = solve(PILE)
-    assert case.is_done(PILE, directory.parent)
+    assert case.done_state(PILE, directory.parent)
     kept, read = WallStress.from_csv(directory / WALL_STRESS), SolvedFlow(directory).stress()
     np.testing.assert_array_equal(kept.tau_wall, read.tau_wall)
     assert (directory / "parameters").read_text().count("//") == 13

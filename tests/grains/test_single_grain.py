@@ -129,7 +129,7 @@ def test_a_displacement_criterion_may_be_very_small(tmp_path: Path) -> None:
 def test_a_rerun_by_hand_from_a_copy_gives_the_same_bytes(tmp_path: Path) -> None:
     one = _cells(FEW)
     _run(one, tmp_path)
-    assert case.is_done(one, tmp_path)
+    assert case.done_state(one, tmp_path)
     copy = tmp_path / """-odd "name" c'é"""
     shutil.copytree(tmp_path / one.name, copy)
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
@@ -169,7 +169,7 @@ def test_a_solver_that_fails_says_why(
     one, cases = _cells(FEW), tmp_path / "cases"
     with pytest.raises(SolverError, match=word) as caught:
         _run(one, cases, limit_s)
-    assert not case.is_done(one, cases)
+    assert not case.done_state(one, cases)
     assert (cases / one.name / case.FAILED).is_file()
     assert str(cases / one.name) in str(caught.value)
 

@@ -63,12 +63,12 @@ def test_a_prepared_case_is_a_copy_of_its_template_with_inputs(tmp_path: Path) -
     identity = json.loads((directory / case.IDENTITY).read_text())
     assert identity["parameters"] == {"size": 1.0}
     assert "input.txt" in identity["inputs_sha256"]
-    assert not case.is_done(Tiny(1.0), tmp_path)
+    assert not case.done_state(Tiny(1.0), tmp_path)
 
 
 def test_a_finished_case_is_done_and_its_checksums_hold(finished: tuple[Tiny, Path]) -> None:
     tiny, cases = finished
-    assert case.is_done(tiny, cases)
+    assert case.done_state(tiny, cases)
     subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=cases / tiny.name, check=True)
 
 
@@ -80,11 +80,11 @@ def test_a_file_is_read_again_only_if_its_time_or_size_has_changed(
     before = result.stat()
     os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns + 1, before.st_mtime_ns + 1))
     result.write_text("24\n")
-    assert not case.is_done(tiny, cases)
+    assert not case.done_state(tiny, cases)
     os.utime(result, ns=(before.st_mtime_ns, before.st_mtime_ns))
-    assert case.is_done(tiny, cases)
+    assert case.done_state(tiny, cases)
     # as old as the marker: it may have been changed after it in the same tick of the clock
     os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns, before.st_mtime_ns))
-    assert not case.is_done(tiny, cases)
+    assert not case.done_state(tiny, cases)
     result.write_text("42\n")
-    assert case.is_done(tiny, cases)
+    assert case.done_state(tiny, cases)

@@ -53,13 +53,6 @@ class Step(Case):
         return {}
 
 
-@dataclass(frozen=True)
-class Other(Step):
-    """A case of another kind."""
-
-    kind: ClassVar[str] = "other"
-
-
 def _order(places: int, *cases: Case) -> list[str]:
     """Names of cases in the order in which a pool without solvers starts them."""
     started: list[str] = []
@@ -100,18 +93,16 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
     assert f"it needs {lost.name}, which failed" in str(failed[second.name])
     assert case.failure(tmp_path / lost.name) == "no result"
     assert len(outcomes) == 5
-    assert case.is_done(fine, tmp_path)
+    assert case.done_state(fine, tmp_path)
 
 
-def test_the_time_left_follows_the_pace_of_each_kind() -> None:
-    steps, others = [Step(10.0), Step(20.0)], [Other(100.0), Other(300.0)]
-    forecast = Forecast([*steps, *others], workers=2)
+def test_the_time_left_follows_the_pace_of_the_cases_so_far() -> None:
+    first, second, third = Step(10.0), Step(20.0), Step(400.0)
+    forecast = Forecast([first, second, third], workers=2)
     assert forecast.left_s() == pytest.approx(430 / 2)
-    forecast.ended(Outcome(steps[0], 5.0))  # half of the estimate: the best guess for others
+    forecast.ended(Outcome(first, 5.0))
     assert forecast.left_s() == pytest.approx(0.5 * 420 / 2)
-    forecast.ended(Outcome(others[0], 200.0))
-    assert forecast.left_s() == pytest.approx((0.5 * 20 + 2 * 300) / 2)
-    forecast.ended(Outcome(others[1], error=SolverError("died")))
+    forecast.ended(Outcome(third, error=SolverError("died")))
     assert forecast.left_s() == pytest.approx(0.5 * 20 / 2)
 
 
