@@ -1,6 +1,8 @@
-"""The files of a deck of LIGGGHTS: parameters, grains, and the text dumps that it writes."""
+"""The decks of LIGGGHTS: contact law, protocol and cost, the files written and the dumps read."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
@@ -8,6 +10,8 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.errors import SolverError
+from orchestrator.study.parts import Grain, Protocol
+from orchestrator.study.sizes import extremes
 from orchestrator.types import FloatArray, IntArray
 
 MEANING = {
@@ -40,6 +44,189 @@ MEANING = {
     "ranks": "processes that share the grains; Allrun reads it",
 }
 """Parameters of the decks, with their units."""
+GONE, FIXED, MOBILE, COUNTED, PUSHED = 0, 1, 2, 3, 4
+"""Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only. Those that
+have gone are in no deck."""
+SAMPLING_INTERVAL = 0.5
+"""Time between two samples of the grains, sqrt(d/g')."""
+SETTLE = 10.0
+"""Time in which the bed settles before the first load step, sqrt(d/g')."""
+POURED_DRAG = 2.0
+"""Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be softer than
+those of the pouring, and without a drag a pile of 25 degrees was not at rest at the end."""
+SETTLE_FLOW = math.sqrt(0.5)
+"""Flow of the settling over that of the first load step: about half of its force. Without any, a
+bed at its limiting slope would not come to rest."""
+START = 0.9
+"""Flow of the first load step over that of the first threshold by the pivot law."""
+BEYOND = 1.2
+"""The last load step's flow over that at which the pivot law says that enough grains have moved."""
+STIR = 0.02
+"""A counted grain that is no further from its place lies there, d: it is left out of the dump.
+With a small displacement criterion, or small grains, it is less."""
+AWAY = 10.0
+"""A counted grain that has come so far along the bed is gone, d: those that it could still meet
+have left before it."""
+
+
+def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
+    """Variables of the contact law: tan(phi), K d/W, damping ratio, time step over sqrt(m/K)."""
+    return {
+        "friction": math.tan(math.radians(grain.friction_angle_deg)),
+        "stiffness": grain.stiffness,
+        "damping": grain.damping,
+        "time_step": protocol.time_step,
+    }
+
+
+def raising(
+    protocol: Protocol, enough: int, *, smallest: float = 1.0, is_poured: bool = False
+) -> dict[str, float | int]:
+    """Variables by which the deck holds a load step, samples the grains and goes on to the next.
+
+    The load steps end early when no more than `enough` counted grains have not moved. `smallest` is
+    the diameter of the smallest grain that may move, d. A poured bed was on springs of its own.
+    """
+    return {
+        "waiting_time": protocol.waiting_time,
+        "sampling_interval": SAMPLING_INTERVAL,
+        "settle": SETTLE,
+        "settle_drag": POURED_DRAG if is_poured else 0.0,
+        "displacement_criterion": protocol.displacement_criterion,
+        "stir": min(STIR, protocol.displacement_criterion * smallest / 2),
+        "away": AWAY,
+        "enough": enough,
+    }
+
+
+def flows(first: float, last: float, step: float) -> FloatArray:
+    """The flow of the settling, then those of load steps, each higher by a relative `step`.
+
+    The last load step reaches at least the flow `last`.
+    """
+    count = 1 + math.ceil(math.log(last / first) / math.log1p(step))
+    rising = first * (1 + step) ** np.arange(count)
+    return np.concatenate([[SETTLE_FLOW * first], rising])
+
+
+def cost_s(
+    load_steps: float, grains: float, rules: Protocol, grain: Grain, exposed: float = math.nan
+) -> float:
+    """Expected time of one core for a deck, s; `exposed` is how many grains a poured bed exposes.
+
+    Lattices, measured with 30 to 770 counted grains: load steps of twice the waiting time, 4.5e7
+    grain-steps a second. Poured beds: 6e6, and the more grains are exposed, the more often one
+    passes before all have waited: load steps of 2000 took four times as long as those of 100. Their
+    smallest grain sets the time step.
+    """
+    length, rate = 2 * rules.waiting_time, 4.5e7
+    if not math.isnan(exposed):
+        small = math.pow(extremes(grain.sizes, grain.diameter)[0], 1.5)
+        length, rate = rules.waiting_time * (1 + exposed / 700) / small, 6e6
+    steps = load_steps * length * math.sqrt(grain.stiffness) / rules.time_step
+    return 0.1 + steps * grains / rate
+
+
+@dataclass(frozen=True)
+class GrainTable:
+    """The n grains of a deck; the id of a grain is its place, from 1.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n, 3)
+        x, y, z of the centres, m.
+    kind : ndarray of int, shape (n,)
+        One of GONE, FIXED, MOBILE, COUNTED, PUSHED.
+    along : ndarray, shape (n, 2)
+        Unit vector downstream along the bed, in which displacement is counted.
+    sizes : ndarray, shape (n,)
+        Diameter of each grain over `diameter`.
+    diameter, density : float
+        The diameter d of the deck's units, m; the density of every grain, kg/m3.
+    width : float
+        Width of a strip with periodic sides, d; 0 for grains in planes.
+    """
+
+    position: FloatArray
+    kind: IntArray
+    along: FloatArray
+    sizes: FloatArray
+    diameter: float
+    density: float
+    width: float = 0.0
+
+    @property
+    def counted_ids(self) -> IntArray:
+        """Ids (from 1) of the grains whose motion is counted."""
+        return np.flatnonzero(self.kind == COUNTED) + 1
+
+    @property
+    def smallest(self) -> float:
+        """Diameter of the smallest grain that may move, d."""
+        return float(self.sizes[self.kind > FIXED].min())
+
+    @property
+    def last_mobile(self) -> float:
+        """The furthest x of a grain that may move, m."""
+        return float(self.position[self.kind > FIXED, 0].max())
+
+    @property
+    def mobile_count(self) -> int:
+        """How many grains may move."""
+        return int((self.kind > FIXED).sum())
+
+
+def write(
+    directory: Path,
+    grains: GrainTable,
+    parameters: Mapping[str, float | int],
+    flows: FloatArray,
+    force: FloatArray,
+    margin: float,
+    ranks: int = 1,
+) -> None:
+    """Write grains, parameters, flows and forces into a copy of the template ``liggghts/bed``.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Each becomes a variable of the deck.
+    flows : ndarray, shape (load steps + 1,)
+        The flow of the settling, then of each load step.
+    force : ndarray, shape (load steps + 1, n, 2)
+        The flow's force on each grain at these flows, N; only pushed grains feel one.
+    margin : float
+        Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
+    ranks : int
+        Processes that share the grains.
+    """
+    present = np.flatnonzero(grains.kind != GONE)
+    places = grains.position[present]
+    bounds = np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
+    if grains.width:
+        bounds[:, 1] = 0.0, grains.width * grains.diameter
+    diameters = grains.diameter * grains.sizes
+    write_grains(
+        directory, grains.position, grains.kind, diameters, grains.density, bounds, present
+    )
+    write_parameters(directory, {**parameters, "width": grains.width, "ranks": ranks})
+    (directory / "load_steps.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    pushed = np.flatnonzero(grains.kind >= COUNTED)
+    counted = np.flatnonzero(grains.kind == COUNTED)
+    for place, axis in enumerate("xz"):
+        _write_sets(directory / f"force.{axis}.txt", pushed, force[:, pushed, place])
+        # in these units displacement is one in the grain's own diameter
+        direction = grains.along[None, counted, place] / grains.sizes[counted]
+        _write_sets(directory / f"along.{axis}.txt", counted, direction)
+
+
+def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
+    """Write sets of values of grains as LIGGGHTS reads them: a count, then ids and values."""
+    ids = [f"{number} " for number in (grains + 1).tolist()]
+    with path.open("w") as stream:
+        for values in sets.tolist():
+            stream.write(f"{len(ids)}\n")
+            stream.writelines(f"{a}{b!r}\n" for a, b in zip(ids, values, strict=True))
 
 
 def write_parameters(
@@ -68,22 +255,8 @@ def write_grains(
 ) -> None:
     """Write ``grains.data``. Every number has all its digits: a rounded bound would lose grains.
 
-    Parameters
-    ----------
-    directory : Path
-        The case.
-    position : ndarray, shape (n, 3)
-        Centres, m; a grain's id is its place, from 1.
-    kind : ndarray of int, shape (n,)
-        Type of each grain in the deck.
-    diameters : ndarray, shape (n,)
-        m.
-    density : float
-        kg/m3.
-    bounds : ndarray, shape (2, 3)
-        Lower and upper corner of the box, m.
-    order : ndarray of int, shape (k,)
-        Places of the grains that are written, in order.
+    Positions (n, 3), diameters (n,) and the corners of the box, `bounds` (2, 3), are in m, the
+    density in kg/m3; `order` has the places of the grains that are written, in order.
     """
     box = "".join(
         f"{low!r} {high!r} {axis}lo {axis}hi\n"
@@ -99,12 +272,12 @@ def write_grains(
 
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
-    """Read a CSV of numbers that a deck has written.
+    """Read a CSV of numbers that a deck has written, of at least so many rows.
 
     Raises
     ------
     SolverError
-        If it is missing or cut short, or has fewer rows.
+        If it is missing or cut short.
     """
     try:
         text = path.read_text(encoding="ascii")
@@ -112,11 +285,8 @@ def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
         if len(table) < rows or not text.endswith("\n"):
             raise ValueError("it is cut short")
     except (OSError, ValueError) as error:
-        raise SolverError(
-            f"the table cannot be read: {error}",
-            where=str(path),
-            remedy="run the same command again",
-        ) from None
+        what, remedy = f"the table cannot be read: {error}", "run the same command again"
+        raise SolverError(what, where=str(path), remedy=remedy) from None
     return table
 
 
@@ -146,7 +316,6 @@ def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFr
         if not whole or rows.isna().any(axis=None):
             raise ValueError("it is cut short or has NaN")
     except (OSError, ValueError, IndexError) as error:
-        raise SolverError(
-            f"the dump cannot be read: {error}", where=str(path), remedy="run the case again"
-        ) from None
+        what, remedy = f"the dump cannot be read: {error}", "run the case again"
+        raise SolverError(what, where=str(path), remedy=remedy) from None
     return steps, rows.assign(step=np.repeat(steps, counts))

@@ -59,8 +59,8 @@ LOCAL = 5.0
 
 
 @dataclass(frozen=True)
-class Mould:
-    """A mould that follows a bed line, and the line that the bed in it is cut to.
+class PouredBed(Case):
+    """The run that pours a bed into a mould of a bed line; all scenes with this bed share it.
 
     Attributes
     ----------
@@ -70,6 +70,14 @@ class Mould:
         Depth of the row of fixed grains under the line, along the vertical.
     surface : float
         Height over the line, normal to it, above which no centre lies after the cut.
+    sizes : LogNormal, sequence of classes, or None
+        Sizes of the grains; None for equal ones.
+    diameter : float
+        The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
+    friction_angle_deg : float
+        Friction angle of the grains.
+    seed : int
+        Chooses one bed of many.
     width : float
         Width of a strip with periodic sides; 0 of a bed in one plane.
     """
@@ -77,11 +85,67 @@ class Mould:
     line: BedLine
     depth: float
     surface: float
+    sizes: Sizes | None
+    diameter: float
+    friction_angle_deg: float
+    seed: int
     width: float = 0.0
+
+    kind: ClassVar[str] = "poured"
+    template: ClassVar[str] = "liggghts/poured"
+    recipe: ClassVar[int] = 3
+    results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
+    derived: ClassVar[tuple[str, ...]] = (BED,)
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The bed line, what is poured, and the seed."""
+        fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
+        sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
+        values = {name: getattr(self, name) for name in fields}
+        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **values}
+
+    @property
+    def cost_s(self) -> float:
+        """Expected time of one core, s: 15,000 steps at 6e6 grain-steps a second."""
+        return 1 + self._count * 15_000 / 6e6
+
+    @property
+    def ranks(self) -> int:
+        """Processes that the solver is run with."""
+        return liggghts.ranks(self._count)
+
+    def check_size(self) -> None:
+        """See that the mould has room for a bed, and takes no more grains than a machine bears.
+
+        Raises
+        ------
+        InputError
+            With the field of a study file.
+        """
+        length = self.line.x[-2] - self.line.x[1]
+        if length < LEAST_LENGTH * (1 - 1e-9):
+            what = f"a poured bed of {length:.3g} grains has no pockets that are those of a bed"
+            remedy = f"at least {LEAST_LENGTH:g} diameters"
+            raise InputError(what, where="bed.length", remedy=remedy)
+        if self._count > MOST_GRAINS:
+            what = f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}"
+            remedy = "a shorter bed, larger grains, or less of bed.poured_depth or bed.width"
+            raise InputError(what, where="bed.packing", remedy=remedy)
+
+    @cached_property
+    def _count(self) -> int:
+        """Number of grains that rain into the mould."""
+        sizes = drawn(self.sizes, self.diameter, 1000, 0)
+        mean = float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
+        part = FILLED_IN_SPACE * self.width if self.width else FILLED
+        length = self.ends[1] - self.ends[0]
+        return int(np.ceil((self.depth + self.surface + HEAP) * length * part / mean))
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Places along x of the two walls: beyond the forms, within the line."""
+        """Places along x of the two walls of the mould: beyond the forms, within the line."""
         x = self.line.x
         return max(x[0], x[1] - APRON), min(x[-1], x[-2] + APRON)
 
@@ -110,30 +174,13 @@ class Mould:
         raised = z[:-1] + self.surface / tangents[:, 0]
         return {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": tangents[:, 1] / tangents[:, 0]}
 
-    def count(self, mean: float) -> int:
-        """Number of grains that fill it, with the heap, by their mean area or volume in d."""
-        start, end = self.ends
-        part = FILLED_IN_SPACE * self.width if self.width else FILLED
-        return int(np.ceil((self.depth + self.surface + HEAP) * (end - start) * part / mean))
-
-    def rain(self, sizes: FloatArray, seed: int) -> FloatArray:
-        """Places in the air of the grains that fill the mould, none touching another.
+    def rain(self, sizes: FloatArray) -> FloatArray:
+        """Places in the air, shape (n, 3), of grains of n sizes (d), none touching another.
 
         They lie row upon row, each over what is already there, at a place of its room that the
         seed decides; in a strip in lanes along the flow.
-
-        Parameters
-        ----------
-        sizes : ndarray, shape (n,)
-            Diameters of the grains, d.
-        seed : int
-            Seed of the places, and of the offset of each row.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
         """
-        chance = np.random.default_rng(seed).uniform(size=(len(sizes), 3 if self.width else 2))
+        chance = np.random.default_rng(self.seed).uniform(size=(len(sizes), 3 if self.width else 2))
         places = np.zeros((len(sizes), 3))
         # with no room to the sides each lane would stay a bed in a plane
         lanes = max(int(self.width / ((1 + LOOSE) * float(sizes.max()))), 1)
@@ -172,98 +219,6 @@ class Mould:
             x += wide
         return places
 
-
-@dataclass(frozen=True)
-class PouredBed(Case):
-    """The run that pours a bed into a mould of a bed line; all scenes with this bed share it.
-
-    Attributes
-    ----------
-    line : BedLine
-        Bed line of the flow.
-    depth, surface : float
-        As `Mould` takes them.
-    sizes : LogNormal, sequence of classes, or None
-        Sizes of the grains; None for equal ones.
-    diameter : float
-        The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
-    friction_angle_deg : float
-        Friction angle of the grains.
-    seed : int
-        Chooses one bed of many.
-    width : float
-        Width of a strip with periodic sides; 0 of a bed in one plane.
-    """
-
-    line: BedLine
-    depth: float
-    surface: float
-    sizes: Sizes | None
-    diameter: float
-    friction_angle_deg: float
-    seed: int
-    width: float = 0.0
-
-    kind: ClassVar[str] = "poured"
-    template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 3
-    results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
-    derived: ClassVar[tuple[str, ...]] = (BED,)
-    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """The bed line, what is poured, and the seed."""
-        fields = ("depth", "surface", "diameter", "friction_angle_deg", "seed", "width")
-        sizes = self.sizes if isinstance(self.sizes, tuple | None) else str(self.sizes)
-        values = {name: getattr(self, name) for name in fields}
-        return {"x": list(self.line.x), "z": list(self.line.z), "sizes": sizes, **values}
-
-    @cached_property
-    def mould(self) -> Mould:
-        """Mould that the grains rain into."""
-        return Mould(self.line, self.depth, self.surface, self.width)
-
-    @property
-    def cost_s(self) -> float:
-        """Expected time of one core, s: 15,000 steps at 6e6 grain-steps a second."""
-        return 1 + self._count * 15_000 / 6e6
-
-    @property
-    def ranks(self) -> int:
-        """Processes that the solver is run with."""
-        return liggghts.ranks(self._count)
-
-    def check_size(self) -> None:
-        """See that the mould has room for a bed, and takes no more grains than a machine bears.
-
-        Raises
-        ------
-        InputError
-            With the field of a study file.
-        """
-        length = self.line.x[-2] - self.line.x[1]
-        if length < LEAST_LENGTH * (1 - 1e-9):
-            raise InputError(
-                f"a poured bed of {length:.3g} grains: fewer than {LEAST_LENGTH:g} in a row have no"
-                " pockets that are those of a bed",
-                where="bed.length",
-                remedy=f"at least {LEAST_LENGTH:g} diameters",
-            )
-        if self._count > MOST_GRAINS:
-            raise InputError(
-                f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}",
-                where="bed.packing",
-                remedy="a shorter bed, larger grains, or less of bed.poured_depth or bed.width",
-            )
-
-    @cached_property
-    def _count(self) -> int:
-        """Number of grains that rain into the mould."""
-        sizes = drawn(self.sizes, self.diameter, 1000, 0)
-        mean = np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4)
-        return self.mould.count(float(mean))
-
     def versions(self) -> dict[str, str]:
         """The programs that run the case, with their versions."""
         return liggghts.programs(self.ranks)
@@ -271,14 +226,14 @@ class PouredBed(Case):
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
-        floor = self.mould.floor
+        floor = self.floor
         sizes = drawn(self.sizes, self.diameter, self._count, self.seed)
-        places = self.mould.rain(sizes, self.seed)
+        places = self.rain(sizes)
         return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), sizes])
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains in the air, the walls and the cut."""
-        start, end = self.mould.ends
+        start, end = self.ends
         centres, sizes = self.grains
         deck.write_parameters(
             directory,
@@ -299,7 +254,7 @@ class PouredBed(Case):
                 "calm": CALM,
             },
         )
-        for name, values in self.mould.cut.items():
+        for name, values in self.cut.items():
             scaled = values if name == "slope" else values * DIAMETER
             (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in scaled.tolist()))
         margin = float(sizes.max()) + 1
@@ -309,7 +264,7 @@ class PouredBed(Case):
         deck.write_grains(
             directory,
             centres * DIAMETER,
-            np.where(np.arange(len(sizes)) < len(self.mould.floor), 1, 2),
+            np.where(np.arange(len(sizes)) < len(self.floor), 1, 2),
             sizes * DIAMETER,
             DENSITY,
             bounds * DIAMETER,
@@ -324,7 +279,7 @@ class PouredBed(Case):
         _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
         number = rows["id"].to_numpy(np.int64) - 1
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
-        fixed = (number < len(self.mould.floor)).astype(int)
+        fixed = (number < len(self.floor)).astype(int)
         bed.assign(size=self.grains[1][number], fixed=fixed).to_csv(directory / BED, index=False)
 
     @staticmethod
@@ -347,27 +302,14 @@ def read(
     directory: Path,
     line: BedLine,
     counts: str | Range,
-    *,
     surface: float,
     mobile_layers: int,
     width: float = 0.0,
 ) -> Packing:
-    """The packing of a finished case.
+    """The packing of a finished case `PouredBed`; lengths in d.
 
-    Parameters
-    ----------
-    directory : Path
-        Directory of the case `PouredBed`.
-    line : BedLine
-        Bed line of the flow, d.
-    counts : {"windward", "all"} or (float, float)
-        Which exposed grains are counted, as `BedLine.counted` takes it.
-    surface : float
-        Height over the line, normal to it, of the highest centres.
-    mobile_layers : int
-        Layers of the forms that may move.
-    width : float
-        Width of a strip with periodic sides; 0 in one plane.
+    `line` is the bed line of the flow, `counts` says which exposed grains are counted, as
+    `BedLine.counted` takes it, `surface` is the height of the highest centres over the line.
 
     Raises
     ------
@@ -387,11 +329,9 @@ def read(
     mobile &= ((surface - height < (mobile_layers - 0.5) * LAYER) | free) & on_form
     counted = free & line.counted(counts)[segment] & within(centres[:, 0], counts)
     if not counted.any():
-        raise InputError(
-            "no grain of the poured bed is exposed where grains are counted",
-            where="bed.counted",
-            remedy="choose another part of the bed, or another bed.seed",
-        )
+        what = "no grain of the poured bed is exposed where grains are counted"
+        remedy = "choose another part of the bed, or another bed.seed"
+        raise InputError(what, where="bed.counted", remedy=remedy)
     first, second, apart = places.pairs(float(sizes.max()) + NEAR)
     gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
     near = mobile.copy()

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.bed.deck import POURED_DRAG
 from orchestrator.benchmark.exact import parameters
 from orchestrator.benchmark.pack import Problem, expectation, table_of
 from orchestrator.flow.case import SPEED_HEIGHT, FlowCase
-from orchestrator.grains.deck import POURED_DRAG
 from orchestrator.grains.pile import MARGIN, Pile
 from orchestrator.tables import Tables
 from orchestrator.types import Row
@@ -175,7 +175,7 @@ def _grains(bed: Bed) -> pd.DataFrame:
     packing, d = bed.pile.packing, bed.pile.scene.grain.diameter
     pushed = packing.mobile & packing.lee
     exposed = packing.windward | pushed
-    tangents = bed.pile.geometry.tangents
+    tangents = bed.pile.tangents
     slope = np.degrees(np.arctan2(tangents[:, 1], tangents[:, 0]))
     x, z = packing.centres.T * d
     kinds = [~packing.mobile, packing.windward, pushed]

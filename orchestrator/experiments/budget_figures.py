@@ -71,7 +71,7 @@ def curves(piles: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
         left.set_title(label(frozen.scene), loc="left", fontsize=8)
         h, rounds = changing.line.h, changing.flows
         for number, flow in enumerate(rounds):
-            line = bed_line(changing.geometry, flow, cases)
+            line = bed_line(changing, flow, cases)
             shade = colormaps["YlGnBu"](0.35 + 0.65 * number / len(rounds))
             right.plot(np.array(line.x) / h, np.array(line.z) / h, color=shade, lw=0.9)
         end = float(changing.line.crest[0]) / h + 0.4

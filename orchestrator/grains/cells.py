@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.grains import deck, motion
+from orchestrator.bed import deck
+from orchestrator.grains import motion
 from orchestrator.runs import process
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json
@@ -94,7 +95,7 @@ class SingleGrainCase(GrainCase):
             "smallest": 1.0,
             "density": DENSITY,
             "gravity": GRAVITY,
-            **deck.Contact.of(self.grain, rules).variables,
+            **deck.contact(self.grain, rules),
             **deck.raising(rules, enough=0),
             # no face, no ceiling, no crest: the planes lie far outside the box
             "slope": 0.0,

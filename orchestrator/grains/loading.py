@@ -55,21 +55,11 @@ class Loading:
 
 
 class ForceTable:
-    """Drag and lift over the weight, tabulated so that thousands of grains ask in turn.
+    """Drag and lift over the weight (N), tabulated so that thousands of grains ask in turn.
 
     Between its places each is a power of the friction velocity times a small correction, a cubic
-    spline of the logarithms: with all places it reproduces the force laws within 1e-12.
-
-    Parameters
-    ----------
-    drag, lift : callable
-        The force law.
-    weight : float
-        Submerged weight of a grain, N.
-    unit : float
-        Friction velocity in the middle of the table, m/s.
-    places : int
-        How many there are.
+    spline of the logarithms: with all places it reproduces the force laws within 1e-12. `unit` is
+    the friction velocity in the middle of the table, m/s.
     """
 
     def __init__(

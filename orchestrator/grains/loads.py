@@ -33,14 +33,9 @@ _packed, _covered, _poured = cache(packing.pile), cache(packing.cover), cache(po
 
 @dataclass(frozen=True)
 class Geometry:
-    """The bed of a scene of a pile: its line, its n grains, and what holds whatever the flow is.
+    """The bed of a scene with a pile: its line, its n grains, and what no flow changes.
 
-    Attributes
-    ----------
-    scene : Scene
-        A scene with a pile.
-    cases : Path or None
-        Directory of the finished runs; only the grains of a poured bed are read from there.
+    `cases` is the directory of the finished runs; only the grains of a poured bed are read there.
     """
 
     scene: Scene
@@ -108,14 +103,8 @@ class Geometry:
         bed, d = self.bed, self.scene.grain.diameter
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
-            return _poured(
-                self.cases / run.name,
-                self.line,
-                self.counts,
-                surface=self.surface,
-                mobile_layers=bed.mobile_layers,
-                width=bed.width,
-            )
+            directory, layers = self.cases / run.name, bed.mobile_layers
+            return _poured(directory, self.line, self.counts, self.surface, layers, bed.width)
         lattice = Lattice(
             bed.entrainment_angle_deg,
             gap=bed.roughness / d,
@@ -153,16 +142,14 @@ class Geometry:
 
         Grains that the flow does not push share one table, that of diameter d; it is never used.
         """
-        unit, weight = float(closed_form(self.scene).friction_velocity), self.scene.weight
+        scene, unit = self.scene, float(closed_form(self.scene).friction_velocity)
         pushed = self.packing.pushed
         sizes = np.where(pushed, self.packing.sizes, 1.0).tolist()
         kinds = list(zip(sizes, np.where(pushed, self.gaps, self.gaps[0]).tolist(), strict=True))
         places = PLACES if len(set(kinds)) <= KINDS else FEWER
         tables = {
-            (size, gap): ForceTable(
-                *forces(self.scene, size, gap), weight * size**3, unit, places=places
-            )
-            for size, gap in set(kinds)
+            kind: ForceTable(*forces(scene, *kind), scene.weight * kind[0] ** 3, unit, places)
+            for kind in set(kinds)
         }
         return [tables[kind] for kind in kinds]
 
@@ -176,7 +163,7 @@ class Geometry:
         angles = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
         return np.asarray(angles[packed.windward])
 
-    def loads(self, stress: WallStress, line: BedLine | None = None) -> "Loads":
+    def under(self, stress: WallStress, line: BedLine | None = None) -> "Loads":
         """The grains under the stress along the bed line, or along the line it has worn down to."""
         how, d = self.scene.forces, self.scene.grain.diameter
         length = max(d, how.averaging_length * self.bed.relief)
@@ -202,13 +189,8 @@ class Geometry:
 class Loads:
     """The n grains of a bed under a flow, and the flows at which they move by their geometry.
 
-    Attributes
-    ----------
-    geometry : Geometry
-        The bed.
-    ratio : ndarray, shape (n,)
-        Friction velocity that drives each grain over the undisturbed one: of the mean stress
-        around it, positive downstream.
+    `ratio`, shape (n,), is the friction velocity that drives each grain over the undisturbed one:
+    that of the mean stress around it, positive downstream.
     """
 
     geometry: Geometry
@@ -247,11 +229,8 @@ class Loads:
         bed, speed = self.geometry, self.speed
         counted = bed.packing.windward
         if not np.any(speed != 0):
-            raise InputError(
-                "no counted grain feels a flow",
-                where=f"scene {bed.scene.id}: flow",
-                remedy="look at the flow case; the mesh or the stress is wrong",
-            )
+            where, remedy = f"scene {bed.scene.id}: flow", "the mesh or the stress is wrong"
+            raise InputError("no counted grain feels a flow", where=where, remedy=remedy)
         if bed.pouring:
             places, sizes = bed.packing.places, bed.packing.sizes
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
@@ -263,10 +242,7 @@ class Loads:
     def leaving(self, present: BoolArray | None = None) -> FloatArray:
         """Undisturbed friction velocity at which each counted grain leaves by peeling, m/s, (N,).
 
-        Parameters
-        ----------
-        present : ndarray of bool, shape (n,), optional
-            The grains that have not left yet; by default all.
+        `present`, shape (n,), has the grains that have not left yet; by default all.
         """
         bed, packed = self.geometry, self.geometry.packing
         criterion = bed.scene.protocol.displacement_criterion

@@ -7,14 +7,14 @@ same criterion to know when a load step may end, and its counts are compared wit
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.deck import read_dump, read_table
+from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_dump, read_table
 from orchestrator.bed.packing import across
 from orchestrator.errors import Exploded, Noisy, SolverError
-from orchestrator.grains.deck import SETTLE_FLOW, GrainTable
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 SETTLING, SAMPLES = "settling.csv", "samples.csv"
@@ -127,20 +127,20 @@ class Motion:
     @property
     def moved(self) -> IntArray:
         """How many grains had moved by the end of each load step, shape (levels + 1,)."""
-        return self._counts(self.level)
+        return self._by_load_step(self.level)
 
     @property
     def fallen_upstream(self) -> IntArray:
         """How many had been the displacement criterion upstream by then, shape (levels + 1,)."""
-        return self._counts(self.fallen)
+        return self._by_load_step(self.fallen)
 
     @property
     def carried_off(self) -> IntArray:
         """How many of those that had moved by then were carried off, shape (levels + 1,)."""
-        return self._counts(np.where(self.carried, self.level, 0))
+        return self._by_load_step(np.where(self.carried, self.level, 0))
 
-    def _counts(self, level: IntArray) -> IntArray:
-        """How many grains had their level by the end of each load step."""
+    def _by_load_step(self, level: IntArray) -> IntArray:
+        """How many grains had reached their level by the end of each load step."""
         counts = np.bincount(level, minlength=len(self.flow))
         counts[0] = 0
         return np.cumsum(counts)
@@ -179,19 +179,12 @@ class Motion:
         )
 
 
-@dataclass(frozen=True)
-class Track:
+class Track(NamedTuple):
     """The counted grains at each sample; arrays of shape (T, N), NaN for a grain that is gone.
 
-    Attributes
-    ----------
-    travel, rise : ndarray
-        Displacement since the settling, along the bed as the flow goes and normal to it, in the
-        grain's own diameter.
-    aside : ndarray
-        The same across the flow, to either side.
-    roll : ndarray
-        Speed of the surface by spinning over the speed of the centre: 1 for pure rolling.
+    `travel`, `rise` and `aside` are the displacement since the settling in the grain's own
+    diameter: along the bed as the flow goes, normal to it, and across the flow to either side.
+    `roll` is the speed of the surface by spinning over that of the centre: 1 for pure rolling.
     """
 
     travel: FloatArray
@@ -200,17 +193,16 @@ class Track:
     roll: FloatArray
 
 
-@dataclass(frozen=True)
-class Count:
-    """Motion of N counted grains by each of T samples. A grain that has moved stays so.
+class Count(NamedTuple):
+    """Motion of N counted grains by each of T samples, shape (T, N); a grain stays counted.
 
     Attributes
     ----------
-    moved : ndarray of bool, shape (T, N)
+    moved
         Displaced downstream or aside by the criterion at a sample, or carried off.
-    fallen : ndarray of bool, shape (T, N)
+    fallen
         Displaced upstream by the criterion at a sample. Such a grain has not moved, but may yet.
-    carried : ndarray of bool, shape (T, N)
+    carried
         Gone without having been seen beyond the criterion: the flow lifted it off the pile.
     """
 
@@ -258,16 +250,7 @@ def _ever(happened: BoolArray) -> BoolArray:
 
 
 def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool) -> Motion:
-    """Read the deck's tables of a finished run.
-
-    Parameters
-    ----------
-    directory : Path
-        The case.
-    grains : GrainTable
-        As the deck was given them.
-    criterion, falls_out
-        As `count` takes them.
+    """Read the deck's tables of a finished run; the other arguments are those of `count`.
 
     Raises
     ------
@@ -281,11 +264,9 @@ def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bo
     lying, fallen = deck_counts(track.travel, criterion, track.aside)
     agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
-        raise SolverError(
-            f"the counts do not reconcile at sample {int(agree.argmin()) + 1}",
-            where=str(directory / SAMPLES),
-            remedy="grains were lost, or the tables are of different runs",
-        )
+        what = f"the counts do not reconcile at sample {int(agree.argmin()) + 1}"
+        remedy = "grains were lost, or the tables are of different runs"
+        raise SolverError(what, where=str(directory / SAMPLES), remedy=remedy)
     counts = count(track.travel, criterion, falls_out=falls_out, aside=track.aside)
     load_step = samples["load_step"].to_numpy(np.int64)
     flow = samples.groupby("load_step")["flow"].first().to_numpy(float)
@@ -320,16 +301,7 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     """Read what the counted grains did at each sample, from ``passage.dump`` and ``bed.dump``.
 
     A counted grain that the first does not list, and that the second has at the end of the load
-    step, is at rest where it had settled.
-
-    Parameters
-    ----------
-    directory : Path
-        The case.
-    grains : GrainTable
-        As the deck was given them.
-    samples : DataFrame
-        The deck's table of samples, T rows.
+    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows.
 
     Raises
     ------
@@ -344,9 +316,9 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
         remedy = "a smaller protocol.time_step, or look for grains that overlap"
         raise Exploded("every counted grain was lost", where=str(path), remedy=remedy)
     if not np.array_equal(steps[1:], samples["step"]):
-        _other(path, "its samples are not those of samples.csv")
+        raise _of_another_run(path, "its samples are not those of samples.csv")
     if not rows["id"].isin(ids).all():
-        _other(path, "it lists grains that are not counted")
+        raise _of_another_run(path, "it lists grains that are not counted")
     state = np.full((len(PASSAGE_COLUMNS) - 1, len(steps), len(ids)), np.nan)
     row, column = np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])
     for values, name in zip(state, PASSAGE_COLUMNS[1:], strict=True):
@@ -372,22 +344,22 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
 def _present(listed: BoolArray, directory: Path, ids: IntArray, samples: pd.DataFrame) -> BoolArray:
     """Which grains were there at each sample: listed ones, or seen later in the load step."""
     steps, rows = read_dump(directory / BED, BED_COLUMNS)
-    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
-    if not np.array_equal(steps, ends):
-        _other(directory / BED, "its frames are not the ends of the load steps")
+    load_step = samples["load_step"].to_numpy(np.int64)
+    last = np.append(np.flatnonzero(np.diff(load_step)), len(load_step) - 1)
+    if not np.array_equal(steps, samples["step"].to_numpy()[last]):
+        raise _of_another_run(directory / BED, "its frames are not the ends of the load steps")
     rows = rows[rows["id"].isin(ids)]
-    left = np.zeros((len(ends), len(ids)), bool)
-    left[np.searchsorted(ends, rows["step"]), np.searchsorted(ids, rows["id"])] = True
-    present = np.empty_like(listed)
-    groups = samples.reset_index(drop=True).groupby("load_step")
-    for at_the_end, (_, group) in zip(left, groups, strict=True):
-        rows_of = group.index
-        present[rows_of] = np.logical_or.accumulate(listed[rows_of][::-1])[::-1] | at_the_end
+    left = np.zeros((len(steps), len(ids)), bool)
+    left[np.searchsorted(steps, rows["step"]), np.searchsorted(ids, rows["id"])] = True
+    present = listed.copy()
+    for at_the_end, first, end in zip(left, [0, *(last[:-1] + 1)], last + 1, strict=True):
+        group = listed[first:end]
+        present[first:end] = np.logical_or.accumulate(group[::-1])[::-1] | at_the_end
     return present
 
 
-def _other(path: Path, what: str) -> None:
-    raise SolverError(what, where=str(path), remedy="run the case again")
+def _of_another_run(path: Path, what: str) -> SolverError:
+    return SolverError(what, where=str(path), remedy="run the case again")
 
 
 def last_places(directory: Path) -> pd.DataFrame:
@@ -402,19 +374,8 @@ def check_rest(
 ) -> None:
     """See that a bed of grains came to rest before the flow rose, judged by their energy.
 
-    Parameters
-    ----------
-    directory : Path
-        The case.
-    grains : GrainTable
-        As the deck was given them.
-    weight : float
-        Submerged weight W of a grain, N.
-    stiffness : float
-        K d/W.
-    all_rest : bool
-        Whether every grain must come to rest: those of a pile must, cells are each a bed of their
-        own and may be one whose grain falls out.
+    The submerged weight W of a grain is in N, the stiffness is K d/W. All grains of a pile must
+    come to rest; cells are each a bed of their own and may be one whose grain falls out.
 
     Raises
     ------

@@ -116,12 +116,14 @@ def flows(
     criterion: float,
     present: BoolArray | None = None,
 ) -> FloatArray:
-    """The flow at which each grain leaves by peeling.
+    """The flow (u*_0, m/s) at which each of n grains in one plane leaves by peeling, shape (n,).
+
+    It is infinite for grains that never leave.
 
     Parameters
     ----------
     places : Places
-        Places of n grains in one plane, in one unit of length d.
+        In one unit of length d.
     sizes : ndarray, shape (n,)
         Diameter of each grain, d.
     loading : Loading
@@ -132,11 +134,6 @@ def flows(
         Displacement along the bed that counts as motion, of the grain's own diameter.
     present : ndarray of bool, shape (n,), optional
         The grains that have not left yet; by default all.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Undisturbed friction velocity, m/s; infinite for grains that never leave.
     """
     present = np.ones(len(sizes), bool) if present is None else present.copy()
     rollers = dict(_rollers(places, sizes, loading, tables, present))

@@ -6,7 +6,7 @@ sides of the grains have, and the flow is solved over it; what is left goes on u
 """
 
 from collections.abc import Container, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 from pathlib import Path
@@ -15,22 +15,20 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 
+from orchestrator.bed import deck
+from orchestrator.bed.deck import GrainTable
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Packing
-from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import WALL_STRESS, FlowCase
-from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import deck, motion
+from orchestrator.grains import motion
 from orchestrator.grains.cells import GrainCase
-from orchestrator.grains.deck import GrainTable
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
-from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -113,14 +111,8 @@ class Worn:
 class WornFlow(Case):
     """The flow over the bed of a pile that has worn for some rounds.
 
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the pile.
-    before : FlowCase or WornFlow
-        The flow of the round before.
-    run : Case or None
-        The run of LIGGGHTS of that round; None: its grains leave by peeling.
+    `before` is the flow of the round before, `run` the run of LIGGGHTS in that round; without one
+    the grains of the round leave by peeling.
     """
 
     scene: Scene
@@ -213,7 +205,7 @@ def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
     """The grains in the round of a flow."""
     stress = WallStress.from_csv(cases / flow.name / WALL_STRESS)
     worn = line(geometry, flow, cases) if isinstance(flow, WornFlow) else None
-    return geometry.loads(stress, worn)
+    return geometry.under(stress, worn)
 
 
 def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
@@ -273,14 +265,8 @@ def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
 class PileCase(GrainCase):
     """The run of LIGGGHTS of the grains of one pile, or of those that are there in a round.
 
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the pile.
-    flow : WornFlow or None
-        The flow of the round; None: that of the whole pile.
-    before : PileCase or None
-        The run that this one goes on from.
+    `flow` is the flow of the round, by default that of the whole pile; `before` the run that this
+    one goes on from.
     """
 
     scene: Scene
@@ -359,7 +345,7 @@ class PileCase(GrainCase):
             "smallest": grains.smallest,
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
-            **deck.Contact.of(self.scene.grain, rules).variables,
+            **deck.contact(self.scene.grain, rules),
             **raising,
             "slope": slope,
             "ceiling_x": ridge[0] * d,
@@ -394,7 +380,7 @@ class PileCase(GrainCase):
         """The grains under the flow when the run begins."""
         geometry = Geometry(self.scene, cases)
         if self.flow is None:
-            return geometry.loads(geometry.model.stress(cases)), Worn.whole(geometry.packing)
+            return geometry.under(geometry.model.stress(cases)), Worn.whole(geometry.packing)
         return _loads(geometry, self.flow, cases), grains(geometry, self.flow, cases)
 
 
@@ -424,11 +410,9 @@ def flows(loads: Loads) -> FloatArray:
             first = min(first, _first(pivots, geometry))
         place = int(np.ceil(rules.final_fraction * geometry.packing.count)) - 1
     if not 0 < first < np.inf:
-        raise InputError(
-            "no exposed grain lies in a pocket that lets it go",
-            where=f"scene {geometry.scene.id}: bed",
-            remedy="a longer or wider bed, or another bed.seed",
-        )
+        what = "no exposed grain lies in a pocket that lets it go"
+        remedy = "a longer or wider bed, or another bed.seed"
+        raise InputError(what, where=f"scene {geometry.scene.id}: bed", remedy=remedy)
     last = thresholds[place]
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
@@ -466,18 +450,10 @@ def table(loads: Loads, worn: Worn) -> GrainTable:
 
 @dataclass(frozen=True)
 class Face:
-    """The counted grains of a pile, N of them, along the bed.
+    """The counted grains of a pile, arrays of shape (N,).
 
-    Attributes
-    ----------
-    ids : ndarray of int, shape (N,)
-        Ids in the deck.
-    arc_length : ndarray, shape (N,)
-        Position along the bed line from the windward toe, m.
-    speed : ndarray, shape (N,)
-        Local friction velocity over the undisturbed one, signed.
-    x : ndarray, shape (N,)
-        Place downstream of the foot of the first form, m.
+    `ids` are those in the deck, `arc_length` and `x` (m) are downstream of the foot of the first
+    form, `speed` is the signed local friction velocity over the undisturbed one.
     """
 
     ids: IntArray
@@ -503,7 +479,7 @@ class Method:
 
     def loads(self, cases: Path) -> Loads:
         """The grains under the flow of the whole pile."""
-        return self.geometry.loads(self.geometry.model.stress(cases))
+        return self.geometry.under(self.geometry.model.stress(cases))
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
@@ -580,59 +556,13 @@ METHODS: dict[str, type[Method]] = {"pivot": Pivot, "peeling": Peeling, "dem": D
 
 
 @dataclass(frozen=True)
-class Pile:
-    """The pile of a scene: its bed, the flow over it, and its threshold method.
-
-    Attributes
-    ----------
-    scene : Scene
-        A scene with a pile.
-    cases : Path or None
-        Directory of the finished runs; only the grains of a poured bed are read from there.
-    """
-
-    scene: Scene
-    cases: Path | None = field(default=None, compare=False)
-
-    @cached_property
-    def geometry(self) -> Geometry:
-        """Its bed, in grains."""
-        return Geometry(self.scene, self.cases)
-
-    @property
-    def bed(self) -> PileBed:
-        """The scene's bed."""
-        return self.geometry.bed
-
-    @property
-    def line(self) -> BedLine:
-        """The bed line, diameters."""
-        return self.geometry.line
-
-    @property
-    def packing(self) -> Packing:
-        """The grains' places, diameters."""
-        return self.geometry.packing
-
-    @property
-    def pouring(self) -> tuple[PouredBed, ...]:
-        """The run that pours the bed, if one does."""
-        return self.geometry.pouring
-
-    @property
-    def model(self) -> FlowModel:
-        """The flow over the bed."""
-        return self.geometry.model
-
-    @property
-    def flow(self) -> FlowCase:
-        """The run of the flow, of a scene whose flow is solved."""
-        return self.geometry.flow
+class Pile(Geometry):
+    """The pile of a scene: its bed, the flow over it, and its threshold method."""
 
     @cached_property
     def method(self) -> Method:
         """How its threshold is found."""
-        return METHODS[self.scene.protocol.method](self.geometry)
+        return METHODS[self.scene.protocol.method](self)
 
     @cached_property
     def runs(self) -> tuple[Case, ...]:
@@ -687,7 +617,7 @@ class Pile:
         """
         ratio = np.zeros(len(self.packing.sizes))
         ratio[self.packing.windward] = speed
-        return np.sort(Loads(self.geometry, ratio).alone())
+        return np.sort(Loads(self, ratio).alone())
 
     def motion(self, cases: Path) -> Motion:
         """Motion of the counted grains; `cases` is the directory of the finished runs."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,9 @@ STEP = np.sqrt(2)
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Values that the load steps enclose, arrays of one shape; NaN where a grain never moved.
+    """Flows at which grains moved, arrays of shape (N,); NaN where a grain never moved.
 
-    Attributes
-    ----------
-    value : ndarray
-        The geometric mean of `low` and `high`.
-    low, high : ndarray
-        At `low` it had not yet happened, at `high` it had.
+    At `low` a grain had not yet moved, at `high` it had; `value` is their geometric mean.
     """
 
     value: FloatArray
@@ -33,59 +28,33 @@ class Thresholds:
 
 
 def of_grains(motion: Motion) -> Thresholds:
-    """The deck's flow at which each counted grain moved, shape (N,)."""
+    """The deck's flow at which each counted grain moved."""
     moved = motion.level > 0
     low = np.where(moved, motion.low[motion.level], np.nan)
     high = np.where(moved, motion.flow[motion.level], np.nan)
     return Thresholds(np.sqrt(low * high), low, high)
 
 
-@dataclass(frozen=True)
-class Curve:
-    """How a pile answers to the flow; arrays over the load steps, shape (levels + 1,).
+def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatArray:
+    """Mean wall stress on the grains that had moved by each load step, Pa, shape (levels + 1,).
 
-    Attributes
-    ----------
-    ustar0 : ndarray
-        Undisturbed friction velocity, m/s.
-    fraction : ndarray
-        n/N that had moved by the end of the load step.
-    mean_tau : ndarray
-        Mean over the grains that had moved of the wall stress's size, Pa; NaN before any had.
+    It is NaN before any had. Of `speed`, the local friction velocity over the undisturbed one of
+    the N counted grains, only the size matters; the density is in kg/m3.
     """
-
-    ustar0: FloatArray
-    fraction: FloatArray
-    mean_tau: FloatArray
-
-
-def curve(motion: Motion, speed: FloatArray, fluid_density: float) -> Curve:
-    """The fraction that moved and the mean stress on it, at each load step.
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion of the N windward grains.
-    speed : ndarray, shape (N,)
-        Local friction velocity over the undisturbed one; only its size matters.
-    fluid_density : float
-        kg/m3.
-    """
-    stress = speed**2
-    mean = np.array([_mean(motion, stress, level) for level in range(len(motion.flow))])
-    return Curve(motion.flow, motion.fraction, fluid_density * motion.flow**2 * mean)
+    mean = np.array([_mean(motion, speed**2, level) for level in range(len(motion.flow))])
+    return np.asarray(fluid_density * motion.flow**2 * mean)
 
 
 @dataclass(frozen=True)
 class PileThreshold:
-    """The flow at which a fraction of a pile's grains has moved.
+    """The flow at which a fraction of a pile's grains has moved; NaN if it was not reached.
 
     Attributes
     ----------
     fraction : float
         n/N.
     ustar0 : float
-        Undisturbed friction velocity, m/s; NaN if the fraction was not reached.
+        Undisturbed friction velocity, m/s.
     tau, tau_low, tau_high : float
         tau_c and its interval, Pa: the mean over the grains that have moved of the stress that
         drives each along its own way, whichever way that is. The interval holds the step between
@@ -108,7 +77,7 @@ class PileThreshold:
 def of_pile(
     motion: Motion, speed: FloatArray, fraction: float, fluid_density: float
 ) -> PileThreshold:
-    """tau_c of a pile at a fraction; arguments as in `curve`."""
+    """tau_c of a pile at a fraction; arguments as in `mean_tau`."""
     level = first_level(motion, fraction)
     if level is None:
         return PileThreshold(fraction, *(math.nan,) * 6)
@@ -145,18 +114,10 @@ def _mean(motion: Motion, values: NDArray[Any], level: int) -> float:
     return float(moved.mean()) if len(moved) else math.nan
 
 
-@dataclass(frozen=True)
-class SizeClass:
-    """The counted grains between two sizes.
+class SizeClass(NamedTuple):
+    """Counted grains between two sizes: which of the N, and the geometric mean diameter, d.
 
-    Attributes
-    ----------
-    number : int
-        0 for the class around d.
-    size : float
-        Geometric mean of their diameters, d.
-    chosen : ndarray of bool, shape (N,)
-        Which of the counted grains they are.
+    The class around d has the number 0.
     """
 
     number: int

@@ -99,9 +99,9 @@ def read(pile: Pile, cases: Path) -> Steps:
         places = np.broadcast_to(packing.centres[grains], (len(stops), len(grains), 2))
     lines = [(0, pile.line)]
     for worn in pile.flows[1:]:  # the first grain that moves under its flow
-        left_ = np.isfinite(piles.grains(pile.geometry, worn, cases).left).sum()
+        left_ = np.isfinite(piles.grains(pile, worn, cases).left).sum()
         stop = int(np.searchsorted(moved.moved[stops], left_, side="right"))
-        lines.append((stop, piles.line(pile.geometry, worn, cases)))
+        lines.append((stop, piles.line(pile, worn, cases)))
     level = np.where(counted > 0, np.searchsorted(stops, counted), 0)[grains]
     if len(lines) > 1:
         gone = (level > 0) & (level <= np.arange(len(stops))[:, None])

@@ -66,7 +66,7 @@ def grains(answer: Answer) -> Columns:
     if pile.pouring:
         packing, counted = pile.packing, pile.packing.windward
         columns["size_over_d"] = packing.sizes[counted]
-        columns["pivot_deg"] = pile.geometry.pivot_angles_deg
+        columns["pivot_deg"] = pile.pivot_angles_deg
         if packing.width:
             columns["y_m"] = packing.places.xyz[counted, 1] * pile.scene.grain.diameter
     return columns
@@ -115,21 +115,21 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
 def curve(answer: Answer) -> Columns:
     """The fraction of a pile that had moved, and the stress on it, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
-    curve = threshold.curve(motion, answer.face.speed, scene.fluid.density)
+    tau = threshold.mean_tau(motion, answer.face.speed, scene.fluid.density)
     return {
         "scene_id": answer.scene_id,
         "load_step": np.arange(len(motion.flow)),
-        "u_e_m_s": curve.ustar0 * answer.pile.model.lid_speed_ratio,
-        "ustar0_m_s": curve.ustar0,
+        "u_e_m_s": motion.flow * answer.pile.model.lid_speed_ratio,
+        "ustar0_m_s": motion.flow,
         "count": motion.count,
         "moved": motion.moved,
         "not_moved": motion.count - motion.moved,
         "carried_off": motion.carried_off,
         "fallen_upstream": motion.fallen_upstream,
-        "fraction_moved": curve.fraction,
-        "mean_tau_pa": curve.mean_tau,
-        "shields": shields(scene, curve.mean_tau),
-        "reynolds": _reynolds(scene, curve.mean_tau),
+        "fraction_moved": motion.fraction,
+        "mean_tau_pa": tau,
+        "shields": shields(scene, tau),
+        "reynolds": _reynolds(scene, tau),
     }
 
 

@@ -86,7 +86,7 @@ def test_the_template_runs_as_it_lies(tmp_path: Path) -> None:
 
 def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
     places, sizes = _grains(mixed)
-    lying = np.arange(len(sizes)) >= len(_plane().mould.floor)
+    lying = np.arange(len(sizes)) >= len(_plane().floor)
     number = _contacts(places, sizes)
     assert np.mean(number[lying] >= 2) > 0.98
     x, _, z = places.xyz.T
@@ -143,7 +143,7 @@ class Lattice(PouredBed):
 
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
-        floor = self.mould.floor
+        floor = self.floor
         rows = [floor[: len(floor) - row] + np.array([row / 2, 0.0, 1.1 * row]) for row in range(5)]
         centres = np.vstack(rows)
         return centres, np.ones(len(centres))
@@ -154,7 +154,7 @@ def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> N
     x, _, z = _grains(_run(lattice, tmp_path))[0].xyz.T
     row = np.rint((z + 3) / np.sin(np.pi / 3))
     np.testing.assert_allclose(z + 3, row * np.sin(np.pi / 3), atol=2e-3)
-    place = x - row / 2 - lattice.mould.floor[0, 0]
+    place = x - row / 2 - lattice.floor[0, 0]
     np.testing.assert_allclose(place, np.rint(place), atol=5e-3)
     assert row.max() == 4
 
@@ -166,7 +166,7 @@ def test_grains_in_the_air_touch_nothing(sizes: Sizes | None, width: float) -> N
     line = BedLine((-10.0, 0.0, 0.5, 8.0, 16.0, 34.0), (0.0, 0.0, 5.0, 5.0, 1.0, 1.0), 1.0)
     bed = PouredBed(line, 6.0, SURFACE, sizes, 1.0, 35.0, 3, width)
     centres, diameters = bed.grains
-    fixed, (start, end) = len(bed.mould.floor), bed.mould.ends
+    fixed, (start, end) = len(bed.floor), bed.ends
     first, second, _ = Places(centres, width).contacts(diameters, 0.0)
     assert (first < fixed).all()
     assert (second < fixed).all()

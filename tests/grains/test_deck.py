@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.grains import deck
+from orchestrator.bed import deck
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS

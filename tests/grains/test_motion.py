@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator import pipeline, plan
-from orchestrator.bed.deck import read_table
+from orchestrator.bed import deck
+from orchestrator.bed.deck import GrainTable, read_table
 from orchestrator.errors import Exploded, Noisy, SolverError
-from orchestrator.grains import deck, motion
-from orchestrator.grains.deck import GrainTable
+from orchestrator.grains import motion
 from orchestrator.report import bed
 from orchestrator.runs.case import templates
 from orchestrator.study import study

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from orchestrator.bed import deck
 from orchestrator.bed.packing import Places
-from orchestrator.grains import deck, motion, peeling, threshold
+from orchestrator.grains import motion, peeling, threshold
 from orchestrator.grains.loading import ForceTable, Loading
 from orchestrator.runs.case import templates
 from orchestrator.study.parts import Grain, Protocol
@@ -73,7 +74,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     weight = 2500.0 * np.pi / 6 * d**3 * 9.81
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
-        **deck.Contact.of(grain, rules).variables,
+        **deck.contact(grain, rules),
         **deck.raising(rules, 0),
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }

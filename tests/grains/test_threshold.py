@@ -45,9 +45,9 @@ def test_thresholds_of_grains_lie_between_two_holds() -> None:
 
 
 def test_curve_holds_the_mean_stress_of_what_has_moved() -> None:
-    found = threshold.curve(MOTION, SPEED, DENSITY)
+    found = threshold.mean_tau(MOTION, SPEED, DENSITY)
     mean = [math.nan, 4.0, (2 * 4 + 3 * 2.25) / 5, (2 * 4 + 3 * 2.25) / 5, (8 + 6.75 + 4) / 9]
-    np.testing.assert_allclose(found.mean_tau, DENSITY * FLOW**2 * mean)
+    np.testing.assert_allclose(found, DENSITY * FLOW**2 * mean)
 
 
 def test_threshold_of_a_pile_at_a_fraction() -> None:
@@ -70,8 +70,8 @@ def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_thei
     forward, back = (threshold.of_pile(MOTION, way * SPEED, 0.9, DENSITY) for way in (1, -1))
     assert back.tau == forward.tau > 0
     assert (forward.against_the_flow, back.against_the_flow) == (0, 1)
-    curve = threshold.curve(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), DENSITY)
-    assert (curve.mean_tau[1:] > 0).all()
+    curve = threshold.mean_tau(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), DENSITY)
+    assert (curve[1:] > 0).all()
     some = threshold.of_pile(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), 0.5, DENSITY)
     assert some.against_the_flow == 0.4
 

@@ -124,13 +124,13 @@ def test_a_bed_changes_after_each_part_of_its_grains(worn: dict[str, Done], meth
     pile, cases = worn[method]
     assert [flow.kind for flow in pile.flows] == ["flow", "worn", "worn"]
     count, windward = pile.packing.count, pile.packing.windward
-    begun = (wear.grains(pile.geometry, flow, cases) for flow in pile.flows)
+    begun = (wear.grains(pile, flow, cases) for flow in pile.flows)
     gone = [np.isfinite(worn.left[windward]) for worn in begun]
     for flow, part in zip(pile.flows[:-1], gone[1:], strict=True):
-        assert part.sum() >= wear.goal(pile.geometry, flow)
+        assert part.sum() >= wear.goal(pile, flow)
     # what has moved never comes back, and the line never rises
     assert all(np.all(after >= before) for before, after in pairwise(gone))
-    lines = [wear.line(pile.geometry, flow, cases) for flow in pile.flows]
+    lines = [wear.line(pile, flow, cases) for flow in pile.flows]
     x = np.linspace(lines[0].x[0], lines[0].x[-1], 300)
     for before, later in pairwise(lines):
         assert np.all(later.height(x) <= before.height(x) + 0.02)
@@ -185,7 +185,7 @@ def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str
     assert len(starts) == 3
     assert all(steps.moved(step - 1) < steps.moved(step) for step in starts[1:])
     # who has moved is off the bed before the next line is there
-    left = np.isfinite(wear.grains(pile.geometry, pile.flows[2], cases).left)
+    left = np.isfinite(wear.grains(pile, pile.flows[2], cases).left)
     assert np.isnan(steps.places[starts[2] - 1, left[steps.grains], 0]).all() or method == "dem"
     frames = bed.data(steps, steps.first(0.5))["lines"]
     assert [step for step, _ in frames] == starts
