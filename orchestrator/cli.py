@@ -5,8 +5,8 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Sequence
-from functools import partial
+from argparse import Namespace
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         del os.environ["SOURCE_DATE_EPOCH"]
     # matplotlib raises where this one names no backend; figures are drawn without a window
     os.environ.pop("MPLBACKEND", None)
-    warnings.showwarning = _show_warning
+    warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
     options = _parser().parse_args(arguments)
@@ -41,17 +41,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failure = of_exception(error)
         if isinstance(failure, Fault):
             raise
-        print(f"orchestrator: {failure}", file=sys.stderr)
+        _say(failure)
         code = failure.exit_code
     lost = terminal.lost()
     if lost and not code:
-        print(f"orchestrator: the answer could not be written: {lost.strerror}", file=sys.stderr)
-        return 1
-    return code
+        _say(f"the answer could not be written: {lost.strerror}")
+    return code or int(lost is not None)
 
 
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"orchestrator: warning: {message}", file=sys.stderr)
+def _say(message: object) -> None:
+    print(f"orchestrator: {message}", file=sys.stderr)
 
 
 class Parser(argparse.ArgumentParser):
@@ -63,33 +62,39 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="orchestrator",
-        description="When does a sediment grain, or a whole bedform of grains, start to move?",
-    )
+def _parser() -> Parser:
+    about = "When does a sediment grain, or a whole bedform of grains, start to move?"
+    parser = Parser(prog="orchestrator", description=about)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
-    study = commands.add_parser("study", help="run what is missing of a study, and draw it")
-    study.set_defaults(run=_study)
-    _add_source(study, "first-look")
-    _add_run_options(study)
-    study.add_argument(
-        "--tolerance",
-        type=float,
-        metavar="X",
-        help="relative error that tau_c may have: the cheapest models known to be within it;"
-        " 0: every scene as the file asks",
+
+    def add(name: str, run: Callable[[Namespace], int], text: str) -> Parser:
+        command: Parser = commands.add_parser(name, help=text)
+        command.set_defaults(run=run, command=name)
+        return command
+
+    def add_run(name: str, run: Callable[[Namespace], int], text: str, source: str = "") -> Parser:
+        command = add(name, run, text)
+        if source:
+            text = "default: %(default)s"
+            command.add_argument(
+                "source", nargs="?", default=source, metavar="FILE|PRESET", help=text
+            )
+        command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
+        count, text = os.cpu_count() or 1, "cases at a time"
+        command.add_argument("--workers", type=_workers, default=count, metavar="N", help=text)
+        return command
+
+    study = add_run("study", _study, "run what is missing of a study, and draw it", "first-look")
+    text = (
+        "relative error that tau_c may have: the cheapest models known to be within it;"
+        " 0: every scene as the file asks"
     )
-    study.add_argument(
-        "--cluster",
-        choices=sorted(SYSTEMS),
-        metavar="QUEUE",
-        help="run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]",
-    )
-    study.add_argument(
-        "--plan", action="store_true", help="say what would run, how long and how large, and end"
-    )
+    study.add_argument("--tolerance", type=float, metavar="X", help=text)
+    text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
+    study.add_argument("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
+    text = "say what would run, how long and how large, and end"
+    study.add_argument("--plan", action="store_true", help=text)
     calculator.add(commands)
     for name, text in (
         ("status", "what of a study is done, running, failed and why"),
@@ -97,37 +102,15 @@ def _parser() -> argparse.ArgumentParser:
         ("gallery", "one page over the studies that a directory holds"),
         ("prune", "drop the large files of finished cases; a rerun makes them anew"),
     ):
-        command = commands.add_parser(name, help=text)
-        command.add_argument("directory", type=Path, metavar="DIR")
-        command.set_defaults(run=partial(_on_directory, name))
-    for name, text in (
-        ("ladder", "what each model costs and how far it is off: speed against accuracy"),
-        ("budget", "what the choices are worth that all models share: a tornado for each scene"),
-        ("stability", "maps of where each method fails"),
-    ):
-        command = commands.add_parser(name, help=text)
-        if name != "stability":
-            _add_source(command, name)
-        _add_run_options(command)
-        command.set_defaults(run=partial(_experiment, name))
+        add(name, _on_directory, text).add_argument("directory", type=Path, metavar="DIR")
+    text = "what each model costs and how far it is off: speed against accuracy"
+    add_run("ladder", _experiment, text, "ladder")
+    text = "what the choices are worth that all models share: a tornado for each scene"
+    add_run("budget", _experiment, text, "budget")
+    add_run("stability", _experiment, "maps of where each method fails")
     benchmark.add(commands)
-    command = commands.add_parser(
-        "doctor", help="are the solvers here, can it draw; what to install"
-    )
-    command.set_defaults(run=_doctor)
+    add("doctor", _doctor, "are the solvers here, can it draw; what to install")
     return parser
-
-
-def _add_source(command: argparse.ArgumentParser, default: str) -> None:
-    text = "default: %(default)s"
-    command.add_argument("source", nargs="?", default=default, metavar="FILE|PRESET", help=text)
-
-
-def _add_run_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
-    command.add_argument(
-        "--workers", type=_workers, default=os.cpu_count() or 1, metavar="N", help="cases at a time"
-    )
 
 
 def _workers(text: str) -> int:
@@ -137,53 +120,49 @@ def _workers(text: str) -> int:
     return number
 
 
-def _study(options: argparse.Namespace) -> int:
+def _study(options: Namespace) -> int:
     from orchestrator import face, pipeline, plan
     from orchestrator.runs.workspace import Workspace
 
     study = face.load(options.source, options.tolerance, "--tolerance")
     out, workers = options.out or Path("results") / study.name, options.workers
     if options.plan:
-        space = Workspace(out.absolute())
-        planned = plan.settled(study, space.cases)
-        missing = list(pipeline.missing(planned, space).values())
-        print("\n".join(plan.forecast(study, planned, missing, workers)))
+        cases = Workspace(out.absolute()).cases
+        print("\n".join(plan.forecast(study, cases, workers)))
         return 0
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
     finished = pipeline.run(study, out, workers=workers, queue=queue, guests=face.GUESTS)
     if not finished.started:
         print("every case was done already; no solver was started", file=sys.stderr)
     if finished.left:
-        print(
-            f"the study file has changed: {len(finished.left)} cases are not asked for any more; "
-            f"`orchestrator status {out}` names them",
-            file=sys.stderr,
-        )
+        what = f"the study file has changed: {len(finished.left)} cases are not asked for any more"
+        print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
     return _end(finished)
 
 
-def _experiment(name: str, options: argparse.Namespace) -> int:
+def _experiment(options: Namespace) -> int:
     """Run an experiment; all but the maps of stability are on the scenes of a study."""
     from orchestrator import face
 
-    experiment = import_module(f"orchestrator.experiments.{name}")
-    out = options.out or Path("results") / name
+    experiment = import_module(f"orchestrator.experiments.{options.command}")
+    out = options.out or Path("results") / options.command
     studies = [face.load(options.source)] if "source" in options else []
     return _end(experiment.run(*studies, out, workers=options.workers))
 
 
-def _on_directory(name: str, options: argparse.Namespace) -> int:
-    if name == "status":
+def _on_directory(options: Namespace) -> int:
+    directory: Path = options.directory
+    if options.command == "status":
         from orchestrator.runs import workspace
 
-        text, has_failed = workspace.status(options.directory)
+        text, has_failed = workspace.status(directory)
         print(text)
         return 3 if has_failed else 0
     from orchestrator import face, gallery, pipeline
 
-    if name == "report":
-        return _end(pipeline.redraw(options.directory, face.GUESTS))
-    print((gallery.write if name == "gallery" else pipeline.prune)(options.directory))
+    if options.command == "report":
+        return _end(pipeline.redraw(directory, face.GUESTS))
+    print((gallery.write if options.command == "gallery" else pipeline.prune)(directory))
     return 0
 
 
@@ -192,12 +171,12 @@ def _end(finished: "Finished") -> int:
     if finished.answer:
         print(finished.answer)
     for name, error in finished.failures.items():
-        print(f"orchestrator: {name} failed: {error}", file=sys.stderr)
+        _say(f"{name} failed: {error}")
     print(finished.page)
     return 3 if finished.failures else 0
 
 
-def _doctor(options: argparse.Namespace) -> int:
+def _doctor(options: Namespace) -> int:
     from orchestrator.solvers import doctor
 
     findings = list(doctor.examine())

@@ -11,30 +11,22 @@ from typing import ClassVar
 
 LONGEST = 400
 """Characters of a message's place, cause and remedy, each."""
+_ROOM = "make room, then the same command continues"
 _REMEDIES = {
-    errno.ENOSPC: "make room, then the same command continues",
-    errno.EDQUOT: "make room, then the same command continues",
+    errno.ENOSPC: _ROOM,
+    errno.EDQUOT: _ROOM,
     errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
     errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
     errno.EMFILE: "raise the limit: ulimit -n 1024",
-    errno.ENFILE: "too many files are open on this machine",
     errno.ENOMEM: "free memory, or raise its limit: ulimit -v",
     errno.EAGAIN: "too many processes? See ulimit -u",
-    errno.ENAMETOOLONG: "choose a shorter path",
 }
 
 
 class OrchestratorError(Exception):
-    """A failure with a place and a remedy; the command line prints it without a traceback.
+    """A failure that the command line prints without a traceback.
 
-    Parameters
-    ----------
-    what : str
-        What went wrong, in one sentence.
-    where : str, optional
-        The file, field or case that it happened in.
-    remedy : str, optional
-        What the user can do about it.
+    It says what went wrong in one sentence, where (the file, field or case), and the remedy.
     """
 
     exit_code = 1
@@ -105,13 +97,11 @@ def of_system(error: OSError, where: str = "") -> OrchestratorError:
     """The message of a failure of the system, at `where` or the file that the error names."""
     # shutil collects the failure of each file: the first one is given
     text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
-    if error.errno == errno.ENOSPC or "No space left" in (text or ""):
-        text, remedy = "no space is left on the disk", _REMEDIES[errno.ENOSPC]
-    else:
-        remedy = _REMEDIES.get(error.errno or 0, "see the file system")
-    name = error.filename
-    place = where or ("" if name is None or isinstance(name, int) else os.fsdecode(name))
-    return OrchestratorError(text or str(error), place, remedy)
+    number = errno.ENOSPC if "No space left" in (text or "") else error.errno or 0
+    text = "no space is left on the disk" if number == errno.ENOSPC else text
+    file = "" if isinstance(error.filename, int | None) else os.fsdecode(error.filename)
+    remedy = _REMEDIES.get(number, "see the file system")
+    return OrchestratorError(text or str(error), where or file, remedy)
 
 
 def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
@@ -145,12 +135,11 @@ def unknown_key(
 ) -> InputError:
     """The message of an unknown key, with the key that was probably meant as the remedy.
 
-    `elsewhere` has keys of other places, each with the way it is written there. A key of the same
-    name is suggested first, then the nearest of `known`, then the nearest of the others.
+    `elsewhere` has keys of other places, each with the way it is written there.
     """
     same = [written for name, written in elsewhere if name == key]
-    there = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
-    near = [written for name, written in elsewhere if name in there]
-    close = same or difflib.get_close_matches(key, known, n=1) or near
+    far = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
+    near = difflib.get_close_matches(key, known, n=1)
+    close = same or near or [written for name, written in elsewhere if name in far]
     meant, listed = f"did you mean {' or '.join(close)}?", f"known keys: {', '.join(sorted(known))}"
     return InputError("unknown key", where, meant if close else listed)

@@ -1,11 +1,9 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator import paper, pipeline, report, tables
 from orchestrator.calculator import table as calculator
-from orchestrator.errors import InputError, OrchestratorError, SolverError, of_system
+from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
@@ -25,45 +23,8 @@ if TYPE_CHECKING:
 
 GUESTS = (paper.report_card,)
 """Guests that add to the page of a study."""
-P = ParamSpec("P")
-T = TypeVar("T")
 
 
-def _public(function: Callable[P, T]) -> Callable[P, T]:
-    """Call with numpy's default error handling; failures of the system as `OrchestratorError`."""
-
-    @wraps(function)
-    def call(*arguments: P.args, **settings: P.kwargs) -> T:
-        try:
-            with np.errstate(divide="warn", over="warn", under="ignore", invalid="warn"):
-                return function(*arguments, **settings)
-        except OSError as error:
-            raise of_system(error) from error
-
-    return call
-
-
-def _path(value: Any, name: str) -> Path:
-    """An argument as a path."""
-    if not isinstance(value, str | os.PathLike) or "\0" in str(value):
-        raise InputError(f"{value!r} is not a path", where=name)
-    return Path(value)
-
-
-def _array(values: Any, name: str) -> Any:
-    """An argument as an array of numbers; a roughness may have texts such as ``d/30``."""
-
-    def number(value: Any) -> Any:
-        return value if isinstance(value, str) and name == "roughness" else float(value)
-
-    try:
-        return np.vectorize(number, otypes=[object])(np.asarray(values, dtype=object))
-    except (TypeError, ValueError):
-        what = f"{values!r} is neither a number nor an array of numbers"
-        raise InputError(what, where=name) from None
-
-
-@_public
 def threshold(
     diameter: ArrayLike,
     *,
@@ -82,20 +43,14 @@ def threshold(
 
     Parameters
     ----------
-    diameter : array_like
-        d, m.
-    density, fluid_density : array_like
-        Densities of grain and fluid, kg/m3.
-    viscosity : array_like
-        Kinematic, m2/s.
+    diameter, density, fluid_density, viscosity, gravity : array_like
+        d, m; densities of grain and fluid, kg/m3; kinematic viscosity, m2/s; m/s2.
     slope_deg, entrainment_angle_deg : array_like
         Slope that the flow goes up, and the angle of the contact that a grain rolls over, degrees.
     roughness : array_like
         Roughness length z0, m, or a part of the diameter such as ``d/10``.
     lift_coefficient : array_like
         Coefficient of Saffman's lift.
-    gravity : array_like
-        m/s2.
     depth : array_like, optional
         Depth of a liquid, m: for its mean velocity.
     law : str or None
@@ -112,35 +67,34 @@ def threshold(
     InputError
         For a point that is no scene, a law that is none, or if no law holds at any point.
     """
-    given: dict[str, Any] = {
-        "diameter": diameter,
-        "density": density,
-        "fluid_density": fluid_density,
-        "viscosity": viscosity,
-        "slope_deg": slope_deg,
-        "entrainment_angle_deg": entrainment_angle_deg,
-        "roughness": roughness,
-        "lift_coefficient": lift_coefficient,
-        "gravity": gravity,
-        **({} if depth is None else {"depth": depth}),
-    }
-    if not isinstance(law, str | None):
-        raise InputError(f"{law!r} is not the name of a force law", where="law")
+    given = {name: values for name, values in locals().items() if name != "law"}
+    if depth is None:
+        del given["depth"]
     try:
         arrays = np.broadcast_arrays(*(_array(values, name) for name, values in given.items()))
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
     if not arrays[0].size:
         raise InputError("an array without values", where="threshold")
-    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True))).infer_objects()
+    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True)))
     answer = "bridged" if law is None else law
     calculator.check_law(answer)
-    found = calculator.thresholds(points, answer)
-    chosen = found if law is None else found[found["answer"]]
+    table = calculator.thresholds(points, answer)
+    chosen = table if law is None else table[table["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)
 
 
-@_public
+def _array(values: Any, name: str) -> np.ndarray[Any, Any]:
+    """An argument as an array of numbers; a roughness may have texts such as ``d/30``."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        if name == "roughness":
+            return np.asarray(values, dtype=object)
+        what = f"{values!r} is neither a number nor an array of numbers"
+        raise InputError(what, where=name) from None
+
+
 def run(
     source: str | Path,
     *,
@@ -168,11 +122,11 @@ def run(
     SolverError
         If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
     """
-    if workers is not None and not (isinstance(workers, int) and workers >= 1):
-        raise InputError(f"{workers!r} is not a whole number of at least 1", where="workers")
+    if workers is not None and workers < 1:
+        raise InputError(f"{workers} is below 1", where="workers")
     asked = load(source, tolerance)
-    place = _path(Path("results") / asked.name if out is None else out, "out")
-    count = workers or os.cpu_count() or 1
+    place = Path(out or Path("results") / asked.name)
+    count = (os.cpu_count() or 1) if workers is None else workers
     finished = pipeline.run(asked, place, workers=count, guests=GUESTS)
     if finished.failures:
         name, error = next(iter(finished.failures.items()))
@@ -183,14 +137,13 @@ def run(
 
 def load(source: str | Path, tolerance: float | None = None, name: str = "tolerance") -> Study:
     """Read a study file or a preset, to be answered with a tolerance that messages call `name`."""
-    asked = study.load(str(_path(source, "source")), [paper.PRESETS])
+    asked = study.load(str(source), [paper.PRESETS])
     if tolerance is None:
         return asked
     study.check_tolerance(tolerance, name)
     return replace(asked, tolerance=tolerance)
 
 
-@_public
 def open(directory: str | Path) -> "Opened":
     """Open the directory of a study that was run.
 
@@ -199,7 +152,7 @@ def open(directory: str | Path) -> "Opened":
     OrchestratorError
         If it holds no study or no tables, or these have changed since they were written.
     """
-    space = Workspace(_path(directory, "directory").absolute())
+    space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
     return Opened(Results(asked, planned, tables.read(space.folder, "tables"), space.cases))
 
@@ -207,16 +160,8 @@ def open(directory: str | Path) -> "Opened":
 class Opened:
     """A study that was run, as `run` and `open` give it.
 
-    Attributes
-    ----------
-    directory, page : Path
-        Its directory and its page.
-    title : str
-        Title in its study file.
-    tables : dict of str to DataFrame
-        Every table by its name, SI units in the columns' names.
-    plot : Plots
-        Its figures.
+    It has the `directory` and the `page`, the `title` in the study file, and the `tables`: every
+    table by its name, a DataFrame with SI units in the columns' names. `plot` draws its figures.
     """
 
     def __init__(self, results: Results) -> None:
@@ -248,7 +193,7 @@ class Opened:
         return tuple(self.answer.split("\n\n")[-1].splitlines())
 
     def case(self, name: str) -> Path:
-        """The directory of a case, by its name or the beginning of it.
+        """The directory of the one case whose name begins so.
 
         Raises
         ------

@@ -3,10 +3,10 @@
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
@@ -20,9 +20,11 @@ from orchestrator.runs.progress import Display, Forecast
 from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, read_marker
 from orchestrator.study.study import Study, parse
 
+Failures = Mapping[str, OrchestratorError]
+"""The cases that failed, by name."""
 
-@dataclass(frozen=True)
-class Finished:
+
+class Finished(NamedTuple):
     """Outcome of a study: its page, the number of cases that were run, and those that failed.
 
     `left` are the cases of an earlier study file that this one does not ask for, and `answer` is
@@ -31,7 +33,7 @@ class Finished:
 
     page: Path
     started: int
-    failures: dict[str, OrchestratorError]
+    failures: Failures
     left: tuple[str, ...] = ()
     answer: str = ""
 
@@ -66,27 +68,21 @@ def run(
         failures: dict[str, OrchestratorError] = {}
         while names := [name for name in planned.cases if name not in {**states, **failures}]:
             started += len(names)
-            todo = {name: planned.cases[name] for name in names}
-            failures |= complete(
-                todo,
-                space,
-                workers=workers,
-                limit_s=study.time_limit_s,
-                queue=queue,
-                after_s=planned.drawing_s,
-            )
+            todo, limit_s = {name: planned.cases[name] for name in names}, study.time_limit_s
+            failures |= complete(todo, space, workers, limit_s, queue, planned.drawing_s)
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases)
             _describe(space, study, planned)
-            states |= planned.done(space.cases, planned.cases.keys() - states)
-        failures = {name: error for name, error in failures.items() if name in planned.cases}
-        whole = read_json(space.drawn) == _state(study, planned, space)
-        if started or not whole or not space.folder.is_whole(MARKERS):
+            states |= planned.done(space.cases, but=states)
+        marker = read_json(space.drawn)
+        answer = marker.get("answer") if isinstance(marker, dict) else None
+        is_drawn = marker == {**_drawn_of(study, planned, space), "answer": answer}
+        if started or not is_drawn or not space.folder.is_whole(MARKERS):
+            failures = {name: error for name, error in failures.items() if name in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
-            draw(study, planned, space, states, failures, guests)
-        answer = report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
+            answer = _draw(study, planned, space, states, failures, guests)
         left = space.left(planned.cases) if changed else ()
-        return Finished(space.page, started, failures, left, answer)
+        return Finished(space.page, started, failures, left, str(answer))
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -107,21 +103,14 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     return changed
 
 
-def missing(planned: Plan, space: Workspace) -> dict[str, Case]:
-    """The cases of a plan that are not done yet, by name."""
-    done = planned.done(space.cases)
-    return {name: case for name, case in planned.cases.items() if name not in done}
-
-
 def complete(
     todo: dict[str, Case],
     space: Workspace,
-    *,
     workers: int,
     limit_s: float,
     queue: Queue | None = None,
     after_s: float = 0.0,
-) -> dict[str, OrchestratorError]:
+) -> Failures:
     """Run cases and show their progress; the failures by the cases' names.
 
     A case may take `limit_s`, s; tables and figures after the runs are expected to take `after_s`.
@@ -134,31 +123,6 @@ def complete(
     with opened as pool, Display(forecast, space.cases) as display:
         engine.check_solvers(todo.values(), pool)
         return engine.run(todo, pool, display, display.watch)
-
-
-def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
-    """Make tables, figures and page again from the cases that are done."""
-    space = Workspace(out.absolute())
-    study, planned = reopen(space)
-    with space.held(STUDY, study.name, new=False):
-        states = planned.done(space.cases)
-        space.check_cases_of_tables(states)
-        causes = {name: case.failure(space.cases / name) for name in planned.cases}
-        failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        draw(study, planned, space, states, failures, guests)
-        answer = report.said(study, planned, tables.read(space.folder, "tables"), space.cases)
-        return Finished(space.page, 0, failures, (), answer)
-
-
-def prune(directory: Path) -> str:
-    """Drop the large files of finished cases, but for those that the page is drawn from."""
-    space = Workspace(directory.absolute())
-    study, planned = reopen(space)
-    with space.held(STUDY, study.name, new=False):
-        done = planned.done(space.cases)
-        made = tables.make(study, planned, space.cases, done)
-        shown = {one.name for one in report.drawn_from(study, planned, made, space.cases)}
-        return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
 
 
 def reopen(space: Workspace) -> tuple[Study, Plan]:
@@ -179,15 +143,39 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     return study, plan.settled(study, space.cases)
 
 
-def draw(
+def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
+    """Make tables, figures and page again from the cases that are done."""
+    space = Workspace(out.absolute())
+    study, planned = reopen(space)
+    with space.held(STUDY, study.name, new=False):
+        states = planned.done(space.cases)
+        space.check_cases_of_tables(states)
+        causes = {name: case.failure(space.cases / name) for name in planned.cases}
+        failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
+        answer = _draw(study, planned, space, states, failures, guests)
+        return Finished(space.page, 0, failures, answer=answer)
+
+
+def prune(directory: Path) -> str:
+    """Drop the large files of finished cases, but for those that the page is drawn from."""
+    space = Workspace(directory.absolute())
+    study, planned = reopen(space)
+    with space.held(STUDY, study.name, new=False):
+        done = planned.done(space.cases)
+        made = tables.make(study, planned, space.cases, done)
+        shown = {case.name for case in report.drawn_from(study, planned, made, space.cases)}
+        return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
+
+
+def _draw(
     study: Study,
     planned: Plan,
     space: Workspace,
     states: Mapping[str, Mapping[str, Any]],
-    failures: dict[str, OrchestratorError],
-    guests: Sequence[Guest] = (),
-) -> None:
-    """Write tables, figures and page, and last the marker of the cases that they are made of.
+    failures: Failures,
+    guests: Sequence[Guest],
+) -> str:
+    """Write tables, figures and page, and last the marker of what they are made of; the answer.
 
     The states are those of the cases that are done, by name, as `Plan.done` gives them.
     """
@@ -200,12 +188,15 @@ def draw(
         tables.write(results, space.folder, "tables")
         tables.write({"timings": times}, space.folder, "timings")
         report.write(study, planned, results, times, causes, space.folder, guests)
+    answer = report.said(study, planned, results, space.cases)
     if not failures:
         terminal.check()
-        space.folder.put(STATE, text_of(_state(study, planned, space)))
+        marker = {**_drawn_of(study, planned, space), "answer": answer}
+        space.folder.put(STATE, text_of(marker))
+    return answer
 
 
-def _state(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
+def _drawn_of(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
     """Digests of all that the tables and figures are made of, and of them."""
     cases = [case.id for case in planned.cases.values()]
     made_of = [__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases]

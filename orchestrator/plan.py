@@ -1,7 +1,7 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,15 +30,9 @@ OTHER_BYTES = 2e6
 class Plan:
     """How the scenes of a study are answered, and by which cases.
 
-    Attributes
-    ----------
-    decisions, piles, checks : dict
-        By the id of the scene that was asked for: how it is answered, and why; its pile; a pile by
-        DEM that checks an answer without DEM.
-    cells : tuple of SingleGrainCase
-        Each answers all of its scenes.
-    cases : dict of str to Case
-        Every run once, by name, a case after those whose results it needs.
+    By the id of the scene that was asked for: the `decisions` with their reasons, the `piles`, and
+    `checks`, piles by DEM that check an answer without DEM. Each of the `cells` answers all of its
+    single grains. `cases` has every run once, by name, after those whose results it needs.
     """
 
     decisions: dict[str, Decision]
@@ -54,31 +48,26 @@ class Plan:
         lengths = sum(float(s[-2] - s[1]) for s in lines)
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
-    def done(
-        self, directory: Path, names: Iterable[str] | None = None
-    ) -> dict[str, dict[str, Any]]:
-        """The markers of the cases that are done, by name; their results are checked.
-
-        Only some of the cases are looked at if their names are given.
-        """
-        cases = [self.cases[name] for name in (self.cases if names is None else names)]
+    def done(self, directory: Path, but: Container[str] = ()) -> dict[str, dict[str, Any]]:
+        """The markers of the cases that are done, by name, but for some; results are checked."""
+        cases = [case for name, case in self.cases.items() if name not in but]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
             states = list(pool.map(lambda case: done_state(case, directory), cases))
         return {case.name: state for case, state in zip(cases, states, strict=True) if state}
+
+    def missing(self, directory: Path) -> dict[str, Case]:
+        """The cases that are not done yet, by name."""
+        done = self.done(directory)
+        return {name: case for name, case in self.cases.items() if name not in done}
 
 
 def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
-    Parameters
-    ----------
-    study : Study
-        With a tolerance, each scene is answered on the cheapest levels that are known to meet it;
-        with one of 0, as it is asked; without one, `by_default`.
-    above : mapping, optional
-        By scene id: levels that turned out to be not good enough.
-    cases : Path, optional
-        Where the runs are, or will be; the grains of a poured bed are read from there.
+    With a tolerance, each scene is answered on the cheapest levels that are known to meet it; with
+    one of 0, as it is asked; without one, `by_default`. `above` has levels that turned out to be
+    not good enough, by scene id. The grains of a poured bed are read from `cases`, the directory
+    of the runs.
 
     Raises
     ------
@@ -87,13 +76,14 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         the field.
     """
     limits.check_study(study)
-    bounds = {scene.id: (above or {}).get(scene.id, NO_BOUND) for scene in study.scenes}
-    decisions = {
-        scene.id: by_default(scene, bounds[scene.id])
-        if study.tolerance is None
-        else decide(scene, study.tolerance, bounds[scene.id])
-        for scene in study.scenes
-    }
+    decisions = {}
+    for scene in study.scenes:
+        bound = (above or {}).get(scene.id, NO_BOUND)
+        has_tolerance = study.tolerance is not None
+        chosen = (
+            decide(scene, study.tolerance, bound) if has_tolerance else by_default(scene, bound)
+        )
+        decisions[scene.id] = chosen
     return of(decisions, study.name, study.tolerance, cases)
 
 
@@ -107,15 +97,14 @@ def of(
 
     With a tolerance, answers without DEM are checked by it.
     """
-    checked = decision.checks(decisions, tolerance) if tolerance else {}
-    piles, checks = (
-        {
-            asked: Pile(answer.scene, cases)
-            for asked, answer in answers.items()
-            if isinstance(answer.scene.bed, PileBed)
-        }
-        for answers in (decisions, checked)
-    )
+
+    def piles_of(answers: Mapping[str, Decision]) -> dict[str, Pile]:
+        scenes = {asked: answer.scene for asked, answer in answers.items()}
+        kept = {asked: scene for asked, scene in scenes.items() if isinstance(scene.bed, PileBed)}
+        return {asked: Pile(scene, cases) for asked, scene in kept.items()}
+
+    piles = piles_of(decisions)
+    checks = piles_of(decision.checks(decisions, tolerance)) if tolerance else {}
     grains = {
         answer.scene.id: answer.scene
         for asked, answer in decisions.items()
@@ -144,46 +133,43 @@ def settled(study: Study, directory: Path) -> Plan:
             if any(failure(directory / run.name) for run in plan.piles[asked].runs)
         }
         if study.tolerance:
-            answers = plan.decisions, plan.piles, plan.checks
-            done = plan.done(directory)
+            answers, done = (plan.decisions, plan.piles, plan.checks), plan.done(directory)
             more |= decision.overruled(*answers, study.tolerance, directory, done)
         if not more:
             return plan
         above |= more
 
 
-def forecast(study: Study, plan: Plan, missing: Sequence[Case], workers: int) -> Iterator[str]:
+def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
-    yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
+    plan = settled(study, directory)
+    missing = plan.missing(directory).values()
+
+    def number(count: int, noun: str) -> str:
+        return f"{count} {noun}{'' if count == 1 else 's'}"
+
+    def counted(names: Iterable[str]) -> str:
+        return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
+
+    yield f"{study.title}: {number(len(study.scenes), 'scene')}"
     for group in study.groups:
-        regimes = Counter(str(regime_of(scene)) for scene in group.scenes)
-        laws = Counter(scene.forces.law for scene in group.scenes)
+        regimes = counted(str(regime_of(scene)) for scene in group.scenes)
+        laws = counted(scene.forces.law for scene in group.scenes)
+        count = number(len(group.scenes), "scene")
         outside = sum(not law_holds(scene) for scene in group.scenes)
-        yield (
-            f"  {group.name}: {_number(len(group.scenes), 'scene')}; regimes: {_counted(regimes)}; "
-            f"force laws: {_counted(laws)}"
-            + (f"; in {outside} the law does not hold for a single grain" if outside else "")
-        )
-    for why, count in Counter(answer.why for answer in plan.decisions.values()).most_common():
-        yield f"  {count} answered: {why}"
+        note = f"; in {outside} the law does not hold for a single grain" if outside else ""
+        yield f"  {group.name}: {count}; regimes: {regimes}; force laws: {laws}{note}"
+    for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
+        yield f"  {times} answered: {why}"
     todo = Counter(case.kind for case in missing)
-    yield f"{_number(len(plan.cases), 'case')}, {len(missing)} to run"
-    for kind, count in Counter(case.kind for case in plan.cases.values()).items():
-        yield f"  {kind}: {count}, {todo[kind]} to run"
+    yield f"{number(len(plan.cases), 'case')}, {len(missing)} to run"
+    for kind, times in Counter(case.kind for case in plan.cases.values()).items():
+        yield f"  {kind}: {times}, {todo[kind]} to run"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
     runs = max(sum(case.cost_s for case in missing) / workers, max(chains, default=0.0))
     size = sum(BYTES.get(case.kind, OTHER_BYTES) for case in missing)
-    yield (
-        f"expected: about {human(runs + plan.drawing_s)} with {_number(workers, 'worker')}, "
-        f"{human(plan.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
-    )
-
-
-def _number(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
-def _counted(counts: Counter[str]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in counts.most_common())
+    expected = f"about {human(runs + plan.drawing_s)} with {number(workers, 'worker')}"
+    rest = f"{human(plan.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
+    yield f"expected: {expected}, {rest}"

@@ -89,7 +89,7 @@ def run(
     space = Workspace(out.absolute())
     with space.held(EXPERIMENT, name) as folder:
         space.describe(EXPERIMENT, name, list(planned.cases))
-        missing = pipeline.missing(planned, space).items()
+        missing = planned.missing(space.cases).items()
         todo = {key: case for key, case in missing if repeats(space.cases / key)}
         failures = pipeline.complete(todo, space, workers=workers, limit_s=limit_s)
         tables, draw = make(Runs(planned, space.cases, planned.done(space.cases), failures))
