@@ -97,14 +97,14 @@ class Case(ABC):
         """Processes that the solver is run with, and so the cores that it takes."""
         return 1
 
-    def share(self, directory: Path) -> float:
-        """Share of its work that a running case has done, 0 to 1; 0 where that is not known."""
-        return 0.0
-
     @property
     def needs(self) -> tuple["Case", ...]:
         """The cases whose results this one's inputs are made of."""
         return ()
+
+    def share(self, directory: Path) -> float:
+        """Share of its work that a running case has done, 0 to 1; 0 where that is not known."""
+        return 0.0
 
     @abstractmethod
     def write(self, directory: Path, cases: Path) -> None:
@@ -112,13 +112,7 @@ class Case(ABC):
 
     @abstractmethod
     def collect(self, directory: Path) -> None:
-        """Check how the run ended and derive its tables.
-
-        Raises
-        ------
-        SolverError
-            If the results cannot be trusted, whatever the exit code was.
-        """
+        """Derive the tables; SolverError if results cannot be trusted, whatever the exit code."""
 
     @abstractmethod
     def versions(self) -> dict[str, str]:
@@ -145,8 +139,8 @@ class Case(ABC):
 def prepare(case: Case, cases: Path) -> Path:
     """Make the case's directory afresh, inputs and identity, and return it.
 
-    The files that an interrupted run left there are removed: they are never trusted half-written.
-    Other files, also inputs that a user has changed, are kept aside: a solver might read them.
+    The files that a former run left there are removed. Other files, also inputs that a user has
+    changed, are kept aside: a solver might read them.
     """
     cases.mkdir(parents=True, exist_ok=True)
     old = cases / case.name
@@ -173,10 +167,7 @@ def prepare(case: Case, cases: Path) -> Path:
     case.write(directory, cases)
     written = [path for path in directory.rglob("*") if path.is_file()]
     identity = {
-        "id": case.id,
-        "kind": case.kind,
-        "recipe": case.recipe,
-        "template": case.template,
+        **{"id": case.id, "kind": case.kind, "recipe": case.recipe, "template": case.template},
         "template_sha256": template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
@@ -188,9 +179,9 @@ def prepare(case: Case, cases: Path) -> Path:
 
 
 def finish(case: Case, directory: Path, **times: float) -> None:
-    """Mark a case as done: the last file written, with digests of all that it vouches for.
+    """Write the marker, last of all files: digests of the results and tables, and the times, s.
 
-    The times of the run, s, are `solver_s`, `cpu_s` and `wall_s`.
+    The times are `solver_s`, `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
     results, derived = (
         files.digest_files(_matching(directory, patterns), root=directory)
@@ -200,17 +191,10 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     files.write_durably(directory / CHECKSUMS, sums)
     (directory / FAILED).unlink(missing_ok=True)
-    marker = {
-        "id": case.id,
-        "ended": "done",
-        **times,
-        "results_sha256": results,
-        "derived_sha256": derived,
-        "bulky": bulky,
-        "stamps": {name: _stamp(directory / name) for name in {*results, *derived, *bulky}},
-        "bytes": files.size_of(directory),
-    }
-    write_json(directory / DONE, marker)
+    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
+    marker = {"id": case.id, "ended": "done", **times, "bytes": files.size_of(directory)}
+    digests = {"results_sha256": results, "derived_sha256": derived}
+    write_json(directory / DONE, {**marker, **digests, "bulky": bulky, "stamps": stamps})
 
 
 def fail(directory: Path, error: SolverError) -> None:
@@ -230,10 +214,7 @@ def ended(directory: Path) -> tuple[str, str]:
 
 
 def failure(directory: Path) -> str | None:
-    """Why the case in a directory failed, or None if it is not known to have failed.
-
-    The word for its end comes first where it says more than that it failed.
-    """
+    """Why the case in a directory failed, or None if it is not known to have failed."""
     word, cause = ended(directory)
     return (cause if word in ("", SolverError.ended) else f"{word}: {cause}") or None
 
@@ -286,16 +267,14 @@ def prune(case: Case, cases: Path) -> None:
     run that the tables were made of. No link is followed. A disk without any room is no obstacle.
     """
     directory, state = cases / case.name, done_state(case, cases)
-    if state is None:
-        return
-    for path in _matching(directory, tuple(state["bulky"])):
-        path.unlink()
-        with contextlib.suppress(OSError):  # it is not empty
-            os.removedirs(path.parent)
-    marker = directory / DONE
-    size_without_marker = files.size_of(directory) - marker.stat().st_size
-    if state["bytes"] != size_without_marker:
-        write_json(marker, {**state, "bytes": size_without_marker})
+    if state:
+        for path in _matching(directory, state["bulky"]):
+            path.unlink()
+            with contextlib.suppress(OSError):  # it is not empty
+                os.removedirs(path.parent)
+        size_without_marker = files.size_of(directory) - files.size_of(directory / DONE)
+        if state["bytes"] != size_without_marker:
+            write_json(directory / DONE, {**state, "bytes": size_without_marker})
 
 
 def size(directory: Path, state: Mapping[str, Any]) -> int:
@@ -306,19 +285,14 @@ def size(directory: Path, state: Mapping[str, Any]) -> int:
 
 def names_in(cases: Path) -> list[str]:
     """Names of the directories of cases that are there, whichever study asked for them."""
-    try:
-        return sorted(name for name in os.listdir(cases) if NAME.fullmatch(name))
-    except (FileNotFoundError, NotADirectoryError):
-        return []
+    return sorted(path.name for path in cases.glob("*-*") if NAME.fullmatch(path.name))
 
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     """The programs, with versions, that some of the cases in a directory were made with."""
-    versions: dict[str, str] = {}
-    for name in sorted(names):
-        identity = read_json(cases / name / IDENTITY)
-        versions.update(identity.get("programs", {}) if isinstance(identity, dict) else {})
-    return versions
+    identities = (read_json(cases / name / IDENTITY) for name in sorted(names))
+    given = (each.get("programs", {}) for each in identities if isinstance(each, dict))
+    return {program: version for versions in given for program, version in versions.items()}
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -329,7 +303,7 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _matching(directory: Path, patterns: Iterable[str]) -> list[Path]:
     """The files in a directory that fit a pattern; no link is followed."""
-    walked = (Path(path) / file for path, _, names in os.walk(directory) for file in names)
+    walked = (Path(path, name) for path, _, names in os.walk(directory) for name in names)
     paths = (path for path in walked if path.is_file() and not path.is_symlink())
     return sorted(path for path in paths if _fits(path.relative_to(directory).as_posix(), patterns))
 

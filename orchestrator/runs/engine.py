@@ -99,15 +99,8 @@ def execute(
     """Run one case, whose needs are done, to its marker of being done; its time, s.
 
     The solver holds `cores` while it runs, and the wait for them is not counted. `stop` ends the
-    run early; after `limit_s` it counts as hung.
-
-    Raises
-    ------
-    SolverError
-        If the solver died, hung or gave results that cannot be trusted; the case's directory is
-        left for inspection.
-    Interrupted
-        If `stop` was set.
+    run early by Interrupted. SolverError is raised if the solver died, did not end within `limit_s`
+    or gave results that cannot be trusted; the case's directory is left for inspection.
     """
     began = time.monotonic()
     directory = case_states.prepare(case, cases)
@@ -145,13 +138,7 @@ def execute(
 
 
 def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
-    """See that the programs of some cases are where a pool runs them, before any is started.
-
-    Raises
-    ------
-    SolverError
-        Naming what is missing, or too old, and what to install.
-    """
+    """See that the programs of some cases are where a pool runs them; else SolverError."""
     kinds = {case.kind: case for case in cases}.values()
     for future in [pool.executor.submit(case.versions) for case in kinds]:
         try:
@@ -166,7 +153,7 @@ def run(
     report: Callable[[Outcome], None],
     watch: Callable[[Collection[Case]], None] = lambda _: None,
 ) -> dict[str, OrchestratorError]:
-    """Run cases that are not done yet.
+    """Run cases that are not done yet; return those that failed, or need one that did, with why.
 
     A case starts once those that it needs have ended. Of the cases that may start, the one with
     the most expensive chain of cases behind it is the first.
@@ -176,19 +163,9 @@ def run(
     todo : mapping of str to Case
         By name; the needs of each case are either here too or done already.
     pool : Pool
-        Where they run.
+        Where they run; Interrupted is raised if it is stopped.
     report, watch : callable
         Receive the outcome of each case as it ends, and, a few times a second, the cases that run.
-
-    Returns
-    -------
-    dict of str to OrchestratorError
-        The cases that failed, with why; those that need them are among them.
-
-    Raises
-    ------
-    Interrupted
-        If the pool was stopped.
     """
     needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
     behind, chains = dict.fromkeys(todo, 0.0), {}  # costs, s, of the cases that wait for each
@@ -227,19 +204,17 @@ def run(
             )
             watch(running.values())
             for future in ended:
-                settle(_outcome(running.pop(future), future, pool))
+                case = running.pop(future)
+                try:
+                    outcome = Outcome(case, future.result())
+                except Interrupted:
+                    raise
+                except pool.lost as error:
+                    outcome = Outcome(case, error=_loss(error, case.name))
+                except Exception as error:  # a fault in reading a case costs it, not the study
+                    outcome = Outcome(case, error=of_exception(error, case.name))
+                settle(outcome)
     return failed
-
-
-def _outcome(case: Case, future: Future[float], pool: Pool) -> Outcome:
-    try:
-        return Outcome(case, future.result())
-    except Interrupted:
-        raise
-    except pool.lost as error:
-        return Outcome(case, error=_loss(error, case.name))
-    except Exception as error:  # a fault in the reading of one case costs that case, not the study
-        return Outcome(case, error=of_exception(error, case.name))
 
 
 def _loss(error: Exception, where: str) -> SolverError:

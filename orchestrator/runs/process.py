@@ -15,20 +15,18 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
 from orchestrator.errors import Interrupted, SolverError
 
-GRACE_S = 2.0
-"""Time between SIGTERM and SIGKILL."""
-POLL_S = 0.1
+POLL_S, GRACE_S = 0.1, 2.0
+"""Time between two looks at a program, and between SIGTERM and SIGKILL."""
 DISK_S = 5.0
 """Time between two looks at the space on the disk; a program is ended if two find it full."""
 TRIES = 3
 """Runs of a program that is killed from outside. One killed three times is out of memory, say."""
-QUERY_S = 30.0
-"""Time limit of a program that is asked for its version, s."""
-QUERY_BYTES = 1_000_000
+QUERY_S, QUERY_BYTES = 30.0, 1_000_000
+"""Limits of a program that is asked for its version."""
 TAIL = 2**16
 """Part of a log in which its last line is looked for, bytes: a log may be of any size."""
 _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
@@ -47,18 +45,11 @@ holds: a process beside the program reads it, and kills the group when the drive
 
 @dataclass(frozen=True)
 class Ended:
-    """How a program ended.
+    """How a program ended: `returncode` as `subprocess` gives it, and `seconds` of wall time.
 
-    Attributes
-    ----------
-    returncode : int
-        As `subprocess` gives it: negative where a signal ended the program.
-    seconds, cpu_s : float
-        Wall time; processor time of the program and all that it waited for, 0 if it was killed, s.
-    over : str
-        The limit at which it was killed: "time", "output" or "disk"; empty if it ended by itself.
-    peak_mib : float
-        Memory of its largest process, MiB; 0 if it was killed.
+    `over` is the limit at which it was killed, "time", "output" or "disk", or empty. `cpu_s` is the
+    processor time of the program and all that it waited for, s, and `peak_mib` the memory of its
+    largest process, MiB; both are 0 if it was killed.
     """
 
     returncode: int
@@ -91,21 +82,14 @@ def run(
         The program and its arguments; no shell reads them.
     cwd, log : Path
         Working directory; file that takes both output streams.
-    limit_s : float
-        Limit of wall time, s.
+    limit_s, output_limit, file_limit : float, optional
+        Limits of wall time, s, of the log's size and of that of any file that is written, bytes.
     stop : threading.Event, optional
-        Set by another thread to end the program early.
+        Set by another thread to end the program early: then Interrupted is raised.
     env : mapping, optional
         Added to this process's environment; None removes a variable.
-    output_limit, file_limit : int, optional
-        Limits of the log's size and of that of each file that the program writes, bytes.
     tries : int, optional
         Number of runs in all if the program is killed from outside; it must start afresh each time.
-
-    Raises
-    ------
-    Interrupted
-        If `stop` was set; the program has ended by then.
     """
     # OpenFOAM takes its case directory from PWD, not from getcwd; a relative PATH would be
     # another one in another working directory
@@ -114,7 +98,8 @@ def run(
     blocks = "" if file_limit is None else str(file_limit // 512)
     for _ in range(tries):
         began, over, cpu_s, peak_mib = time.monotonic(), "", 0.0, 0.0
-        with log.open("wb") as stream:
+        looked, was_full = began, False
+        with log.open("wb") as stream, contextlib.ExitStack() as stack:
             process = subprocess.Popen(
                 ["sh", "-c", _GUARD, "sh", blocks, *command],
                 cwd=cwd,
@@ -124,52 +109,31 @@ def run(
                 start_new_session=True,
                 env={name: value for name, value in given.items() if value is not None},
             )
-            try:
-                over = _wait(process, began + limit_s, stop, stream, output_limit, cwd)
-                if not over:
-                    _, status, usage = os.wait4(process.pid, 0)
-                    process.returncode = os.waitstatus_to_exitcode(status)
-                    cpu_s, peak_mib = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
-            finally:
-                _end_group(process)
+            stack.callback(_end_group, process)
+            end, handle = select.poll(), os.pidfd_open(process.pid)
+            stack.callback(os.close, handle)
+            end.register(handle, select.POLLIN)  # at the end: no core is spent on asking
+            while not over and not end.poll(1000 * POLL_S):
+                if stop is not None and stop.is_set():
+                    raise Interrupted("stopped", remedy="the same command continues")
+                now = time.monotonic()
+                if now > began + limit_s:
+                    over = "time"
+                elif os.fstat(stream.fileno()).st_size > output_limit:
+                    over = "output"
+                elif now > looked + DISK_S:
+                    looked, before, was_full = now, was_full, _is_full(cwd)
+                    over = "disk" if before and was_full else ""
+            if not over:
+                _, status, usage = os.wait4(process.pid, 0)
+                process.returncode = os.waitstatus_to_exitcode(status)
+                cpu_s, peak_mib = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
         ended = Ended(process.returncode, time.monotonic() - began, cpu_s, over, peak_mib)
         # a shell reports 128 + n of a program that signal n ended
         code = -ended.returncode if ended.returncode < 0 else ended.returncode - 128
         if over or code not in _OUTSIDE:
             break
     return ended
-
-
-def _wait(
-    process: "subprocess.Popen[bytes]",
-    deadline: float,
-    stop: threading.Event | None,
-    log: BinaryIO,
-    output_limit: float,
-    cwd: Path,
-) -> str:
-    """Wait until a program has ended, or return the limit that it has reached."""
-    looked, was_full = time.monotonic(), False
-    handle = os.pidfd_open(process.pid)  # becomes ready at the end: no core is spent on asking
-    try:
-        end = select.poll()
-        end.register(handle, select.POLLIN)
-        while not end.poll(1000 * POLL_S):
-            if stop is not None and stop.is_set():
-                raise Interrupted("stopped", remedy="the same command continues")
-            now = time.monotonic()
-            if now > deadline:
-                return "time"
-            if os.fstat(log.fileno()).st_size > output_limit:
-                return "output"
-            if now > looked + DISK_S:
-                is_full = _is_full(cwd)
-                if is_full and was_full:
-                    return "disk"
-                looked, was_full = now, is_full
-    finally:
-        os.close(handle)
-    return ""
 
 
 def _is_full(folder: Path) -> bool:

@@ -7,7 +7,6 @@ import os
 import socket
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,22 +27,17 @@ NAMED = 5
 
 
 class Kind(NamedTuple):
-    """A kind of directory that this program writes.
-
-    `word` names its contents, such as "study". The JSON file `marker` states them, with "kind" and
-    "name". `option` is how another directory is chosen.
-    """
+    """A kind of contents, and the JSON file of a directory that states their kind and name."""
 
     word: str
     marker: str
-    option: str = " with --out"
 
 
 STUDY = Kind("study", "study.json")
 EXPERIMENT = Kind("experiment", STUDY.marker)
 RESULTS = Kind("benchmark of the solver", "benchmark.json")
 COMPARISON = Kind("comparison with the pack", RESULTS.marker)
-PACK = Kind("benchmark pack", "manifest.json", " as PACK")
+PACK = Kind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
@@ -53,16 +47,9 @@ MARKERS = (STUDY.marker, STATE)
 
 @contextlib.contextmanager
 def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[Folder]:
-    """Make a directory, or take it up again, and hold it while the block runs.
+    """Make a directory for contents of a kind and a name, and hold it while the block runs.
 
-    Parameters
-    ----------
-    root : Path
-        The directory: new, empty, or of the same kind and name.
-    kind, name : Kind, str
-        Kind and name of its contents: the name of a study, or the solver of results.
-    new : bool, optional
-        Whether a directory without a marker gets one.
+    It may also be empty, or hold these contents already. Without a marker it gets one if `new`.
 
     Raises
     ------
@@ -82,8 +69,8 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
             stack.enter_context(_held(folder.path(LOCK)))
         except OSError as error:
             what = f"the output directory cannot be used: {error.strerror or error}"
-            remedy = f"choose another{kind.option}"
-            raise InputError(what, where=str(error.filename or root), remedy=remedy) from None
+            where = str(error.filename or root)
+            raise InputError(what, where, remedy="choose another one: --out") from None
         _check(folder, kind, name)  # another process may have been first
         if new and read_marker(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
@@ -116,7 +103,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
                 holds = "the output directory holds something that is not a"
                 what = what or f"{holds} {kind.word}: {path.name}"
     if what:
-        raise InputError(what, str(root), f"choose an empty or a new one{kind.option}")
+        raise InputError(what, str(root), remedy="choose an empty or a new one: --out")
     for place in (LOCK, RECORD, kind.marker, "cases", *folder.written()):
         folder.path(place)
 
@@ -144,37 +131,15 @@ def _held(path: Path) -> Iterator[None]:
             lock.release()
 
 
-@dataclass(frozen=True)
-class Workspace:
-    """The directory that holds one study's cases, tables, figures and page."""
+class Workspace(Folder):
+    """The directory that holds one study's cases, tables, figures and page.
 
-    root: Path
+    `cases` has the directories of the cases, and `drawn` is the file `STATE`.
+    """
 
-    @property
-    def folder(self) -> Folder:
-        """The way for files into it."""
-        return Folder(self.root)
-
-    @property
-    def cases(self) -> Path:
-        """The directory of the case directories."""
-        return self.root / "cases"
-
-    @property
-    def page(self) -> Path:
-        """The page."""
-        return self.root / "report.html"
-
-    @property
-    def drawn(self) -> Path:
-        """The file `STATE`."""
-        return self.root / STATE
-
-    def held(
-        self, kind: Kind, name: str, *, new: bool = True
-    ) -> contextlib.AbstractContextManager[Folder]:
-        """Hold the directory, as `claimed` does."""
-        return claimed(self.root, kind, name, new=new)
+    def __init__(self, root: Path) -> None:
+        super().__init__(root)
+        self.cases, self.page, self.drawn = root / "cases", root / "report.html", root / STATE
 
     def is_held(self) -> bool:
         """Whether a running process holds the study; nothing is written."""
@@ -190,7 +155,7 @@ class Workspace:
         whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
         value = {**whose, **about, "cases": cases}
         if read_marker(self.root, kind) != value:
-            self.folder.put(kind.marker, text_of(value))
+            self.put(kind.marker, text_of(value))
 
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote; InputError if the directory holds no study."""
@@ -207,13 +172,7 @@ class Workspace:
         return tuple(name for name in names_in(self.cases) if name not in asked)
 
     def check_cases_of_tables(self, done: Container[str]) -> None:
-        """Refuse to replace tables whose cases are not all done: new ones would lack results.
-
-        Raises
-        ------
-        OrchestratorError
-            With the number of these cases.
-        """
+        """Refuse (OrchestratorError) to replace tables whose cases are not all done."""
         table = self.root / "timings" / "timings.csv"
         if not table.is_file():
             return
@@ -230,13 +189,7 @@ class Workspace:
 
 
 def status(directory: Path) -> tuple[str, bool]:
-    """How far a study came, for people, and whether a case has failed; from its directory alone.
-
-    Raises
-    ------
-    InputError
-        If the directory holds no study.
-    """
+    """How far a study came, for people, and whether a case has failed; from its directory alone."""
     space = Workspace(directory.absolute())
     about, is_running = space.description(), space.is_held()
     there = {name: read_json(space.cases / name / DONE) for name in names_in(space.cases)}
