@@ -154,7 +154,7 @@ def open(directory: str | Path) -> "Opened":
     """
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
-    return Opened(Results(asked, planned, tables.read(space.folder, "tables"), space.cases))
+    return Opened(Results(asked, planned, tables.read(space, "tables"), space.cases))
 
 
 class Opened:

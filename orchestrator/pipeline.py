@@ -17,7 +17,7 @@ from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
 from orchestrator.runs.progress import Display, Forecast
-from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, read_marker
+from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, claimed, read_marker
 from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
@@ -61,7 +61,7 @@ def run(
     """
     plan.make(study)  # what cannot be answered is refused before anything is written
     space = Workspace(out.absolute())
-    with space.held(STUDY, study.name):
+    with claimed(space.root, STUDY, study.name):
         planned = plan.settled(study, space.cases)
         changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
@@ -77,7 +77,7 @@ def run(
         marker = read_json(space.drawn)
         answer = marker.get("answer") if isinstance(marker, dict) else None
         is_drawn = marker == {**_drawn_of(study, planned, space), "answer": answer}
-        if started or not is_drawn or not space.folder.is_whole(MARKERS):
+        if started or not is_drawn or not space.is_whole(MARKERS):
             failures = {name: error for name, error in failures.items() if name in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
             answer = _draw(study, planned, space, states, failures, guests)
@@ -147,7 +147,7 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
-    with space.held(STUDY, study.name, new=False):
+    with claimed(space.root, STUDY, study.name, new=False):
         states = planned.done(space.cases)
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name) for name in planned.cases}
@@ -160,7 +160,7 @@ def prune(directory: Path) -> str:
     """Drop the large files of finished cases, but for those that the page is drawn from."""
     space = Workspace(directory.absolute())
     study, planned = reopen(space)
-    with space.held(STUDY, study.name, new=False):
+    with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = {case.name for case in report.drawn_from(study, planned, made, space.cases)}
@@ -179,20 +179,20 @@ def _draw(
 
     The states are those of the cases that are done, by name, as `Plan.done` gives them.
     """
-    space.folder.drop(STATE)
+    space.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
     results = tables.make(study, planned, space.cases, states)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-    with space.folder.renewed(but=MARKERS):
-        tables.write(results, space.folder, "tables")
-        tables.write({"timings": times}, space.folder, "timings")
-        report.write(study, planned, results, times, causes, space.folder, guests)
+    with space.renewed(but=MARKERS):
+        tables.write(results, space, "tables")
+        tables.write({"timings": times}, space, "timings")
+        report.write(study, planned, results, times, causes, space, guests)
     answer = report.said(study, planned, results, space.cases)
     if not failures:
         terminal.check()
         marker = {**_drawn_of(study, planned, space), "answer": answer}
-        space.folder.put(STATE, text_of(marker))
+        space.put(STATE, text_of(marker))
     return answer
 
 
@@ -200,4 +200,4 @@ def _drawn_of(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
     """Digests of all that the tables and figures are made of, and of them."""
     cases = [case.id for case in planned.cases.values()]
     made_of = [__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases]
-    return {"of": digest_text(canonical_json(made_of)), "sha256": space.folder.written(MARKERS)}
+    return {"of": digest_text(canonical_json(made_of)), "sha256": space.written(MARKERS)}

@@ -93,7 +93,7 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
     _check(asked, planned, source)
     if not space.drawn.is_file():
         raise InputError("the study is not finished", where=str(source), remedy="run it to its end")
-    times = tables.read(space.folder, "timings")["timings"].set_index("case")["solver_s"]
+    times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
     if set(times.index) != set(planned.cases):
         raise InputError(
             "the study was run by another version of the program: its cases are others",
@@ -101,7 +101,7 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
             remedy="run it again",
         )
     kinds = [kind for kind, one in KINDS.items() if one.level in (levels or LEVELS)]
-    results = tables.read(space.folder, "tables")
+    results = tables.read(space, "tables")
     sharing = {one.name: len(one.scenes) for one in planned.cells}
 
     def timed() -> Iterator[Problem]:

@@ -17,7 +17,7 @@ from orchestrator.report import document, settings
 from orchestrator.report.document import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs.case import programs
-from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace
+from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace, claimed
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.tables import text
@@ -87,7 +87,7 @@ def run(
         Whether a case that failed, by its directory, is run again.
     """
     space = Workspace(out.absolute())
-    with space.held(EXPERIMENT, name) as folder:
+    with claimed(space.root, EXPERIMENT, name) as folder:
         space.describe(EXPERIMENT, name, list(planned.cases))
         missing = planned.missing(space.cases).items()
         todo = {key: case for key, case in missing if repeats(space.cases / key)}

@@ -16,7 +16,7 @@ from orchestrator.benchmark.export import export
 from orchestrator.benchmark.pack import COLUMNS
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
-from orchestrator.runs.workspace import STUDY, Workspace
+from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from tests.benchmark.conftest import ROOT
@@ -299,7 +299,7 @@ def test_beds_that_no_pack_holds_are_refused(fields: str, named: str, tmp_path: 
     text += 'protocol.method = "dem"\nflow.first_cell_height = 1e-3\n'
     space = Workspace(tmp_path)
     space.root.mkdir(exist_ok=True)
-    with space.held(STUDY, "held"):
+    with claimed(space.root, STUDY, "held"):
         space.describe(STUDY, "held", [], study=text, tolerance=None)
     with pytest.raises(InputError, match=named):
         export(tmp_path / "pack", tmp_path, ())

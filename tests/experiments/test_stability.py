@@ -15,7 +15,7 @@ from orchestrator.experiments import stability, stability_figures
 from orchestrator.experiments.experiment import Runs
 from orchestrator.experiments.stability import NOTICED, Map
 from orchestrator.fidelity import calibration, limits
-from orchestrator.runs.workspace import EXPERIMENT, Workspace
+from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 
 ALL = stability.load_all()
 SMALL = """
@@ -49,7 +49,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     one = stability.load(path)
     planned = stability.planned_for([one])
     space = Workspace(tmp_path / "out")
-    with space.held(EXPERIMENT, "stability"):
+    with claimed(space.root, EXPERIMENT, "stability"):
         pipeline.complete(planned.missing(space.cases), space, workers=2, limit_s=120)
     runs = Runs(planned, space.cases, planned.done(space.cases), {})
     good, bad = stability.judge(one, runs).sort_values("x").to_dict("records")

@@ -17,7 +17,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, Worn
 from orchestrator.report import bed
 from orchestrator.report.results import Results
-from orchestrator.runs.workspace import STUDY, Workspace
+from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.parts import Grain
 from orchestrator.study.profile import Profile
@@ -64,7 +64,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     space = Workspace(tmp_path_factory.mktemp("wear") / "out")
     asked = study.parse(PILE.format(more=METHODS), name="wear", where="test")
     planned = plan.make(asked)
-    with space.held(STUDY, "wear"):
+    with claimed(space.root, STUDY, "wear"):
         assert not pipeline.complete(planned.cases, space, workers=2, limit_s=600.0)
     made = tables.make(asked, planned, space.cases, planned.done(space.cases))
     return Results(asked, planned, made, space.cases)
@@ -246,7 +246,7 @@ def test_what_a_bed_that_changes_needs(change: str, word: str) -> None:
 def test_a_pack_takes_no_bed_that_changes(tmp_path: Path) -> None:
     text = PILE.format(more="update = 0.25")
     space = Workspace(tmp_path / "study")
-    with space.held(STUDY, "one"):
+    with claimed(space.root, STUDY, "one"):
         space.describe(STUDY, "one", [], study=text, tolerance=None)
     with pytest.raises(InputError, match=r"protocol\.update"):
         export.export(tmp_path / "pack", space.root, ())
