@@ -189,21 +189,19 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-def write_mesh(directory: Path) -> None:
-    """Mesh a case: `pile.geo` with the files that it includes becomes `pile.msh`, ASCII 2.2.
+def write_mesh(directory: Path) -> Any:
+    """Mesh a case: `pile.geo` with the files that it includes becomes `pile.msh`, binary.
 
     The mesh must hold hexahedra only, none of them inverted, and the physical groups in `GROUPS`.
-
-    Parameters
-    ----------
-    directory : Path
-        The case; any thread may call, one at a time makes its mesh.
+    Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`.
 
     Raises
     ------
     SolverError
         If gmsh fails, or the mesh is not such a one.
     """
+    import meshio
+
     try:
         import gmsh
     except OSError as error:
@@ -215,30 +213,26 @@ def write_mesh(directory: Path) -> None:
         # the default installs a signal handler, which only the main thread may
         gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
         try:
-            if fault := _meshed(gmsh, directory):
-                raise SolverError(
-                    f"no usable mesh: {fault}",
-                    where=str(directory / "pile.msh"),
-                    remedy="check the slope, the height and the first cell in parameters.geo",
-                )
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.open(str(directory / "pile.geo"))
+            gmsh.model.mesh.generate(3)
+            names = {gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()}
+            if missing := GROUPS - names:
+                raise ValueError(f"without the physical groups {sorted(missing)}")
+            if list(gmsh.model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
+                raise ValueError("not of hexahedra only")
+            tags = gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[0]
+            if (gmsh.model.mesh.getElementQualities(tags, "minDetJac") <= 0).any():
+                raise ValueError("with inverted cells")
+            gmsh.option.setNumber("Mesh.Binary", 1)
+            gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
             gmsh.write(str(directory / "pile.msh"))
+        except Exception as error:  # gmsh raises nothing narrower
+            raise SolverError(
+                f"no usable mesh: {error}",
+                where=str(directory / "pile.msh"),
+                remedy="check the slope, the height and the first cell in parameters.geo",
+            ) from error
         finally:
             gmsh.finalize()
-
-
-def _meshed(gmsh: Any, directory: Path) -> str:
-    """Mesh a case in gmsh's memory; the fault of the mesh, empty if there is none."""
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(directory / "pile.geo"))
-        gmsh.model.mesh.generate(3)
-    except Exception as error:  # gmsh raises nothing narrower
-        return f"gmsh failed: {error}"
-    names = {gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()}
-    if missing := GROUPS - names:
-        return f"without the physical groups {sorted(missing)}"
-    if list(gmsh.model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
-        return "not of hexahedra only"
-    tags = gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[0]
-    inverted = np.count_nonzero(gmsh.model.mesh.getElementQualities(tags, "minDetJac") <= 0)
-    return f"with {inverted} inverted cells" if inverted else ""
+    return meshio.read(directory / "pile.msh")

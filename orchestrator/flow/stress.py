@@ -22,6 +22,8 @@ within this part of it: seven digits of the places make 1e-5 of it, a bend of 10
 APPROACH_ERROR = 0.08
 """Largest relative difference of u* in the column before the inlet from the log law's: k-epsilon is
 within 0.02, other models, whose log law is another, are within 0.07."""
+MEAN_SPEED_ERROR = 0.1
+"""Largest relative difference of a channel's mean speed, before the inlet, from the log law's."""
 SEPARATES_FROM_DEG = 15.0
 """Slope from which the flow always separates behind the crest, and reattaches 5 to 9 h from it."""
 SHORTEST_BUBBLE = 5.0
@@ -179,6 +181,7 @@ def diagnostics(
     height: float,
     roughness: float,
     reynolds: float,
+    mean_speed: float | None = None,
 ) -> pd.DataFrame:
     """A few numbers of a solved flow beside the ranges in which sound flows have them.
 
@@ -186,8 +189,8 @@ def diagnostics(
     ----------
     stress : WallStress
         The stress of the solved flow.
-    approach : float
-        Friction velocity before the inlet over that of the log law.
+    approach, mean_speed : float
+        Friction velocity before the inlet, and mean speed of a channel, over that of the log law.
     slope_deg, height, roughness : float
         Slope of the pile, degrees; its height and roughness length, m.
     reynolds : float
@@ -196,7 +199,7 @@ def diagnostics(
     Returns
     -------
     DataFrame
-        With ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no, for each
+        With ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no (NaN is not), for each
         ``quantity`` of the index.
     """
     centre = float(np.median(stress.z_e_m))
@@ -208,14 +211,11 @@ def diagnostics(
         "approach_ustar_over_log_law": (approach, 1 - APPROACH_ERROR, 1 + APPROACH_ERROR),
         "reattachment_over_h": (reattachment(stress, height), shortest, inf),
     }
-    return judged(pd.DataFrame.from_dict(rows, orient="index", columns=RANGE))
-
-
-RANGE = ["value", "sound_from", "sound_to"]
-
-
-def judged(table: pd.DataFrame) -> pd.DataFrame:
-    """Diagnostics with the column ``sound``: whether the value is in its range; NaN is not."""
+    if mean_speed is not None:
+        channel = (mean_speed, 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR)
+        rows["mean_speed_over_log_law"] = channel
+    columns = ["value", "sound_from", "sound_to"]
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     sound = table["value"].between(table["sound_from"], table["sound_to"])
     return table.assign(sound=np.where(sound, "yes", "no")).rename_axis("quantity")
 

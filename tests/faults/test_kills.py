@@ -158,7 +158,7 @@ def test_the_whole_session_is_asked_to_end(pile: Bench) -> None:
     pile.check_finished()
 
 
-SOLVERS = {"gmshToFoam": "flow", "simpleFoam": "flow", "liggghts": "pile"}
+SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
 """The solvers of a study in their order, by the kind of their case."""
 
 

@@ -15,7 +15,8 @@ import pytest
 
 from orchestrator.bed.line import between_flats
 from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase, SolvedFlow, set_values
+from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase, set_values
+from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import APPROACH_ERROR, WallStress, reattachment
 from orchestrator.runs import case, process
 from orchestrator.solvers import openfoam

@@ -12,7 +12,7 @@ import pytest
 from orchestrator.bed.line import triangle
 from orchestrator.errors import InputError, SolverError
 from orchestrator.flow import theory
-from orchestrator.flow.case import SolvedFlow
+from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import WallStress, bubble, diagnostics, reattachment
 from orchestrator.types import FloatArray
 

@@ -1,4 +1,4 @@
-// The mesh over bed_line.geo. After a change: gmsh -3 pile.geo. SI units.
+// The mesh over bed_line.geo; after a change see README.md. SI units.
 slope_deg = 15.0;        // of the windward faces; 0 if there are none, degrees
 height = 0.02;           // of the forms, m
 lid = 2.0;               // height of the lid above the flat bed; lidHeight of parameters, m

@@ -1,0 +1,221 @@
+"""Mesh and fields as files of OpenFOAM: written before a run, read after it."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.errors import SolverError
+from orchestrator.flow.stress import WallStress
+from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.solvers.openfoam import read_numbers
+from orchestrator.types import FloatArray, IntArray
+
+SIDES = np.array(
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)
+"""Corners of the sides of a hexahedron, seen from outside against the clock."""
+_HEAD = "FoamFile\n{{\n    version 2.0;\n    format ascii;\n    class {};\n    object {};\n}}\n\n"
+_END = "// ***"
+_WITHOUT_BRACKETS = str.maketrans("()", "  ")
+
+
+def listed(values: FloatArray | IntArray, item: str) -> str:
+    """A list with an item of a format such as ``"(%.10g %.10g %.10g)"`` for each value or row."""
+    text = f"{item}\n" * len(values) % tuple(values.ravel().tolist())
+    return f"{len(values)}\n(\n{text})\n"
+
+
+def read_list(path: Path, after: str = "") -> FloatArray:
+    """The first list of a file, or the first behind some text, shape (n, numbers of an item).
+
+    Raises
+    ------
+    SolverError
+        If the file is missing or not whole.
+    """
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
+    if start < 0 or _END not in text[-100:]:
+        what = f"the results are not whole: {path.name}"
+        raise SolverError(what, where=str(path), remedy="is the disk full? Run the case again")
+    count = int(text[:start].rsplit(maxsplit=1)[-1])
+    numbers = text[start + 3 : text.find("\n)", start)].translate(_WITHOUT_BRACKETS)
+    return np.fromstring(numbers, sep=" ").reshape(count, -1)
+
+
+def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
+    """Write the ``constant/polyMesh`` of a case from a mesh of hexahedra one cell thick.
+
+    Parameters
+    ----------
+    mesh : meshio.Mesh
+        Its physical surfaces become the patches; ``bed`` has one face for each column of cells.
+    directory : Path
+        The case.
+    types : mapping
+        Types of the patches, with the entries that belong to them; "patch" if not named.
+
+    Returns
+    -------
+    ndarray, shape (columns, cells of a column)
+        Height of the middles of the cells in their order, m: downstream, in a column upwards.
+    """
+    points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
+    tags = mesh.cell_data_dict["gmsh:physical"]["quad"]
+    x, _, z = points[cells].mean(axis=1).T
+    columns = np.argsort(x).reshape(np.count_nonzero(tags == mesh.field_data["bed"][0]), -1)
+    columns = np.take_along_axis(columns, np.argsort(z[columns], axis=1), axis=1)
+    faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4).astype(np.int64)
+    owner = np.repeat(np.arange(len(cells)), len(SIDES))
+
+    def key(corners: IntArray) -> IntArray:
+        """A number for the lowest three corners, which no other side has."""
+        a, b, c, _ = np.sort(corners, axis=1).T
+        return np.asarray((a * len(points) + b) * len(points) + c)
+
+    keys = key(faces)
+    order = np.argsort(keys, kind="stable")
+    twins = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    inner, outer = order[twins], order[twins + 1]
+    inside = np.lexsort((owner[outer], owner[inner]))  # as OpenFOAM orders the faces of cells
+    chosen, neighbour = [inner[inside]], owner[outer[inside]]
+    on_patches = order[np.searchsorted(keys[order], key(quads.astype(np.int64)))]
+    patches, start = [], len(neighbour)
+    for name, (tag, dimension) in mesh.field_data.items():
+        if dimension == 2:
+            chosen.append(np.sort(on_patches[tags == tag]))
+            entries = f"type {types.get(name, 'patch')}; nFaces {len(chosen[-1])}"
+            patches.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
+            start += len(chosen[-1])
+    at = np.concatenate(chosen)
+    (directory / "constant/polyMesh").mkdir(parents=True)
+    for name, kind, text in (
+        ("points", "vectorField", listed(points, "(%.15g %.15g %.15g)")),
+        ("faces", "faceList", listed(faces[at], "4(%d %d %d %d)")),
+        ("owner", "labelList", listed(owner[at], "%d")),
+        ("neighbour", "labelList", listed(neighbour, "%d")),
+        ("boundary", "polyBoundaryMesh", f"{len(patches)}\n(\n{''.join(patches)})\n"),
+    ):
+        whole = f"{_HEAD.format(kind, name)}{text}\n{_END}\n"
+        (directory / "constant/polyMesh" / name).write_text(whole, encoding="utf-8")
+    return np.asarray(z[columns])
+
+
+def start_from(path: Path, values: FloatArray) -> None:
+    """Let a field in ``0/`` start from a value or a vector of each cell."""
+    vector = values.ndim > 1
+    kind, item = ("vector", "(%.10g %.10g %.10g)") if vector else ("scalar", "%.10g")
+    text = path.read_text(encoding="utf-8")
+    field = f"internalField nonuniform List<{kind}>\n{listed(values, item)};"
+    path.write_text(re.sub(r"internalField [^;]+;", lambda _: field, text), encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class SolvedFlow:
+    """The last iteration of an OpenFOAM case that `Allrun` has run in.
+
+    The approaching flow develops in the column before the inlet, on the rows of the mesh.
+
+    Raises
+    ------
+    SolverError
+        By each method and property, if the case holds no results, or a file of it is not whole.
+    """
+
+    directory: Path
+
+    def field(self, name: str, patch: str = "") -> FloatArray:
+        """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""
+        path = next(self.directory.glob(f"[1-9]*/{name}"), None)
+        if path is None:
+            where = str(self.directory)
+            raise SolverError("no results", where=where, remedy="run ./Allrun there")
+        return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
+
+    @cached_property
+    def _mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells."""
+        folder = self.directory / "constant/polyMesh"
+        corners = read_list(folder / "points")[read_list(folder / "faces").astype(int)[:, 1:]]
+        owner, neighbour = (
+            read_list(folder / name).astype(int)[:, 0] for name in ("owner", "neighbour")
+        )
+        # the mean of a hexahedron's corners is that of the means of its sides
+        middles = np.zeros((owner.max() + 1, 3))
+        np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))
+        np.add.at(middles, neighbour, corners[: len(neighbour)].mean(axis=1) / len(SIDES))
+        boundary = (folder / "boundary").read_text(encoding="utf-8")
+        match = re.search(r"\bbed\b[^}]*nFaces\s+(\d+);\s+startFace\s+(\d+);", boundary)
+        if match is None:
+            raise SolverError("a mesh without a bed", where=str(folder), remedy="mesh it again")
+        count, start = map(int, match.groups())
+        bed = slice(start, start + count)
+        return corners[bed], owner[bed], middles
+
+    @property
+    def middles(self) -> FloatArray:
+        """Middles of the cells, m, shape (n, 3)."""
+        return self._mesh[2]
+
+    @cached_property
+    def _numbers(self) -> dict[str, float]:
+        return read_numbers(self.directory / "parameters")
+
+    def stress(self) -> WallStress:
+        """Stress along the bed; u*_0 is that of the column before the inlet."""
+        velocity, z0 = self.field("U"), self._numbers["roughnessLength"]
+        corners, cells, middles = self._mesh
+        # faces in the order of the flow, each with its two upstream corners first
+        order = np.argsort(corners[..., 0].mean(axis=1))
+        across = np.argsort(corners[order, :, 0], axis=1)[..., None]
+        corners = np.take_along_axis(corners[order], across, axis=1)
+        starts, ends = corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
+        centres, lengths = (starts + ends) / 2.0, np.linalg.norm(ends - starts, axis=1)
+        tangents = (ends - starts) / lengths[:, None]
+        toe = int(np.argmin(np.abs(starts[:, 0])))
+        s = np.cumsum(lengths) - lengths[:toe].sum() - lengths / 2.0
+        normals = np.column_stack([-tangents[:, 2], np.zeros(len(s)), tangents[:, 0]])
+        above = cells[order]
+        z_e = np.vecdot(middles[above] - centres, normals)
+        u_t = np.vecdot(velocity[above], tangents)
+        # OpenFOAM's is the stress of the bed on the flow
+        tau = -np.vecdot(self.field("wallShearStress", "bed")[order], tangents)
+        if not tau[0] > 0:
+            raise SolverError("no flow in the column before the inlet", where=str(self.directory))
+        ustar0, bed_of_study = float(np.sqrt(tau[0])), slice(1, None)
+        columns = {
+            "s_m": s,
+            "x_m": centres[:, 0],
+            "z_m": centres[:, 2],
+            "length_m": lengths,
+            "z_e_m": z_e,
+            "tau_wall": tau / ustar0**2,
+            "ustar_over_ustar0_eq10": log_law_ustar(u_t, z_e, z0) / ustar0,
+            "ustar_over_ustar0_eq10_printed": log_law_ustar(u_t, z_e, z0, printed=True) / ustar0,
+        }
+        return WallStress(**{name: values[bed_of_study] for name, values in columns.items()})
+
+    def approach_ustar(self) -> float:
+        """Friction velocity in the column before the inlet over that of the log law.
+
+        It is 1 but for the difference that the rows of the mesh make to the log law.
+        """
+        (corners, _, _), numbers = self._mesh, self._numbers
+        first = int(np.argmin(corners[..., 0].mean(axis=1)))
+        tau = -float(self.field("wallShearStress", "bed")[first, 0])
+        law = [numbers[name] for name in ("freeStream", "speedHeight", "roughnessLength")]
+        return float(np.sqrt(max(tau, 0.0)) / log_law_ustar(*law))
+
+    def column_speed(self) -> float:
+        """Mean speed in the column before the inlet, m/s."""
+        x, z = self.middles[:, 0], self.middles[:, 2]
+        column = np.flatnonzero(x < x.min() + 1e-6 * np.ptp(x))
+        column = column[np.argsort(z[column])]
+        points = read_list(self.directory / "constant/polyMesh/points")
+        levels = np.sort(points[points[:, 0] <= points[:, 0].min() + 1e-9, 2])[::2]
+        return float(np.average(self.field("U")[column, 0], weights=np.diff(levels)))
