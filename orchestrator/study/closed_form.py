@@ -41,29 +41,14 @@ _CACHE: dict[tuple[str, tuple[float, ...]], Threshold] = {}
 
 def single_grain(scene: Scene) -> SingleGrain:
     """The grain of a scene; its entrainment angle is that of the pocket that it lies in."""
-    return SingleGrain(
-        diameter=scene.grain.diameter,
-        roughness=scene.bed.roughness,
-        fluid_density=scene.fluid.density,
-        viscosity=scene.fluid.viscosity,
-        lift_coefficient=scene.forces.lift_coefficient,
-        density=scene.grain.density,
-        slope_deg=scene.bed.slope_deg,
-        entrainment_angle_deg=scene.pocket_angle_deg,
-        gravity=scene.fluid.gravity,
-    )
+    grain, bed, fluid = scene.grain, scene.bed, scene.fluid
+    flow = (bed.roughness, fluid.density, fluid.viscosity, scene.forces.lift_coefficient)
+    pivot = (grain.density, bed.slope_deg, scene.pocket_angle_deg, fluid.gravity)
+    return SingleGrain(grain.diameter, *flow, *pivot)
 
 
 def thresholds(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold]:
-    """The thresholds of grains under a force law, each of shape ().
-
-    Parameters
-    ----------
-    name : str
-        The force law.
-    grains : sequence of SingleGrain
-        Tuples of the same numbers will do.
-    """
+    """The thresholds of grains (as `SingleGrain`) under a force law, each of shape ()."""
     keys = [(name, tuple(grain)) for grain in grains]
     if new := [key for key in dict.fromkeys(keys) if key not in _CACHE]:
         columns = np.array([grain for _, grain in new]).T
@@ -87,9 +72,8 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
-    answers = thresholds(scene.forces.law, grains)
-    each = np.array([answer.friction_velocity for answer in answers], float)
-    return np.asarray(np.nan_to_num(each, nan=0.0, posinf=np.inf)[place])
+    each = [answer.friction_velocity for answer in thresholds(scene.forces.law, grains)]
+    return np.asarray(np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf)[place])
 
 
 def forces(
@@ -97,14 +81,8 @@ def forces(
 ) -> tuple[Force, Force]:
     """Drag and lift on exposed grains of a resolved scene.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    sizes : array_like
-        Diameters of the grains over that of the scene.
-    gaps : array_like, optional
-        Heights of their lowest points above the level at which the flow begins, m; by default z0.
+    `sizes` are diameters over that of the scene; `gaps` are heights of the grains' lowest points
+    above the level at which the flow begins, m, by default z0.
     """
     law, grain = LAWS[scene.forces.law], single_grain(scene)
     exposure = Exposure(grain.diameter * np.asarray(sizes, float), *grain[1:5], gaps)
@@ -124,15 +102,13 @@ def law_holds(scene: Scene) -> bool:
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
     """Each scene with one force law; by the paper's rule a scene becomes two in the transition."""
     # many thresholds at once take a hundredth of the time that they take one after the other
+    grains = {scene.id: single_grain(scene) for scene in scenes}
     for name in {scene.forces.law for scene in scenes} - {PAPER}:
-        thresholds(name, [single_grain(each) for each in scenes if each.forces.law == name])
+        thresholds(name, [grains[each.id] for each in scenes if each.forces.law == name])
     for name in ("low", "high"):  # the tables have the regime of each scene, whatever its law
-        thresholds(name, [single_grain(scene) for scene in scenes])
+        thresholds(name, [*grains.values()])
     for scene in scenes:
-        if scene.forces.law != PAPER:
-            yield (scene,)
-            continue
         parts = {part: getattr(scene, part) for part in Scene.model_fields}
-        laws = LAWS_OF[regime_of(scene)]
+        laws = LAWS_OF[regime_of(scene)] if scene.forces.law == PAPER else ()
         forces = (scene.forces.model_copy(update={"law": law}) for law in laws)
-        yield tuple(Scene(**{**parts, "forces": each}) for each in forces)
+        yield tuple(Scene(**{**parts, "forces": each}) for each in forces) or (scene,)

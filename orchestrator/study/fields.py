@@ -8,7 +8,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.part import Info, Part, Scope
+from orchestrator.study.part import Info, Part
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
@@ -57,18 +57,15 @@ class Quantity:
         """Its meaning with its unit, its scope and the meaning of its words."""
         unit = f", {self.info.unit}" if self.info.unit else ""
         scope = "" if self.info.scope == "every scene" else f" ({self.info.scope})"
-        words = "; ".join(f"{word}: {meaning}" for word, meaning in self.info.choices.items())
-        return f"{self.meaning}{unit}{scope}" + (f"; {words}" if words else "")
+        words = (f"; {word}: {meaning}" for word, meaning in self.info.choices.items())
+        return f"{self.meaning}{unit}{scope}{''.join(words)}"
 
 
 def plain(value: Any) -> Any:
     """A value as a cell of a table: words and numbers stay, all else becomes a text."""
     if isinstance(value, tuple):
-        classes = (
-            # a class of a sieve table: diameter and part of the mass
-            f"{1e3 * entry[0]:g} mm {100 * entry[1]:g} %" if isinstance(entry, tuple) else entry
-            for entry in value
-        )
+        # a class of a sieve table: diameter and part of the mass
+        classes = (f"{1e3 * e[0]:g} mm {100 * e[1]:g} %" if type(e) is tuple else e for e in value)
         return "; ".join(map(str, classes)) or None
     return str(value) if isinstance(value, Profile | LogNormal) else value
 
@@ -77,7 +74,7 @@ def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], b
     return lambda scene: isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
 
 
-APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
+APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
     "piles": _of_piles(lambda scene, bed: True),
@@ -95,19 +92,20 @@ APPLIES: Mapping[Scope, Callable[[Scene], bool]] = {
     "DEM and peeling": lambda scene: scene.protocol.method != "pivot",
     "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method != "pivot"),
 }
+"""The scenes on which a field has an effect, by the `scope` of its `Info`."""
 
 
-def _quantity(part: str, name: str, field: FieldInfo) -> Quantity:
-    words = next(each for each in field.metadata if isinstance(each, Info))
-    meaning = " ".join((field.description or "").split())
+def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
+    info = next(each for each in declared.metadata if isinstance(each, Info))
+    meaning = " ".join((declared.description or "").split())
     read = attrgetter(f"{part}.{name}")
-    return Quantity(f"{part}.{name}", words.column or name, words, meaning, read)
+    return Quantity(f"{part}.{name}", info.column or name, info, meaning, read)
 
 
 FIELDS: tuple[Quantity, ...] = tuple(
-    _quantity(part, name, field)
+    _quantity(part, name, declared)
     for part, model in PARTS.items()
-    for name, field in model.model_fields.items()
+    for name, declared in model.model_fields.items()
 )
 """Every field of a study file, in the order of the file."""
 DERIVED: tuple[Quantity, ...] = (

@@ -1,31 +1,15 @@
-"""Base of the parts of a scene, the words that their fields are declared with, shared ranges."""
+"""How the fields of a scene are declared: base class, words of a field, shared ranges."""
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic.fields import FieldInfo
 
-Scope = Literal[
-    "every scene",
-    "single grains",
-    "piles",
-    "dunes",
-    "beds with level parts",
-    "profiles",
-    "disordered piles",
-    "poured beds",
-    "random beds and replicas",
-    "solved flows",
-    "DEM",
-    "DEM of piles",
-    "DEM and peeling",
-    "DEM and peeling of piles",
-]
-"""The scenes on which a field has an effect."""
-About = Literal["question", "answer", "replica"]
-"""Role of a field: a question to nature, a way to answer it, or a choice among many alike."""
-
+List = Field(strict=False)
+"""Beside a type of tuples: a list of TOML is taken as one."""
 # Limits of nature, not of the methods, in SI units. Each has its extremes beside it.
 Roughness = Annotated[float, Field(ge=1e-12, le=10)]
 """From far below any grain, where a wall is smooth, to the largest boulder."""
@@ -40,17 +24,14 @@ Viscosity = Annotated[float, Field(ge=1e-8, le=1e3)]
 class UnfitError(ValueError):
     """Two fields of a scene that do not go together: which, why and what would."""
 
-    def __init__(self, field: str, what: str, remedy: str) -> None:
+    def __init__(self, field: str, what: str, remedy: str = "leave it out") -> None:
         self.field, self.what, self.remedy = field, what, remedy
         super().__init__(f"{field}: {what} ({remedy})")
 
 
 @dataclass(frozen=True)
 class Info:
-    """The words for a field, beside its name, its range and its default.
-
-    The meaning of the field is the text under its declaration.
-    """
+    """The words for a field; its meaning is the text under its declaration."""
 
     label: str
     symbol: str = ""
@@ -58,14 +39,38 @@ class Info:
     unit: str = ""
     column: str = ""
     """Its column in tables, with the unit, where that is not its name; "-" for none."""
-    scope: Scope = "every scene"
-    """The scenes on which it has an effect; for all others its column is empty."""
-    about: About = "question"
-    """A level of fidelity may change only fields about the answer."""
-    choices: Mapping[str, str] = field(default_factory=dict)
+    scope: str = "every scene"
+    """The scenes on which it has an effect, a key of `fields.APPLIES`; for all others its column
+    is empty."""
+    about: Literal["question", "answer", "replica"] = "question"
+    """A question to nature, a way to answer it, which alone a level of fidelity may change, or a
+    choice among many alike."""
+    choices: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """For a field of words, the meaning of each."""
     read: str = ""
     """The property of a scene that has the value in use, where the field may be left open."""
+
+
+def field(label: str, default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
+    """Declare a field with its default, its words and its range.
+
+    Parameters
+    ----------
+    label, default, *words
+        Label, default (none: required), then symbol, unit and column as of `Info`.
+    since
+        Whether the field came after the first studies: a scene that has its default leaves it out
+        of its digest, and keeps its id.
+    **settings
+        Further words of `Info`, and the rules of `pydantic.Field`, such as ``ge`` and ``le``.
+    """
+    about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
+    about |= dict(zip(("symbol", "unit", "column"), words, strict=False))
+    if since:
+        settings["exclude_if"] = lambda value: value == default
+    declared: FieldInfo = Field(default, **settings)
+    declared.metadata.append(Info(label, **about))
+    return declared
 
 
 class Part(BaseModel):
@@ -80,8 +85,3 @@ class Part(BaseModel):
     def _without_minus_zero(cls, value: Any) -> Any:
         """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
         return value + 0.0 if isinstance(value, float) else value
-
-
-def unless(default: Any) -> Any:
-    """Leave a field with its default out of the digest: scenes from before it keep their ids."""
-    return Field(exclude_if=lambda value: value == default)

@@ -14,7 +14,6 @@ from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
 from orchestrator.types import FloatArray, IntArray
 
-SIEVE_COLUMNS, PROFILE_COLUMNS = ("diameter_m", "fraction"), ("x_m", "z_m")
 SHAPE_FIELDS = (
     *("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius"),
     *("length", "forms", "spacing"),
@@ -24,13 +23,10 @@ LARGEST = 20 * 2**20
 """Bytes of a file."""
 LARGEST_NUMBER = 1e5
 """Largest coordinate, m."""
-FEWEST = 3
-"""Points."""
 MOST_CORNERS = 3000
 """Most corners of a bed line, each of which is a grid line of the flow's mesh."""
-GAP = 20.0
-"""A step along x this many times the middle one is a gap, in a profile of `DENSE` points."""
-DENSE = 20
+GAP, DENSE = 20.0, 20
+"""A step along x this many times the middle one is a gap, in a profile of so many points."""
 STEEPEST_DEG = 60.0
 """Slope beyond which no mesh of vertical grid lines follows the bed."""
 RESOLVED = 4
@@ -50,8 +46,6 @@ class Profile:
     """The file itself."""
     digest: str
     """Digest of the corners: two profiles with one digest are one bed."""
-    lines: tuple[int, ...] = field(default=(), compare=False, repr=False)
-    """Number of the file's line that has each point; empty for a smoothed line."""
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -72,42 +66,35 @@ class Profile:
 
 @dataclass
 class Files:
-    """The profiles and sieve tables of a study."""
+    """The profiles and sieve tables of a study; a bad one is refused with an `InputError`."""
 
     folder: Path
     """Folder of the study file."""
     texts: dict[str, Any]
     """Text of each file by its name, at first of the study's own table ``profiles``."""
-    added: str = field(default="", init=False)
+    added: str = ""
     """TOML with the texts that came from files: with it a study's text is whole without them."""
 
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
-        """Fields of a bed that names a profile; `where` names the study file in messages.
-
-        Raises
-        ------
-        InputError
-            Naming the file, the line or the field, and the remedy.
-        """
-        for name in SHAPE_FIELDS:
-            if name in bed:
-                what, remedy = f"it has its own {name}", f"leave out bed.{name}"
-                raise InputError(what, where=f"{where}: bed.profile", remedy=remedy)
-        name, smoothing = bed["profile"], bed.get("smoothing", 0.0)
+        """Fields of a bed that names a profile; `where` names the study file in messages."""
+        where, name = f"{where}: bed.profile", bed["profile"]
+        for given in SHAPE_FIELDS:
+            if given in bed:
+                raise InputError(f"it has its own {given}", where, f"leave out bed.{given}")
         if not isinstance(name, str):
-            what = f"{name!r} is not accepted"
-            raise InputError(what, where=f"{where}: bed.profile", remedy="name a file")
+            raise InputError(f"{name!r} is not accepted", where, "name a file")
+        smoothing = bed.get("smoothing", 0.0)
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value
-        place = f"{where}: bed.profile: {self.folder / name}"
+        place = f"{where}: {self.folder / name}"
         profile = read_profile(self._text(name, place), Path(name).name, place, smoothing)
         slope = round(profile.steepest_deg, 2)
         return {"profile": profile, "height": profile.height, "slope_deg": slope}
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
-        """The rows of a sieve table, diameter (m) and fraction; errors as of `bed`."""
+        """The rows of a sieve table, diameter (m) and fraction."""
         place = f"{where}: grain.sizes: {self.folder / name}"
-        _, *columns = read_columns(self._text(name, place), SIEVE_COLUMNS, place)
+        _, *columns = read_columns(self._text(name, place), ("diameter_m", "fraction"), place)
         return [list(row) for row in np.column_stack(columns).tolist()]
 
     def _text(self, name: str, where: str) -> str:
@@ -117,10 +104,7 @@ class Files:
             # a JSON string is a TOML string, but for the mark of deletion
             text = json.dumps(self.texts[name], ensure_ascii=False).replace("\x7f", "\\u007f")
             self.added += f"{head}{json.dumps(name)} = {text}\n"
-        text = self.texts[name]
-        if not isinstance(text, str):
-            raise InputError("not a text", where=f"profiles: {name}", remedy="write x_m,z_m ...")
-        return text
+        return str(self.texts[name])
 
 
 def read_text(path: Path, largest: int, where: str) -> str:
@@ -142,7 +126,7 @@ def read_text(path: Path, largest: int, where: str) -> str:
     except (OSError, ValueError) as error:
         what = f"not a readable text file: {getattr(error, 'strerror', None) or error}"
         remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
-        raise InputError(what, where=where, remedy=remedy) from None
+        raise InputError(what, where, remedy) from None
     return text
 
 
@@ -161,37 +145,24 @@ def read_columns(
     InputError
         Naming the file, the line and the remedy.
     """
-    import pandas as pd
-
     rows = [(line, row) for line, row in enumerate(csv.reader(io.StringIO(text)), 1) if any(row)]
-    if not rows:
-        remedy = f"write {','.join(names)} and a line for each point"
-        raise InputError("an empty file", where=where, remedy=remedy)
-    header = [name.strip() for name in rows[0][1]]
+    header = [name.strip() for name in rows[0][1]] if rows else []
     for name in names:
         if header.count(name) != 1:
             remedy = f"the first line is {','.join(names)}: metres, commas between columns"
-            if name.replace("_m", "_mm") in header:
-                remedy = f"divide {name}m by 1000 and name it {name}"
-            raise InputError(f"no column {name}, or two", where=f"{where}: line 1", remedy=remedy)
-    for line, row in rows[1:]:
-        if len(row) != len(header):
-            what = f"{len(row)} values under a header of {len(header)}"
-            remedy = "write numbers with a decimal point, and commas between them"
-            raise InputError(what, where=f"{where}: line {line}", remedy=remedy)
-    columns = []
-    for name in names:
-        cells = pd.Series([row[header.index(name)] for _, row in rows[1:]], dtype=str)
-        values = pd.to_numeric(cells, errors="coerce").to_numpy(float)
-        if (bad := ~(np.abs(values) <= LARGEST_NUMBER)).any():
-            place = int(np.argmax(bad))
-            raise InputError(
-                f"{cells[place][:30]!r} is not a number of at most {LARGEST_NUMBER:g}",
-                where=f"{where}: line {rows[1 + place][0]}",
-                remedy="write it with a decimal point, in metres; close gaps, or cut the file",
-            )
-        columns.append(values)
-    return np.array([line for line, _ in rows[1:]]), columns[0], columns[1]
+            raise InputError(f"no column {name}, or two", f"{where}: line 1", remedy)
+    places, values = [header.index(name) for name in names], np.empty((len(rows) - 1, 2))
+    for index, (line, row) in enumerate(rows[1:]):
+        try:
+            if len(row) != len(header):
+                raise ValueError(f"{len(row)} values under a header of {len(header)}")
+            first, second = values[index] = [float(row[place]) for place in places]
+            if not (abs(first) <= LARGEST_NUMBER and abs(second) <= LARGEST_NUMBER):
+                raise ValueError(f"a number is not within {LARGEST_NUMBER:g}")
+        except ValueError as error:
+            remedy = "write metres with a decimal point and commas between them; close gaps"
+            raise InputError(str(error), f"{where}: line {line}", remedy) from None
+    return np.array([line for line, _ in rows[1:]]), values[:, 0], values[:, 1]
 
 
 @cache
@@ -212,60 +183,52 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     InputError
         Naming the file, the line and the remedy.
     """
-    lines, x, z = read_columns(text, PROFILE_COLUMNS, where)
+    lines, x, z = read_columns(text, ("x_m", "z_m"), where)
 
     def refuse(what: str, remedy: str, point: int | None = None) -> None:
-        place = where if point is None else f"{where}: line {lines[point]}"
+        place = where if point is None or smoothing else f"{where}: line {lines[point]}"
         raise InputError(what, where=place, remedy=remedy)
 
-    if len(x) < FEWEST:
-        refuse(f"{len(x)} points make no bed", f"write {FEWEST} at least")
+    if len(x) < 3:
+        refuse(f"{len(x)} points make no bed", "write 3 at least")
     steps = np.diff(x)
-    if (steps <= 0).any():
-        point = int(np.argmax(steps <= 0)) + 1
-        what = f"x goes back to {x[point]:g} m: unsorted, or an overhang"
-        if (steps < 0).all():
-            what = "x falls: the profile runs upstream"
-        elif steps[point - 1] == 0:
-            what = f"x = {x[point]:g} m again"
-        refuse(what, "sort the lines by x, with one height for each place", point)
-    widest, middle = int(np.argmax(steps)), float(np.median(steps))
+    back, widest, middle = int(np.argmin(steps > 0)), int(np.argmax(steps)), float(np.median(steps))
+    if steps[back] <= 0:
+        what = f"x does not rise to {x[back + 1]:g} m: unsorted, twice the same, or an overhang"
+        refuse(what, "sort the lines by x, with one height for each place", back + 1)
     if len(x) >= DENSE and steps[widest] > GAP * middle:
         what = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m; others are {middle:g} m"
         refuse(what, "fill it with points", widest + 1)
-    more = "give bed.smoothing, a length in m"
+    more = "raise bed.smoothing" if smoothing else "give bed.smoothing, a length in m"
+    if smoothing > np.ptp(x) / 4:
+        what = f"smoothing over {smoothing:g} m leaves nothing of {np.ptp(x):g} m"
+        refuse(what, "lower bed.smoothing")
+    count = float(np.ptp(x)) / smoothing * RESOLVED if smoothing else len(x)
+    if count > MOST_CORNERS:
+        refuse(f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has", more)
     if smoothing:
-        more = "raise bed.smoothing"
-        if smoothing > np.ptp(x) / 4:
-            what = f"smoothing over {smoothing:g} m leaves nothing of {np.ptp(x):g} m"
-            refuse(what, "lower bed.smoothing")
-        if np.ptp(x) * RESOLVED > smoothing * MOST_CORNERS:
-            refuse(f"smoothing over {smoothing:g} m leaves over {MOST_CORNERS} points", more)
-        x, z = _smoothed(x, z, smoothing)
-    if len(x) > MOST_CORNERS:
-        refuse(f"{len(x)} points, more than the {MOST_CORNERS} that a mesh has", more)
+        x, z = _smoothed(x, z, smoothing, max(int(np.ceil(count)), DENSE))
     if np.ptp(z) == 0:
         refuse("level: it has no height to measure by", 'ask for shape = "flat" with a height')
     slopes = np.degrees(np.arctan2(np.diff(z), np.diff(x)))
     steep = int(np.argmax(np.abs(slopes)))
     if abs(slopes[steep]) > STEEPEST_DEG:
         what = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m, above {STEEPEST_DEG:g}"
-        more = f"{more}; check that x and z are both in m"
-        refuse(what, more, None if smoothing else steep + 1)
+        refuse(what, f"{more}; check that x and z are both in m", steep + 1)
     xs, zs = (tuple((values - values[0]).tolist()) for values in (x, z))
     corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
-    numbers = () if smoothing else tuple(lines.tolist())
-    return Profile(name, xs, zs, text, digest_text(corners), numbers)
+    return Profile(name, xs, zs, text, digest_text(corners))
 
 
-def _smoothed(x: FloatArray, z: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Weighted means at places a part of the length apart."""
+def _smoothed(
+    x: FloatArray, z: FloatArray, length: float, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Weighted means at the ends of `count` equal steps."""
     # beyond its ends the line goes on as turned about them: they stay where they are
     around = np.concatenate([2 * x[0] - x[:0:-1], x, 2 * x[-1] - x[-2::-1]])
     heights = np.concatenate([2 * z[0] - z[:0:-1], z, 2 * z[-1] - z[-2::-1]])
     # each point stands for the bed half-way to its neighbours
     share = np.gradient(around)
-    count = max(int(np.ceil(np.ptp(x) / length * RESOLVED)), DENSE)
     places = np.linspace(x[0], x[-1], count + 1)
     first, last = np.searchsorted(around, [places - 2 * length, places + 2 * length])
     means = np.interp(places, x, z)

@@ -1,11 +1,10 @@
 """One scene: a fluid, its grains, their bed, the flow and the protocol."""
 
 import re
-from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 from math import acos, cos, degrees, radians
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -42,18 +41,11 @@ a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002
 ROUGHEST = 1 / 3
 """Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the largest
 ratio measured; above 1/3 a grain would lie where the mean flow of the log law is at rest."""
-Misfit = tuple[str, str, str]
-"""A field that does not go with others, why, and what would."""
+POURED = 'bed.packing = "poured", or leave it out'
 
 
 class Scene(Part):
-    """One point of a study.
-
-    Raises
-    ------
-    pydantic.ValidationError
-        Naming each field that is missing, unknown, of the wrong type or out of range.
-    """
+    """One point of a study; a `pydantic.ValidationError` names each field that is wrong."""
 
     fluid: Fluid = Fluid()
     grain: Grain
@@ -64,139 +56,108 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        for misfit in self._misfits():
-            raise UnfitError(*misfit)
-        return self
-
-    def _misfits(self) -> Iterator[Misfit]:
-        grain, bed, law = self.grain, self.bed, LAWS.get(self.forces.law)
+        grain, bed, forces, method = self.grain, self.bed, self.forces, self.protocol.method
+        d, z0, law = grain.diameter, bed.roughness, LAWS.get(forces.law)
         if grain.density <= self.fluid.density:
-            yield (
-                "grain.density",
-                f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3",
-                "the grain would float; raise it, or lower fluid.density",
-            )
-        largest = extremes(grain.sizes, grain.diameter)[1]
-        bed_grains = grain.diameter / bed.relative_size * largest
-        if bed.roughness > ROUGHEST * bed_grains * (1 + 1e-9):
-            what = f"z0 = {bed.roughness:g} m is above a third of the bed's grains of"
-            what = f"{what} {bed_grains:g} m, rougher than any grains lie"
-            yield "bed.roughness", what, "typical: d/30"
-        if law and law.turns and self.protocol.method != "pivot":
-            what = f"{law.name} turns the grain about its centre, which the method"
-            what = f"{what} {self.protocol.method} leaves out"
-            yield "forces.law", what, 'choose the method "pivot", or a force law without torque'
-        if grain.sizes is not None and not self.is_poured:
-            what = "a lattice has equal grains: a mixture needs a poured bed"
-            yield "grain.sizes", what, 'bed.packing = "poured", or leave it out'
-        stiff = self.is_poured and grain.stiffness > MOST_POURED_STIFFNESS
-        if stiff and self.protocol.method == "dem":
-            what = "poured grains lie in one another by some 1e-3 d: springs of"
-            what = f"{what} {grain.stiffness:.3g} W/d throw them apart"
-            yield "grain.stiffness", what, f"at most {MOST_POURED_STIFFNESS:g}"
-        if self.forces.exposure == "protrusion" and not self.is_poured:
-            what = "the grains of a lattice stand alike"
-            yield "forces.exposure", what, 'bed.packing = "poured", or leave it out'
-        if self.forces.exposure == "protrusion" and law and not law.protrudes:
+            what = f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3"
+            raise UnfitError("grain.density", what, "raise it, or lower fluid.density")
+        bed_grains = d / bed.relative_size * extremes(grain.sizes, d)[1]
+        if z0 > ROUGHEST * bed_grains * (1 + 1e-9):
+            what = f"{z0:g} m is above a third of the bed's grains of {bed_grains:g} m"
+            raise UnfitError("bed.roughness", what, "typical: d/30")
+        if law and law.turns and method != "pivot":
+            what = f"{law.name} turns the grain about its centre, which {method} leaves out"
+            raise UnfitError("forces.law", what, 'choose the method "pivot", or another law')
+        if forces.exposure == "protrusion" and law and not law.protrudes:
             laws = ", ".join(name for name, each in LAWS.items() if each.protrudes)
             what = f"{law.name} knows no height of a grain over the bed"
-            yield "forces.exposure", what, f"laws that do: {laws}"
+            raise UnfitError("forces.exposure", what, f"laws that do: {laws}")
+        if not self.is_poured:
+            if grain.sizes is not None:
+                raise UnfitError("grain.sizes", "a mixture needs a poured bed", POURED)
+            if forces.exposure == "protrusion":
+                raise UnfitError("forces.exposure", "grains of a lattice stand alike", POURED)
+        elif method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS:
+            what = f"springs of {grain.stiffness:.3g} W/d throw them apart"
+            what = f"poured grains lie in one another by some 1e-3 d: {what}"
+            raise UnfitError("grain.stiffness", what, f"at most {MOST_POURED_STIFFNESS:g}")
         if isinstance(bed, PileBed):
-            yield from self._misfits_of_pile(bed)
-            yield from self._misfits_of_flow(bed)
-            return
-        if bed.roughness >= grain.diameter:
-            yield "bed.roughness", "z0 is not below the grain's diameter", "typical: d/30"
+            self._check_bed(bed)
+            self._check_flow(bed)
+            return self
+        if z0 >= d:
+            raise UnfitError("bed.roughness", "it is not below the diameter", "typical: d/30")
         if pocket_cosine(bed) >= 1:
-            apart = 2 * cos(radians(bed.entrainment_angle_deg))
-            what = f"a grain of {bed.relative_size:g} d falls between neighbours that are"
-            what = f"{what} {apart:.3g} d apart"
-            yield "bed.relative_size", what, "raise it, or bed.entrainment_angle_deg"
+            what = f"a grain of {bed.relative_size:g} d falls between its neighbours"
+            raise UnfitError("bed.relative_size", what, "raise it, or bed.entrainment_angle_deg")
         if self.protocol.update:
-            what = "a single grain leaves no bed that changes"
-            yield "protocol.update", what, "leave it out"
+            raise UnfitError("protocol.update", "a single grain leaves no bed that changes")
+        return self
 
-    def _misfits_of_pile(self, bed: PileBed) -> Iterator[Misfit]:
-        d, method = self.grain.diameter, self.protocol.method
-        if bed.width:  # a strip in space
-            least = LEAST_WIDTH * extremes(self.grain.sizes, d)[1]
-            if bed.packing != "poured":
-                what = "a lattice is one layer in the plane of the flow"
-                yield "bed.width", what, 'bed.packing = "poured", or leave it out'
-            if bed.width < least:
-                what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
-                yield "bed.width", what, f"at least {least:.4g}, or 0 for a bed in the plane"
-            if method == "peeling":
-                what = "the method peeling knows grains in the plane of the flow alone"
-                yield "bed.width", what, 'protocol.method = "dem" or "pivot", or width 0'
-            if self.protocol.update:
-                what = "a bed that changes is one layer in the plane of the flow"
-                yield "bed.width", what, "leave it or protocol.update out"
+    def _check_bed(self, bed: PileBed) -> None:
+        d, profile = self.grain.diameter, bed.profile
+        least = LEAST_WIDTH * extremes(self.grain.sizes, d)[1]
+        if bed.width and bed.packing != "poured":
+            raise UnfitError("bed.width", "a lattice is one layer in the plane of the flow", POURED)
+        if bed.width and (self.protocol.method == "peeling" or self.protocol.update):
+            what = "peeling and protocol.update know one layer in the plane of the flow alone"
+            raise UnfitError("bed.width", what)
+        if 0 < bed.width < least:
+            what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
+            raise UnfitError("bed.width", what, f"at least {least:.4g}, or 0: a bed in the plane")
         if bed.relative_size != 1:
-            what = "it is of a single grain on its neighbours"
-            yield "bed.relative_size", what, "leave it out"
-        if bed.profile is None:
-            yield from _misfits_of_shape(bed)
-        elif (length := bed.profile.x[-1]) > MOST_GRAINS * d:
+            raise UnfitError("bed.relative_size", "it is of a single grain on its neighbours")
+        if profile is None:
+            _check_shape(bed)
+        elif (length := profile.x[-1]) > MOST_GRAINS * d:
             what = f"{length:g} m are {length / d:.0f} grains of {d:g} m"
-            yield "bed.profile", what, "are its columns in mm? or cut a part out of it"
+            raise UnfitError("bed.profile", what, "are its columns in mm? or cut a part out of it")
         else:
-            steps = np.hypot(np.diff(bed.profile.x), np.diff(bed.profile.z))
+            steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
             near = int(np.argmin(steps))
             cell = self.first_cell_height if self.flow.model == "solve" else 0.0
             least = max(NARROWEST_OVER_D * d, NARROWEST_OVER_CELL * cell)
             if steps[near] < least:
-                lines = bed.profile.lines
-                line = f"line {lines[near + 1]}, " if lines else ""
-                what = f"{bed.profile.name}, {line}x = {bed.profile.x[near + 1]:.6g} m:"
-                what = f"{what} {steps[near]:.2g} m from the point before it, nearer than"
-                what = f"{what} {least:.2g} m"
-                more = "give" if lines else "raise"
-                yield "bed.profile", what, f"leave out one of the two, or {more} bed.smoothing"
+                what = f"{profile.name}, x = {profile.x[near + 1]:.6g} m: {steps[near]:.2g} m from"
+                what = f"{what} the point before it, nearer than {least:.2g} m"
+                raise UnfitError("bed.profile", what, "leave out a point, or raise bed.smoothing")
         for obstacle, other in pairwise(sorted(bed.obstacles, key=lambda each: each.x)):
             if other.x - obstacle.x < obstacle.reach + other.reach:
-                yield "bed.obstacles", f"{obstacle} and {other} overlap", "move one of them"
+                raise UnfitError("bed.obstacles", f"{obstacle} and {other} overlap", "move one")
         if bed.height < 5 * d:
             what = f"{bed.height:g} m is less than five grains of {d:g} m"
-            remedy = "a pile needs some rows, and lengths on a flat bed are parts of it: raise"
-            yield "bed.height", what, f"{remedy} bed.height or lower grain.diameter"
+            raise UnfitError("bed.height", what, "raise bed.height, or lower grain.diameter")
 
-    def _misfits_of_flow(self, bed: PileBed) -> Iterator[Misfit]:
-        flow, height = self.flow, bed.relief
+    def _check_flow(self, bed: PileBed) -> None:
+        flow, height, cell = self.flow, bed.relief, self.first_cell_height
         top = flow.depth or flow.lid * height
         for obstacle in bed.obstacles:
             if top < LEAST_DEPTH * obstacle.height:
-                what = f"{obstacle} under a flow {top:g} m deep"
-                remedy = f"at most a part of 1/{LEAST_DEPTH:g} of that, or raise the depth or"
-                yield "bed.obstacles", what, f"{remedy} flow.lid"
+                what = f"{obstacle} under a flow {top:g} m deep, less than {LEAST_DEPTH:g} heights"
+                raise UnfitError("bed.obstacles", what, "raise flow.depth or flow.lid")
         if flow.top == "boundary layer":
             if flow.depth:
                 remedy = 'leave it out, or choose flow.top = "open water"'
-                yield "flow.depth", "a boundary layer has none", remedy
+                raise UnfitError("flow.depth", "a boundary layer has none", remedy)
         elif not flow.depth:
-            yield "flow.depth", f"the depth of {flow.top} is missing", "give it, in m"
+            raise UnfitError("flow.depth", f"the depth of {flow.top} is missing", "give it, in m")
         elif flow.depth < LEAST_DEPTH * height:
-            what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms,"
-            yield "flow.depth", f"{what} {height:g} m", "raise it, or lower bed.height"
+            what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms"
+            raise UnfitError("flow.depth", what, "raise it, or lower bed.height")
         elif flow.model not in ("solve", "flat"):
             what = f"the theory {flow.model} is of a flow without a top"
-            yield "flow.model", what, 'choose "solve" or "flat"'
-        cell = self.first_cell_height
+            raise UnfitError("flow.model", what, 'choose "solve" or "flat"')
         if flow.model == "solve" and cell > height / 4:
             what = f"{cell:g} m is above a quarter of the pile's {height:g} m"
-            yield "flow.first_cell_height", what, "lower it, or raise bed.height"
+            raise UnfitError("flow.first_cell_height", what, "lower it, or raise bed.height")
         if self.protocol.update:
-            never = "leave it out"
-            if flow.model != "solve":
-                what = f'the flow model "{flow.model}" knows no bed that changes'
-                yield "protocol.update", what, f'flow.model = "solve", or {never}'
-            if self.protocol.method == "pivot":
-                what = "each grain by itself frees no other"
-                yield "protocol.update", what, f'the method "peeling" or "dem", or {never}'
+            if flow.model != "solve" or self.protocol.method == "pivot":
+                what = f'flow.model "{flow.model}" or the method "{self.protocol.method}"'
+                what = f"{what} knows no bed that changes"
+                raise UnfitError("protocol.update", what, '"solve" with "dem", or leave it out')
             if cell > self.grain.diameter:
                 what = f"the first cell, {cell:g} m, is higher than a grain"
-                remedy = f"set flow.first_cell_height to at most the diameter, or {never}"
-                yield "protocol.update", what, remedy
+                raise UnfitError("protocol.update", what, "lower flow.first_cell_height")
 
     @cached_property
     def id(self) -> str:
@@ -241,18 +202,15 @@ class Scene(Part):
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
-        if self.flow.first_cell_height:
-            return self.flow.first_cell_height
         viscous = (self.flow.viscosity or 0.0) / self._eddy_viscosity
-        return default_first_cell_height(self.bed.relief, self.solve_roughness, viscous)
+        default = default_first_cell_height(self.bed.relief, self.solve_roughness, viscous)
+        return self.flow.first_cell_height or default
 
     @property
     def solve_viscosity(self) -> float:
         """Kinematic viscosity at which the flow over a pile is solved, m2/s."""
-        if self.flow.viscosity:
-            return self.flow.viscosity
         most = self._eddy_viscosity * self.first_cell_height / VISCOUS_CELLS
-        return min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
+        return self.flow.viscosity or min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
 
     @property
     def _eddy_viscosity(self) -> float:
@@ -270,23 +228,22 @@ def pocket_cosine(bed: Bed) -> float:
     return 2 * cos(radians(bed.entrainment_angle_deg)) / (1 + bed.relative_size)
 
 
-def _misfits_of_shape(bed: PileBed) -> Iterator[Misfit]:
+def _check_shape(bed: PileBed) -> None:
     (low, high), rises = BUILDABLE_DEG, bed.form.rises
-    name = f"a {bed.shape}" if bed.shape != "flat" else "a flat bed"
     if rises and not low <= bed.slope_deg <= high:
         what, remedy = f"a pile of {bed.slope_deg:g} deg", f"choose {low:g} ... {high:g} deg"
-        yield "bed.slope_deg", what, remedy
-    if bed.smoothing:
-        yield "bed.smoothing", "it is of a profile", "leave it out"
-    for field, about in PileBed.model_fields.items():
-        shapes = having(field)
-        if shapes and bed.shape not in shapes and getattr(bed, field) != about.default:
-            remedy = f"leave it out; it is of: {', '.join(shapes)}"
-            yield f"bed.{field}", f"{name} has none", remedy
+        raise UnfitError("bed.slope_deg", what, remedy)
     if not rises and bed.slope_deg:
-        yield "bed.slope_deg", f"{name} does not rise", "leave it out"
+        raise UnfitError("bed.slope_deg", f"the shape {bed.shape} does not rise")
+    if bed.smoothing:
+        raise UnfitError("bed.smoothing", "it is of a profile")
+    for name, declared in PileBed.model_fields.items():
+        shapes = having(name)
+        if shapes and bed.shape not in shapes and getattr(bed, name) != declared.default:
+            remedy = f"leave it out; it is of: {', '.join(shapes)}"
+            raise UnfitError(f"bed.{name}", f"the shape {bed.shape} has none", remedy)
     if bed.spacing and bed.forms == 1:
-        yield "bed.spacing", "one form has no neighbour", "raise bed.forms"
+        raise UnfitError("bed.spacing", "one form has no neighbour", "raise bed.forms")
 
 
 def default_first_cell_height(height: float, roughness: float, viscous: float = 0.0) -> float:
@@ -299,17 +256,15 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
     return min(max(height / 40, 2.5 * roughness, VISCOUS_CELLS * viscous), height / 4)
 
 
-def roughness_length(value: Any, diameter: float, mixture: Sizes | None = None) -> Any:
-    """A roughness in metres, from a number or from a part of the diameter such as ``"d/30"``.
+def roughness_length(text: str, diameter: float, mixture: Sizes | None = None) -> float:
+    """A roughness in metres from a part of the diameter (m) such as ``"d/30"``.
 
     In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
     finer than.
     """
-    if not isinstance(value, str):
-        return value
-    match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", value)
+    match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", text)
     if not match or float(match[2]) == 0:
-        raise UnfitError("bed.roughness", f"{value!r} is not a length", 'write metres, or "d/30"')
+        raise UnfitError("bed.roughness", f"{text!r} is not a length", 'write metres, or "d/30"')
     # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
     size = percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
     return float(f"{size / float(match[2]):.12g}")

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from orchestrator.types import FloatArray
 
 if TYPE_CHECKING:
-    from orchestrator.study.parts.bed import PileBed
+    from orchestrator.study.parts import PileBed
 
 CHORDS = 40
 """Chords of the windward side of a form that is a curve."""
@@ -28,41 +28,33 @@ ARC_DEG = 2.0
 
 @dataclass(frozen=True)
 class Shape:
-    """The facts of one shape.
-
-    Attributes
-    ----------
-    name, meaning : str
-        What a study file calls it, and its description there.
-    corners : callable
-        Corners of one form of a `PileBed`.
-    fields : tuple of str
-        Fields of the bed that not all shapes have, and this one has.
-    rises : bool
-        Whether it has a windward side, whose slope is the bed's.
-    lee_slope_deg : float or None
-        Slope of the lee side by default; None: that of the windward side.
-    counted : {"windward", "all"}
-        Which exposed grains are counted by default.
-    label : str
-        Its name in figures.
-    """
+    """The facts of one shape."""
 
     name: str
     meaning: str
     corners: Callable[["PileBed"], FloatArray]
+    """Corners of one form of a bed."""
     fields: tuple[str, ...] = ()
+    """Fields of the bed that not all shapes have, and this one has."""
     rises: bool = True
+    """Whether it has a windward side, whose slope is the bed's."""
     lee_slope_deg: float | None = None
+    """Slope of the lee side by default; None: that of the windward side."""
     counted: Literal["windward", "all"] = "windward"
+    """Exposed grains that are counted by default."""
     label: str = ""
+    """Its name in figures, where that is not its name."""
 
 
-def _faces(bed: "PileBed", top: float = 0.0) -> FloatArray:
-    """Two straight faces, with a level top between them."""
+def _faces(bed: "PileBed") -> FloatArray:
+    """Two straight faces."""
     up, down = (bed.height / tan(radians(slope)) for slope in (bed.slope_deg, bed.lee_slope))
-    ends = [[up, bed.height], [up + top, bed.height]] if top else [[up, bed.height]]
-    return np.array([[0, 0], *ends, [up + top + down, 0]])
+    return np.array([[0, 0], [up, bed.height], [up + down, 0]])
+
+
+def _trapezoid(bed: "PileBed") -> FloatArray:
+    foot, crest, toe = _faces(bed)
+    return np.array([foot, crest, *np.add([crest, toe], [bed.level_length, 0])])
 
 
 def _dune(bed: "PileBed") -> FloatArray:
@@ -157,61 +149,47 @@ def _step_down(bed: "PileBed") -> FloatArray:
     return np.array([[0, 0], [bed.level_length, 0], [bed.level_length + face, -bed.height]])
 
 
-TRAIN, LEE = ("forms", "spacing"), ("lee_slope_deg",)
+def _flat(bed: "PileBed") -> FloatArray:
+    return np.array([[0, 0], [bed.level_length, 0]])
+
+
+TRAIN, LEE, LEVEL = ("forms", "spacing"), ("lee_slope_deg",), ("length",)
 SLIP_FACE_DEG = 30.0
 """Lee slope of a dune and of a step down."""
-SHAPES = {
-    shape.name: shape
-    for shape in (
-        Shape("triangle", "two straight faces", _faces, (*TRAIN, *LEE)),
-        Shape(
-            "dune",
-            "a windward side and a slip face",
-            _dune,
-            ("windward", "brink_radius", *TRAIN, *LEE),
-            lee_slope_deg=SLIP_FACE_DEG,
-        ),
-        Shape(
-            "cosine",
-            "one wave of a cosine, from trough to trough",
-            _cosine,
-            TRAIN,
-            label="wave of a cosine",
-        ),
-        Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, label="Gaussian hill"),
-        Shape(
-            "rushil",
-            "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
-            _rushil,
-            TRAIN,
-            label="hill of RUSHIL",
-        ),
-        Shape(
-            "trapezoid",
-            "two straight faces and a level top",
-            lambda bed: _faces(bed, bed.level_length),
-            ("length", *TRAIN, *LEE),
-        ),
-        Shape("step up", "a straight face up to higher ground", _step_up, ("length",)),
-        Shape(
-            "step down",
-            "a straight face down to lower ground",
-            _step_down,
-            ("length", *LEE),
-            rises=False,
-            lee_slope_deg=SLIP_FACE_DEG,
-            counted="all",
-        ),
-        Shape(
-            "flat",
-            "level bed",
-            lambda bed: np.array([[0, 0], [bed.level_length, 0]]),
-            ("length",),
-            rises=False,
-            counted="all",
-        ),
-    )
-}
+_LISTED = (
+    Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
+    Shape(
+        "dune",
+        "a windward side and a slip face",
+        _dune,
+        ("windward", "brink_radius", *TRAIN, *LEE),
+        lee_slope_deg=SLIP_FACE_DEG,
+    ),
+    Shape(
+        "cosine", "one wave of a cosine, trough to trough", _cosine, TRAIN, label="wave of a cosine"
+    ),
+    Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, label="Gaussian hill"),
+    Shape(
+        "rushil",
+        "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
+        _rushil,
+        TRAIN,
+        label="hill of RUSHIL",
+    ),
+    Shape("trapezoid", "two straight faces and a level top", _trapezoid, LEVEL + TRAIN + LEE),
+    Shape("step up", "a straight face up to higher ground", _step_up, LEVEL),
+    Shape(
+        "step down",
+        "a straight face down to lower ground",
+        _step_down,
+        LEVEL + LEE,
+        rises=False,
+        lee_slope_deg=SLIP_FACE_DEG,
+        counted="all",
+    ),
+    Shape("flat", "level bed", _flat, LEVEL, rises=False, counted="all"),
+)
+SHAPES = {shape.name: shape for shape in _LISTED}
 """All shapes, by what a study file calls them."""
 
 

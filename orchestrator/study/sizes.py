@@ -5,14 +5,12 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 from scipy.special import ndtr, ndtri
 
-from orchestrator.study.part import UnfitError
+from orchestrator.study.part import List, UnfitError
 from orchestrator.types import FloatArray
 
-Sieve = tuple[tuple[float, float], ...]
-"""Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
 LARGEST_RATIO = 10.0
 """Largest ratio of the largest to the smallest grain: the lists of neighbours in DEM reach as far
 as two of the largest, so that their length, and the time of a run, rise with its square."""
@@ -50,38 +48,21 @@ class LogNormal(BaseModel):
         return f"log-normal, sigma_g {self.sigma_g:g}, {low:.3g} to {high:.3g} d50"
 
 
-Sizes = LogNormal | Sieve
+_Number = Annotated[float, Field(gt=0, lt=100)]
+Sieve = tuple[Annotated[tuple[_Number, _Number], List], ...]
+"""Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
+TABLE, FORMULA = "rows", "log-normal"
 
 
-def read(value: Any) -> Sizes | None:
-    """Sizes as a study file writes them: a list of rows, or a table with ``sigma_g``.
+def _kind(value: Any) -> str:
+    return FORMULA if isinstance(value, dict | LogNormal) else TABLE
 
-    Raises
-    ------
-    UnfitError
-        If the value is neither.
-    """
 
-    def refused(what: str) -> UnfitError:
-        remedy = "write [[5e-4, 0.4], [1e-3, 0.6]], or { sigma_g = 1.3 }"
-        return UnfitError("grain.sizes", what, remedy)
-
-    if value is None or isinstance(value, LogNormal):
-        return value
-    if isinstance(value, dict):
-        try:
-            return LogNormal.model_validate(value)
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise refused(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
-    if not isinstance(value, list | tuple) or not value:
-        raise refused("neither rows [diameter, mass fraction] nor { sigma_g = ... }")
-    for row in value:
-        if not isinstance(row, list | tuple) or len(row) != 2:
-            raise refused("a row is not [diameter, mass fraction]")
-        if not all(isinstance(number, int | float) and 0 < number < 100 for number in row):
-            raise refused("a diameter (m) or a mass fraction is no number above 0")
-    return tuple((float(diameter), float(fraction)) for diameter, fraction in value)
+Sizes = Annotated[
+    Annotated[LogNormal, Tag(FORMULA)] | Annotated[Sieve, Field(min_length=1), List, Tag(TABLE)],
+    Discriminator(_kind),
+]
+"""In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 
 
 def check(sizes: Sizes, diameter: float) -> None:
@@ -92,39 +73,31 @@ def check(sizes: Sizes, diameter: float) -> None:
     UnfitError
         If it is not.
     """
-    what, field, remedy = "", "grain.sizes", "look at the rows"
     median = percentile(sizes, diameter, 0.5)
     if isinstance(sizes, LogNormal):
         if abs(median / diameter - 1) > OFF_MEDIAN:
             what = f"between these cut-offs d50 is {median:.4g} m, not the diameter"
-            remedy = "write smallest = 1/largest"
+            raise UnfitError("grain.sizes", what, "write smallest = 1/largest")
     else:
         diameters, fractions = np.array(sizes).T
         if not np.all(np.diff(diameters) > 0):
-            what = "the diameters do not rise from row to row"
-        elif abs(fractions.sum() - 1) > SUM:
+            raise UnfitError("grain.sizes", "the diameters do not rise", "sort the rows")
+        if abs(fractions.sum() - 1) > SUM:
             what = f"the mass fractions add up to {fractions.sum():.6g}, not to 1"
-        elif abs(diameter / median - 1) > 1e-9:
-            field, remedy = "grain.diameter", "leave it out"
-            what = f"the d50 of grain.sizes is {median:.9g} m"
+            raise UnfitError("grain.sizes", what, "look at the rows")
+        if abs(diameter / median - 1) > 1e-9:
+            raise UnfitError("grain.diameter", f"the d50 of grain.sizes is {median:.9g} m")
     low, high = extremes(sizes, diameter)
-    if not what and (ratio := high / low) > LARGEST_RATIO:
-        what = f"the largest grain is {ratio:.3g} times the smallest, more than {LARGEST_RATIO:g}"
-    if what:
-        raise UnfitError(field, what, remedy)
+    if (ratio := high / low) > LARGEST_RATIO:
+        what = f"the largest grain is {ratio:.3g} times the smallest"
+        raise UnfitError("grain.sizes", what, f"at most {LARGEST_RATIO:g}")
 
 
 def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
-    """Diameter that a part of the mass is finer than, m; straight in its logarithm between classes.
+    """Diameter that a part (0 ... 1) of the mass is finer than, m.
 
-    Parameters
-    ----------
-    sizes : LogNormal, sequence of classes, or None
-        None of equal grains.
-    diameter : float
-        Diameter of equal grains, or the median of a log-normal distribution, m.
-    part : float
-        0 ... 1.
+    It is straight in its logarithm between classes. `diameter` is that of equal grains, where
+    `sizes` is None, or the median of a log-normal distribution, m.
     """
     if sizes is None:
         return diameter
@@ -138,11 +111,9 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
 
 def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
     """The smallest and the largest grain of a mixture over one diameter; both 1 of equal grains."""
-    if sizes is None:
-        return 1.0, 1.0
     if isinstance(sizes, LogNormal):
         return sizes.ends
-    return sizes[0][0] / diameter, sizes[-1][0] / diameter
+    return (sizes[0][0] / diameter, sizes[-1][0] / diameter) if sizes else (1.0, 1.0)
 
 
 def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:

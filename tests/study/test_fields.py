@@ -77,21 +77,19 @@ def test_columns_are_distinct_and_explained() -> None:
     assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
 
 
-@pytest.mark.parametrize("one", NUMERIC, ids=lambda one: one.name)
-def test_every_number_has_two_ends(one: Quantity) -> None:
-    low, high = reference.bounds(fields.declared(one))
+@pytest.mark.parametrize("quantity", NUMERIC, ids=lambda each: each.name)
+def test_every_number_has_two_ends(quantity: Quantity) -> None:
+    low, high = reference.bounds(fields.declared(quantity))
     assert (low[0], high[0]) in {(">", "<"), (">", "≤"), ("≥", "<"), ("≥", "≤")}
-    part, _, name = one.name.partition(".")
-    tables = {"grain": {"diameter": "1e-3"}, "bed": {"kind": "'pile'", "slope_deg": "20.0"}}
-    integer = fields.declared(one).annotation is int
-    for value in ("-1", str(10**18)) if integer else ("-1e-320", "1e30", "1e308", "-1e308"):
-        parts = {**tables, part: {**tables.get(part, {}), name: value}}
-        text = "\n".join(
-            f"{table} = {{ {', '.join(f'{key} = {entry}' for key, entry in entries.items())} }}"
-            for table, entries in parts.items()
-        )
-        with pytest.raises(InputError, match=rf"test: {one.name}: .* is not accepted"):
-            study.parse(text, name="test", where="test")
+    part, _, name = quantity.name.partition(".")
+    bed = {"kind": "pile", "slope_deg": 20.0}
+    base: dict[str, dict[str, Any]] = {"grain": {"diameter": 1e-3}, "bed": bed}
+    integer = fields.declared(quantity).annotation is int
+    for value in (-1, 10**18) if integer else (-1e-320, 1e308):
+        parts = {key: {**base.get(key, {})} for key in fields.PARTS}
+        parts[part][name] = value
+        with pytest.raises(InputError, match=rf"test: {quantity.name}: .* is not accepted"):
+            study.make_scene(parts, "test")
 
 
 @pytest.mark.parametrize("one", CHANGEABLE, ids=lambda one: one.name)
