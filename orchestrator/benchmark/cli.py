@@ -11,87 +11,39 @@ def add(commands: Any) -> None:
     """Add ``benchmark`` with its parts to the parser of the program."""
     group = commands.add_parser("benchmark", help="compare another solver with this one")
     parts = group.add_subparsers(required=True, metavar="part")
-    level = argparse.ArgumentParser(add_help=False)
-    level.add_argument(
-        "--level",
-        action="extend",
-        nargs="+",
-        default=[],
-        type=int,
-        choices=(1, 2, 3, 4, 5),
-        metavar="N",
-        help="only these levels, 1 to 5",
-    )
-    choice = argparse.ArgumentParser(add_help=False, parents=[level])
-    choice.add_argument(
-        "--scene",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="PATTERN",
-        help="only these scenes, such as '2-incline-*'",
-    )
-    pack = argparse.ArgumentParser(add_help=False)
-    pack.add_argument("pack", type=Path, metavar="PACK", help="directory of the pack")
 
-    command = parts.add_parser(
-        "export", parents=[pack, level], help="write scenes and their expected answers"
-    )
-    command.add_argument(
-        "--from",
-        dest="study",
-        type=Path,
-        metavar="DIR",
-        help="a finished study; without one only levels 1 and 2, which are formulas",
-    )
-    command.set_defaults(run=_export)
+    def part(name: str, run: Any, text: str) -> argparse.ArgumentParser:
+        command: argparse.ArgumentParser = parts.add_parser(name, help=text)
+        command.set_defaults(run=run)
+        command.add_argument("pack", type=Path, metavar="PACK", help="directory of the pack")
+        several: dict[str, Any] = {"action": "extend", "nargs": "+", "default": []}
+        text, levels = "only these levels, 1 to 5", (1, 2, 3, 4, 5)
+        command.add_argument("--level", **several, type=int, choices=levels, metavar="N", help=text)
+        if name != "export":
+            text = "only these scenes, such as '2-incline-*'"
+            command.add_argument("--scene", **several, metavar="PATTERN", help=text)
+        return command
 
-    command = parts.add_parser(
-        "run", parents=[pack, choice], help="run a solver on each scene, ours in turn, and compare"
-    )
-    command.add_argument(
-        "--solver",
-        required=True,
-        metavar="COMMAND",
-        help="such as 'my-solver {case} {out}': a scene's directory, and the CSV file to write",
-    )
-    command.add_argument(
-        "--out", type=Path, metavar="RESULTS", help="default: results/benchmark-NAME of the pack"
-    )
-    command.add_argument(
-        "--limit",
-        type=_positive,
-        default=600.0,
-        metavar="S",
-        help="wall time for a scene; default %(default)g",
-    )
-    command.add_argument(
-        "--memory",
-        type=_positive,
-        default=4.0,
-        metavar="GIB",
-        help="memory of each process of the solver; default %(default)g",
-    )
-    command.set_defaults(run=_run)
+    command = part("export", _export, "write scenes and their expected answers")
+    text = "a finished study; without one only levels 1 and 2, which are formulas"
+    command.add_argument("--from", dest="study", type=Path, metavar="DIR", help=text)
 
-    command = parts.add_parser(
-        "compare", parents=[pack, choice], help="the same for answers that are there already"
-    )
-    command.add_argument(
-        "results",
-        type=Path,
-        nargs="+",
-        metavar="RESULTS",
-        help="holds SCENE/answer.csv; its name is the solver's",
-    )
-    command.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="directory of the page; default: the only RESULTS, if run wrote them, or"
-        " results/benchmark-NAME of the pack",
-    )
-    command.set_defaults(run=_compare)
+    command = part("run", _run, "run a solver on each scene, ours in turn, and compare")
+    text = "such as 'my-solver {case} {out}': a scene's directory, and the CSV file to write"
+    command.add_argument("--solver", required=True, metavar="COMMAND", help=text)
+    text = "default: results/benchmark-NAME of the pack"
+    command.add_argument("--out", type=Path, metavar="RESULTS", help=text)
+    text = "wall time for a scene; default %(default)g"
+    command.add_argument("--limit", type=_positive, default=600.0, metavar="S", help=text)
+    text = "memory of each process of the solver; default %(default)g"
+    command.add_argument("--memory", type=_positive, default=4.0, metavar="GIB", help=text)
+
+    command = part("compare", _compare, "the same for answers that are there already")
+    text = "holds SCENE/answer.csv; its name is the solver's"
+    command.add_argument("results", type=Path, nargs="+", metavar="RESULTS", help=text)
+    text = "directory of the page; default: the only RESULTS, if run wrote them, or"
+    text += " results/benchmark-NAME of the pack"
+    command.add_argument("--out", type=Path, metavar="DIR", help=text)
 
 
 def _positive(text: str) -> float:

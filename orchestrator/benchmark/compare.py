@@ -2,43 +2,38 @@
 
 import csv
 import fnmatch
-import os
 import re
 import shlex
 import shutil
 import signal
-import stat
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from orchestrator.benchmark import pack
 from orchestrator.benchmark.export import Ours
-from orchestrator.benchmark.pack import COUNTS, Pack
-from orchestrator.errors import InputError, OrchestratorError, one_line, printable
+from orchestrator.benchmark.pack import COUNTS, LARGEST, Pack
+from orchestrator.errors import InputError, one_line, printable
 from orchestrator.runs import process, workspace
-from orchestrator.runs.files import Folder, read_json, text_of
-from orchestrator.tables import text
+from orchestrator.runs.files import Folder, opened, read_json, text_of
+from orchestrator.tables import csv as text_of_table
 from orchestrator.types import Row
 
 ANSWER, LOG, USED, OURS = "answer.csv", "log.txt", "used.json", "ours"
 """Files of a scene in the results: the answer, the output, and the times. The answers of our
-solvers lie in a directory beside those of the solver."""
+solvers lie in a directory beside those of the solver; they are those of the solver `OURS`."""
 PAGE, NUMBERS, VERDICTS, FIGURES = "comparison.html", "comparison.csv", "verdicts.csv", "figures"
-COLUMNS = ["quantity", "at", "value"]
 STEPS = "steps"
 """Quantity that a solver may add to any answer: its number of time steps."""
 MIB = 2**20
 ANSWER_BYTES, LOG_BYTES, FILE_BYTES = 4 * MIB, 64 * MIB, 4096 * MIB
 """Largest answer, largest output, and largest file of a solver, bytes."""
-LARGEST = 1e30
-"""Largest number of an answer, SI units."""
 ROUND = 1e-8
 """Relative rounding of a pack's tables."""
 LISTED = 10
@@ -51,12 +46,8 @@ LEVELS = {
     5: "flow and grains",
 }
 """Names of the levels."""
-OF_SCHEMA_1 = re.compile(r"[1-5]-[0-9a-f]{12}")
-"""Names of the scenes of former packs."""
 OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
 """Words that are operators of a shell."""
-
-
 MEASURE = """
 import json, os, resource, signal, sys, time
 report, memory, *command = sys.argv[1:]
@@ -74,10 +65,6 @@ sys.exit(code if code >= 0 else 128 - code)
 """
 """Program that runs the solver: the memory of a process that this one starts would count as the
 solver's."""
-
-
-class AnswerError(OrchestratorError):
-    """An answer that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -109,28 +96,7 @@ class Limits:
     memory: int = 4 * 2**30
 
 
-@dataclass(frozen=True)
-class Contender:
-    """A solver with its answers to some scenes of a pack.
-
-    Attributes
-    ----------
-    name : str
-        Name of the directory of its results.
-    verdicts : DataFrame
-        A row for each scene: ``passed``, ``message``, errors and times.
-    numbers : DataFrame
-        The expectations with ``answer``, ``error`` (relative) and ``within``; rows are the same for
-        all solvers.
-    """
-
-    name: str
-    verdicts: pd.DataFrame
-    numbers: pd.DataFrame
-
-
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """A comparison: failures as lines, a summary as a table, and the page."""
 
     failures: list[str]
@@ -149,40 +115,36 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
         The solver's, with ``{case}`` and ``{out}``; it is split as by a shell, but no shell runs.
     out : Path or None
         Directory of the results; by default ``results/benchmark-NAME`` of the pack.
-    choice : Choice
-        The scenes.
-    limits : Limits
-        Limits of the solver.
+    choice, limits : Choice, Limits
+        The scenes, and the limits of the solver for each.
 
     Raises
     ------
     InputError
         If the pack, the command or the directory cannot be used.
     """
-    chosen = pack.read(root.absolute())
-    names, words = choice.names(chosen), split(command)
-    out = (out or _default_place(root)).absolute()
-    _check_places([out], out, chosen)
-    ours = Ours(chosen, out / OURS / "cases")
-    for name in names:
-        ours.check(name)
+    chosen, words = pack.read(root.absolute()), split(command)
+    names, digest = choice.names(chosen), chosen.manifest.sha256[pack.EXPECTED]
+    out = _place(out or _default(root), chosen)
+    ours = Ours(chosen, names, out / OURS / "cases")
     with workspace.claimed(out, workspace.RESULTS, command) as folder:
-        about = _about(out)
-        if about.get("pack", chosen.digest) != chosen.digest:
-            raise InputError(
-                "the directory holds answers to another pack, or to an earlier export of this one",
-                where=str(out),
-                remedy="choose another with --out, or remove it",
+        about = workspace.read_marker(out, workspace.RESULTS) or {}
+        if about.get("pack", digest) != digest:
+            what = (
+                "the directory holds answers to another pack, or to an earlier export of this one"
             )
-        folder.note(workspace.RESULTS.marker, text_of({**about, "pack": chosen.digest}))
+            raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
+        folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest}))
         ours.root.mkdir(parents=True, exist_ok=True)
         for number, name in enumerate(names, 1):
             print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
-            _put(folder, name, *solve(words, chosen.directory(name), limits))
+            _solve(words, chosen.root / pack.SCENES / name, limits, folder, name)
             answer, took = ours.answer(name)
-            _put(folder, f"{OURS}/{name}", pack.csv(answer).encode(), b"", took._asdict())
-        chosen.verify()
-        return _written(chosen, [judge(chosen, names, out)], folder)
+            folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
+            times = {key: value for key, value in took._asdict().items() if value == value}
+            folder.note(f"{OURS}/{name}/{USED}", text_of(times))
+        pack.verify(chosen.root, chosen.manifest)
+        return _written(chosen, *judge(chosen, names, [out]), folder)
 
 
 def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choice) -> Outcome:
@@ -206,41 +168,32 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
         If the pack or a directory cannot be used, or two have one name.
     """
     chosen = pack.read(root.absolute())
-    names = choice.names(chosen)
-    for place in results:
+    names, solvers = choice.names(chosen), [OURS, *(place.absolute().name for place in results)]
+    for place, solver in zip(results, solvers[1:], strict=True):
         if not place.is_dir():
             raise InputError("there is no such directory", where=str(place), remedy="name another")
-        if any(OF_SCHEMA_1.fullmatch(path.name) for path in place.iterdir()):
-            pack.refuse_schema("its answers are to a pack of schema 1", place)
-    about = _about(results[0]) if len(results) == 1 else {}
-    out = (out or (results[0] if about else _default_place(root))).absolute()
-    _check_places(results, out, chosen)
-    is_of_run = bool(about) and out == results[0].absolute()
-    kind = workspace.RESULTS if is_of_run else workspace.COMPARISON
-    contenders = [judge(chosen, names, place) for place in results]
-    with workspace.claimed(out, kind, about["name"] if is_of_run else chosen.root.name) as folder:
-        return _written(chosen, contenders, folder)
+        if solvers.count(solver) > 1:
+            remedy = "name each directory of results after its solver"
+            raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
+    about = workspace.read_marker(results[0], workspace.RESULTS) or {}
+    is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
+    out = _place(out or (results[0] if is_of_run else _default(root)), chosen)
+    is_same = is_of_run and out == results[0].absolute()
+    kind = workspace.RESULTS if is_same else workspace.COMPARISON
+    judged = judge(chosen, names, results)
+    with workspace.claimed(out, kind, about["name"] if is_same else chosen.root.name) as folder:
+        return _written(chosen, *judged, folder)
 
 
-def _about(results: Path) -> Row:
-    """The notes of `run` in its results; empty for other directories."""
-    about = workspace.read_marker(results, workspace.RESULTS) or {}
-    return about if about.get("kind") == workspace.RESULTS.word else {}
-
-
-def _default_place(root: Path) -> Path:
+def _default(root: Path) -> Path:
     return Path("results") / f"benchmark-{root.absolute().name}"
 
 
-def _check_places(results: Sequence[Path], out: Path, chosen: Pack) -> None:
-    """See that each solver has a name of its own, and that nothing is written into the pack."""
-    names = [OURS, *(place.absolute().name for place in results)]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        remedy = "name each directory of results after its solver"
-        raise InputError(f"two solvers have the name {twice[0]}", "RESULTS", remedy)
+def _place(out: Path, chosen: Pack) -> Path:
+    """The directory of the results, which is not in the pack."""
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
+    return out.absolute()
 
 
 def split(command: str) -> list[str]:
@@ -268,22 +221,19 @@ def split(command: str) -> list[str]:
     raise InputError(what, "--solver", remedy)
 
 
-def solve(
-    words: Sequence[str], scene: Path, limits: Limits
-) -> tuple[bytes | None, bytes, dict[str, Any]]:
+def _solve(words: Sequence[str], scene: Path, limits: Limits, folder: Folder, name: str) -> None:
     """Run a solver on a copy of a scene, in a directory that is removed afterwards.
 
-    Returns the bytes of its answer, None if there is none; its output; and its times (s), memory
-    (MiB) and ``error``, the reason why the answer does not count.
+    Its answer, its output, its times (s) and memory (MiB) are put into a directory of the results;
+    with the times is ``error``, the reason why the answer does not count.
     """
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        work, log = Path(folder, "work"), Path(folder, LOG)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as private:
+        work, log, report = Path(private, "work"), Path(private, LOG), Path(private, USED)
         case, out = work / "case", work / ANSWER
         shutil.copytree(scene, case)
         command = [word.replace("{case}", str(case)).replace("{out}", str(out)) for word in words]
-        measured = Path(folder, USED)
         ended = process.run(
-            [sys.executable, "-ISc", MEASURE, str(measured), str(limits.memory), *command],
+            [sys.executable, "-ISc", MEASURE, str(report), str(limits.memory), *command],
             cwd=work,
             log=log,
             limit_s=limits.seconds,
@@ -291,14 +241,16 @@ def solve(
             output_limit=LOG_BYTES,
             file_limit=FILE_BYTES,
         )
-        error, answer = _fault(ended, limits, log), None
+        error = _fault(ended, limits, log)
         try:
-            answer = content(out)
-        except AnswerError as fault:
+            folder.note(f"{name}/{ANSWER}", _content(out))
+        except ValueError as fault:
+            folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
             error = error or str(fault)
-        used = read_json(measured) or {"seconds": ended.seconds}
+        used = read_json(report) or {"seconds": ended.seconds}
         with log.open("rb") as stream:
-            return answer, stream.read(LOG_BYTES), {**used, "error": error}
+            folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))
+        folder.note(f"{name}/{USED}", text_of({**used, "error": error}))
 
 
 def _fault(ended: process.Ended, limits: Limits, log: Path) -> str:
@@ -317,66 +269,45 @@ def _fault(ended: process.Ended, limits: Limits, log: Path) -> str:
     return f"it ended with {ended.returncode}{printed and f': {printed}'}"
 
 
-def _put(
-    folder: Folder, name: str, answer: bytes | None, log: bytes, used: Mapping[str, Any]
-) -> None:
-    """Put the results of a scene in place of earlier ones."""
-    if answer is None:
-        folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
-    else:
-        folder.note(f"{name}/{ANSWER}", answer)
-    if log:
-        folder.note(f"{name}/{LOG}", log)
-    numbers = {key: value for key, value in used.items() if value == value}
-    folder.note(f"{name}/{USED}", text_of(numbers))
-
-
-def content(path: Path) -> bytes:
-    """The bytes of an answer; raises AnswerError if there is no plain file, or it is too large."""
+def _content(path: Path) -> bytes:
+    """The bytes of an answer; raises ValueError if there is no file, or it is too large."""
     try:
-        state = path.lstat()
-        if not stat.S_ISREG(state.st_mode):
-            raise AnswerError(f"{ANSWER} is a link or no file")
-        if state.st_size > ANSWER_BYTES:
-            raise AnswerError(f"{ANSWER} has more than {ANSWER_BYTES // MIB} MiB")
-        return path.read_bytes()
+        with opened(path) as stream:
+            content = stream.read(ANSWER_BYTES + 1)
     except FileNotFoundError:
-        raise AnswerError(f"it wrote no {ANSWER}") from None
+        raise ValueError(f"it wrote no {ANSWER}") from None
     except OSError as error:
-        raise AnswerError(f"{ANSWER} cannot be read: {error.strerror}") from None
+        raise ValueError(f"{ANSWER} cannot be read: {error.strerror}") from None
+    if len(content) > ANSWER_BYTES:
+        raise ValueError(f"{ANSWER} has more than {ANSWER_BYTES // MIB} MiB")
+    return content
 
 
-def parsed(data: bytes) -> pd.DataFrame:
-    """The answers of a file: columns ``quantity``, ``place`` (see `place_of`) and ``answer``.
-
-    Raises
-    ------
-    AnswerError
-        Naming the first line that is not whole.
-    """
+def _parsed(data: bytes) -> dict[tuple[str, str], float]:
+    """The answers of a file, by quantity and `place_of`; raises ValueError for its first fault."""
+    answers: dict[tuple[str, str], float] = {}
     try:
         text = data.decode("utf-8-sig")  # some programs begin a text with a mark of its encoding
-        lines = [[word.strip() for word in row] for row in csv.reader(text.splitlines())]
+        rows = [[word.strip() for word in row] for row in csv.reader(text.splitlines()) if row]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise AnswerError(f"{ANSWER} is no table: {error}") from None
-    if lines[:1] != [COLUMNS]:
-        raise AnswerError(f"{ANSWER} does not begin with {','.join(COLUMNS)}")
-    rows = []
-    for number, row in enumerate(lines[1:], 2):
-        if len(row) not in (0, len(COLUMNS)):
-            raise AnswerError(f"{ANSWER}, line {number}: {len(row)} fields in place of 3")
+        raise ValueError(f"{ANSWER} is no table: {error}") from None
+    if rows[:1] != [["quantity", "at", "value"]]:
+        raise ValueError(f"{ANSWER} does not begin with quantity,at,value")
+    for number, row in enumerate(rows[1:], 2):
         try:
-            rows += [(row[0], place_of(row[1]), _number(row[2]))] if row else []
+            quantity, at, value = row
+            key, answer = (quantity, place_of(at)), float(value)
         except ValueError:
-            what = f"{','.join(row)[:80]!r} holds no finite number below {LARGEST:g}"
-            raise AnswerError(f"{ANSWER}, line {number}: {what}") from None
+            answer = np.nan
+        if not abs(answer) < LARGEST:
+            what = f"{','.join(row)[:80]!r} is not a quantity, its at and a finite number"
+            raise ValueError(f"{ANSWER}, line {number}: {what}")
+        if key in answers:
+            raise ValueError(f"{ANSWER} answers {_question(*key)} twice")
+        answers[key] = answer
     if not text.endswith("\n"):
-        raise AnswerError(f"{ANSWER} is cut short: its last line has no end")
-    table = pd.DataFrame(rows, columns=["quantity", "place", "answer"])
-    twice = table[table.duplicated(["quantity", "place"])]
-    if len(twice):
-        raise AnswerError(f"{ANSWER} answers {_question(twice.iloc[0])} twice")
-    return table
+        raise ValueError(f"{ANSWER} is cut short: its last line has no end")
+    return answers
 
 
 def place_of(at: str) -> str:
@@ -384,19 +315,40 @@ def place_of(at: str) -> str:
     return f"{float(at):.7g}" if at.strip() else ""
 
 
-def _number(text: str) -> float:
-    # Python also reads underscores and digits of other alphabets, which other programs never write
-    if "_" in text or not text.isascii() or not abs(float(text)) < LARGEST:
-        raise ValueError(text)
-    return float(text)
+def _question(quantity: str, at: str) -> str:
+    return f"{quantity} at {at}" if at else quantity
 
 
-def _question(row: Any) -> str:
-    return f"{row['quantity']} at {row['place']}" if row["place"] else str(row["quantity"])
+def _read(results: Path, names: Sequence[str]) -> tuple[dict[Any, float], pd.DataFrame]:
+    """The answers of a solver by scene, quantity and place; for each scene times and a fault."""
+    answers: dict[Any, float] = {}
+    rows = []
+    for name in names:
+        used, of_scene = read_json(results / name / USED) or {}, {}
+        error = str(used.get("error") or "")
+        try:
+            of_scene = {} if error else _parsed(_content(results / name / ANSWER))
+        except ValueError as fault:
+            error = str(fault)
+        answers |= {(name, *key): value for key, value in of_scene.items()}
+        times = {key: used.get(key) for key in ("seconds", "cpu_s", "peak_mib")}
+        # the message repeats the output of a program
+        row: Row = {
+            "scene": name,
+            "message": one_line(error),
+            **times,
+            STEPS: of_scene.get((STEPS, "")),
+        }
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    numbers = {key: pd.to_numeric(table[key], errors="coerce") for key in (*times, STEPS)}
+    return answers, table.assign(**numbers)
 
 
-def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
-    """Compare the answers of a solver with the expected ones.
+def judge(
+    chosen: Pack, names: Sequence[str], results: Sequence[Path]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Compare the answers of solvers with the expected ones.
 
     Parameters
     ----------
@@ -404,213 +356,164 @@ def judge(chosen: Pack, names: Sequence[str], results: Path) -> Contender:
         The pack.
     names : sequence of str
         The scenes.
-    results : Path
-        Holds ``SCENE/answer.csv`` of the solver, and ``ours/SCENE/answer.csv`` if ours ran.
+    results : sequence of Path
+        For each solver the directory with its ``SCENE/answer.csv``, and ``ours/SCENE/answer.csv``
+        if ours ran in turn with it.
+
+    Returns
+    -------
+    numbers : DataFrame
+        A row for each solver, `OURS` the last, and each expectation: ``solver``, the columns of the
+        expected answers, ``answer``, ``error`` (relative) and ``within``.
+    verdicts : DataFrame
+        A row for each solver and scene: ``passed``, ``message``, errors and times.
     """
-    answers, ours, scenes = [], [], []
-    for name in names:
-        used, used_by_ours = (
-            value if isinstance(value := read_json(folder / name / USED), dict) else {}
-            for folder in (results, results / OURS)
-        )
-        error = str(used.get("error") or "")
-        answer = again = pd.DataFrame(columns=["quantity", "place", "answer"])
-        if not error:
-            try:
-                answer = parsed(content(results / name / ANSWER))
-            except AnswerError as fault:
-                error = str(fault)
-        path = results / OURS / name / ANSWER
-        if os.path.lexists(path):
-            try:
-                again = parsed(content(path))
-            except AnswerError as fault:
-                raise InputError(fault.what, where=str(path), remedy="remove it") from None
-        answers.append(answer.assign(scene=name))
-        ours.append(again.assign(scene=name))
-        given = chosen.scenes[name]
-        scenes.append(
-            {
-                "scene": name,
-                "level": given["level"],
-                "kind": given["kind"],
-                "message": one_line(error),  # it repeats the output of a program
-                **{key: _known(used.get(key)) for key in ("seconds", "cpu_s", "peak_mib")},
-                **{f"ours_{key}": _known(used_by_ours.get(key)) for key in ("seconds", "cpu_s")},
-                STEPS: _known(answer["answer"][answer["quantity"] == STEPS].max()),
-                f"ours_{STEPS}": _known(again["answer"][again["quantity"] == STEPS].max()),
-            }
-        )
-    keys = ["scene", "quantity", "place"]
-    numbers = chosen.expected[chosen.expected["scene"].isin(names)]
-    numbers = numbers.assign(place=numbers["at"].map(place_of))
-    numbers = numbers.merge(pd.concat(answers), on=keys, how="left")
-    numbers = numbers.merge(
-        pd.concat(ours).rename(columns={"answer": "again"}), on=keys, how="left"
-    )
-    numbers["ours"] = numbers.pop("again").astype(float).fillna(numbers["ours"])
-    numbers["answer"] = numbers["answer"].astype(float)
-    numbers["error"] = relative(numbers["answer"], numbers["value"])
-    numbers["within"] = within(numbers, numbers["answer"], numbers["tolerance"])
-    table = pd.DataFrame(scenes).set_index("scene")
+    expected = chosen.expected[chosen.expected["scene"].isin(names)]
+    places = expected["at"].map(place_of)
+    keys = [*zip(expected["scene"], expected["quantity"], places, strict=True)]
+    tables, times = [], []
+    for place in results:
+        solver = printable(place.absolute().name)
+        (answers, used), (again, used_by_ours) = _read(place, names), _read(place / OURS, names)
+        ours = [again.get(key, stated) for key, stated in zip(keys, expected["ours"], strict=True)]
+        answer = [answers.get(key, np.nan) for key in keys]
+        tables.append(expected.assign(solver=solver, ours=ours, answer=answer))
+        for key in ("seconds", "cpu_s", STEPS):
+            used[f"ours_{key}"] = used_by_ours[key]
+        times.append(used.assign(solver=solver))
+    own = {key: times[0][f"ours_{key}"] for key in ("seconds", STEPS)}
+    own["cpu_s"] = pd.concat(times)["ours_cpu_s"].groupby(level=0).mean()
+    times.append(times[0].assign(solver=OURS, message="", peak_mib=np.nan, **own))
+    tables.append(tables[0].assign(solver=OURS, answer=tables[0]["ours"]))
+    numbers = pd.concat(tables, ignore_index=True)
+    # the error of a value of zero is the answer
+    value = numbers["value"]
+    numbers["error"] = (numbers["answer"] - value) / value.where(value != 0, 1.0)
+    numbers["within"] = within(numbers, numbers["tolerance"])
 
-    def or_else(faults: dict[str, str]) -> "pd.Series[str]":
-        more = pd.Series(faults, dtype=object).reindex(table.index, fill_value="")
-        return table["message"].where(table["message"] != "", more)
-
-    table["message"] = or_else({**_miscounted(numbers, chosen), **_missing(numbers)})
-    table["answered"] = table["message"] == ""
-    table["message"] = or_else(_wrong(numbers))
-    table["passed"] = table["message"] == ""
+    verdicts = pd.concat(times).set_index(["solver", "scene"])
+    for key in ("level", "kind"):
+        verdicts[key] = [chosen.scenes[name][key] for _, name in verdicts.index]
+    faults = _faults(numbers, chosen).reindex(verdicts.index)
+    is_silent = (verdicts["message"] != "") | (faults["rank"] > 1)
+    verdicts["answered"] = ~is_silent
+    verdicts["message"] = verdicts["message"].where(verdicts["message"] != "", faults["what"])
+    verdicts["message"] = verdicts["message"].fillna("")
+    verdicts["passed"] = verdicts["message"] == ""
     judged = numbers[numbers["tolerance"].notna() & ~numbers["quantity"].isin(COUNTS)]
-    signed = judged[judged["scene"].map(table["answered"])].set_index("scene")["error"]
-    table["error"] = signed.abs().groupby("scene").median()
-    table["worst"] = signed.abs().groupby("scene").max()
-    table["bias"] = signed.groupby("scene").median()
-    for ratio, time in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
-        table[ratio] = (table[time] / table[f"ours_{time}"]).where(table["answered"])
-    name = printable(results.absolute().name)
-    return Contender(name, table.reset_index(), numbers.drop(columns="place"))
+    signed = judged.set_index(["solver", "scene"])["error"]
+    groups, sizes = signed.groupby(level=[0, 1]), signed.abs().groupby(level=[0, 1])
+    for name, errors in (
+        ("error", sizes.median()),
+        ("worst", sizes.max()),
+        ("bias", groups.median()),
+    ):
+        verdicts[name] = errors.reindex(verdicts.index).where(verdicts["answered"])
+    for ratio, key in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
+        verdicts[ratio] = (verdicts[key] / verdicts[f"ours_{key}"]).where(verdicts["answered"])
+    verdicts.loc[OURS, ["ratio", "cpu_ratio"]] = np.nan
+    return numbers, verdicts.reset_index()
 
 
-def _known(value: Any) -> float:
-    """A time or a memory, NaN where it is none: anybody may have written it."""
-    return float(value) if isinstance(value, int | float) and 0 < value < 1e300 else np.nan
-
-
-def relative(answer: Any, value: Any) -> Any:
-    """The error of answers over the values; a value of zero has none, and leaves it as it is."""
-    return (answer - value) / np.where(value == 0, 1.0, value)
-
-
-def within(numbers: pd.DataFrame, answer: Any, tolerance: Any) -> Any:
+def within(numbers: pd.DataFrame, tolerance: Any) -> "pd.Series[bool]":
     """Whether answers are in their intervals, widened by a tolerance; missing ones are not."""
     margin = (tolerance + ROUND) * numbers["value"].abs()
-    return (answer >= numbers["low"] - margin) & (answer <= numbers["high"] + margin)
+    return numbers["answer"].between(numbers["low"] - margin, numbers["high"] + margin)
 
 
-def _missing(numbers: pd.DataFrame) -> dict[str, str]:
-    """The scenes that lack a number that was asked, and which."""
-    lacking = numbers[numbers["answer"].isna()].groupby("scene")
-    return {
-        str(name): f"{ANSWER} lacks {_question(rows.iloc[0])}"
-        + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
-        for name, rows in lacking
-    }
+def _faults(numbers: pd.DataFrame, chosen: Pack) -> pd.DataFrame:
+    """The worst fault of each solver in each scene that has one: ``rank`` and ``what``.
+
+    Ranks: 3, a number is missing; 2, a count is none; 1, a judged number is off.
+    """
+    index, answer = ["solver", "scene"], numbers["answer"]
+    counts = numbers["quantity"].isin((*COUNTS, "count"))
+    is_none = counts & ((answer < 0) | (answer % 1 != 0))
+    # at the last load step both are asked: together they are the counted grains
+    ends: Any = numbers[numbers["quantity"].isin(("moved", "not_moved"))]
+    ends = ends[ends.duplicated([*index, "at"], keep=False)].groupby(index)
+    total = numbers[numbers["quantity"] == "count"].set_index(index)["answer"]
+    summed = ends["answer"].sum(min_count=2)
+    total = total.reindex(summed.index).fillna(ends["value"].sum())
+    lost = {*summed.index[summed.notna() & (summed != total)]}
+    ids = zip(numbers["solver"], numbers["scene"], strict=True)
+    is_lost = (numbers["quantity"] == "not_moved") & np.array([key in lost for key in ids])
+    is_off = numbers["tolerance"].notna() & ~numbers["within"]
+    rank = np.select([answer.isna(), is_none | is_lost, is_off], [3, 2, 1], 0)
+    # a count that is off is named only if nothing else is
+    size = numbers["error"].abs().where(~counts, 0.0)
+    table = numbers.assign(rank=rank, size=size, is_none=is_none)[rank > 0]
+    table = table.sort_values(["rank", "size"], ascending=False, kind="stable")
+    table["others"] = table.groupby([*index, "rank"])["rank"].transform("size") - 1
+    worst = table.drop_duplicates(index)
+    return worst.assign(what=[_what(row) for row in worst.to_dict("records")]).set_index(index)
 
 
-def _miscounted(numbers: pd.DataFrame, chosen: Pack) -> dict[str, str]:
-    """The scenes whose counts are none, or do not make N."""
-    counts = numbers[numbers["quantity"].isin((*COUNTS, "count"))]
-    broken = counts[(counts["answer"] < 0) | (counts["answer"] % 1 != 0)]
-    faults = {
-        row["scene"]: f"{_question(row)} is {row['answer']:g}: it counts grains"
-        for row in broken[::-1].to_dict("records")
-    }
-    moved = counts[counts["quantity"] == "moved"]
-    rest = counts[counts["quantity"] == "not_moved"]
-    both = moved.merge(rest, on=["scene", "place"], suffixes=("", "_not"))
-    total = counts[counts["quantity"] == "count"].set_index("scene")["answer"]
-    for row in both.to_dict("records"):
-        count = total.get(row["scene"], chosen.scenes[row["scene"]].get("count"))
-        n, rest_of_n = row["answer"], row["answer_not"]
-        if count is not None and n + rest_of_n != count:
-            sums = f"{n:g} moved and {rest_of_n:g} not, at load step {row['place']}, of {count:g}"
-            faults.setdefault(row["scene"], f"the counts do not make N: {sums}")
-    return faults
-
-
-def _wrong(numbers: pd.DataFrame) -> dict[str, str]:
-    """The scenes with a judged number that is off: the one that is furthest off, and how many."""
-    off = numbers[numbers["tolerance"].notna() & ~numbers["within"]]
-    # a count is named only if nothing else is off
-    off = off.assign(size=off["error"].abs().where(~off["quantity"].isin(COUNTS), 0.0))
-    messages = {}
-    for name, rows in off.groupby("scene"):
-        row = rows.iloc[int(rows["size"].to_numpy().argmax())]
-        what = f"{_question(row)} is {row['answer']:.6g}, not {row['value']:.6g}"
+def _what(row: Mapping[Any, Any]) -> str:
+    question, answer = _question(row["quantity"], row["at"]), row["answer"]
+    if row["rank"] == 3:
+        what = f"{ANSWER} lacks {question}"
+    elif row["is_none"]:
+        what = f"{question} is {answer:g}: it counts grains"
+    elif row["rank"] == 2:
+        what = "the counts do not make N: moved and not_moved at the last load step"
+    else:
+        what = f"{question} is {answer:.6g}, not {row['value']:.6g}"
         if row["low"] < row["high"]:
             what += f" ({row['low']:.6g} ... {row['high']:.6g})"
-        more = f", and {len(rows) - 1} more are off" if len(rows) > 1 else ""
-        messages[str(name)] = what + more
-    return messages
+    return what + (f", and {row['others']} more" if row["others"] else "")
 
 
-def ours(contenders: Sequence[Contender]) -> Contender:
-    """Our solvers as one more of them: our answers, and the mean of our processor times."""
-    first, numbers = contenders[0].verdicts, contenders[0].numbers
-    numbers = numbers.assign(answer=numbers["ours"])
-    numbers["error"] = relative(numbers["answer"], numbers["value"])
-    judged = numbers[numbers["tolerance"].notna() & ~numbers["quantity"].isin(COUNTS)]
-    worst = judged["error"].abs().groupby(judged["scene"]).max()
-    cpu_s = pd.concat([one.verdicts for one in contenders]).groupby("scene")["ours_cpu_s"].mean()
-    verdicts = first.assign(
-        answered=True,
-        worst=first["scene"].map(worst),
-        cpu_s=first["scene"].map(cpu_s),
-        cpu_ratio=np.nan,
-        steps=first["ours_steps"],
-    )
-    return Contender(OURS, verdicts, numbers)
-
-
-def failures(of: Contender) -> pd.DataFrame:
-    """The failures of a solver, one for each cause: ``scenes``, ``kind`` and ``why``."""
-    failed = of.verdicts[~of.verdicts["passed"]]
+def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
+    """The failures of solvers, one for each cause: ``solver``, ``scenes``, ``kind``, ``why``."""
+    failed = verdicts[~verdicts["passed"]]
     # messages of one cause differ in their numbers
     cause = failed["message"].str.replace(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True)
     rows = []
-    for (kind, _), group in failed.groupby(["kind", cause], sort=False):
+    for (solver, kind, _), group in failed.groupby(["solver", "kind", cause], sort=False):
         more = f" and {len(group) - 1} more of kind {kind}" if len(group) > 1 else ""
         first = group.iloc[0]
-        rows.append({"scenes": first["scene"] + more, "kind": kind, "why": first["message"]})
-    return pd.DataFrame(rows, columns=["scenes", "kind", "why"])
+        rows.append((solver, first["scene"] + more, kind, first["message"]))
+    return pd.DataFrame(rows, columns=["solver", "scenes", "kind", "why"])
 
 
-def summary(contenders: Sequence[Contender]) -> pd.DataFrame:
+def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     """One row for each level and kind that was asked, and each solver."""
     rows = []
-    table = pd.concat([one.verdicts.assign(solver=one.name) for one in contenders])
-    for (level, kind, solver), of in table.groupby(["level", "kind", "solver"], sort=False):
-        rows.append(
-            {
-                "level": f"{level} {LEVELS[int(str(level))]}",
-                "kind": kind,
-                "solver": solver,
-                "scenes": len(of),
-                "passed": of["passed"].sum(),
-                "error, median": _text(100 * of["error"].median(), " %"),
-                "bias": _text(100 * of["bias"].median(), " %"),
-                "error, largest": _text(100 * of["worst"].max(), " %"),
-                "time over ours": _text(of["ratio"].median()),
-                "CPU over ours": _text(of["cpu_ratio"].median()),
-                "peak, MiB": _text(of["peak_mib"].max()),
-            }
-        )
+    for (level, kind, solver), of in verdicts.groupby(["level", "kind", "solver"], sort=False):
+        numbers = {
+            "error, median": (100 * of["error"].median(), " %"),
+            "bias": (100 * of["bias"].median(), " %"),
+            "error, largest": (100 * of["worst"].max(), " %"),
+            "time over ours": (of["ratio"].median(), ""),
+            "CPU over ours": (of["cpu_ratio"].median(), ""),
+            "peak, MiB": (of["peak_mib"].max(), ""),
+        }
+        head = {"level": f"{level} {LEVELS[int(str(level))]}", "kind": kind, "solver": solver}
+        texts = {name: f"{x:.3g}{unit}" if x == x else "" for name, (x, unit) in numbers.items()}
+        rows.append({**head, "scenes": len(of), "passed": of["passed"].sum(), **texts})
     return pd.DataFrame(rows)
 
 
-def _text(value: float, unit: str = "") -> str:
-    return f"{value:.3g}{unit}" if value == value else ""
-
-
-def _written(chosen: Pack, contenders: Sequence[Contender], folder: Folder) -> Outcome:
+def _written(
+    chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder
+) -> Outcome:
     """Put tables, figures and page of a comparison into a directory."""
-    numbers = pd.concat([one.numbers.assign(solver=one.name) for one in contenders])
-    verdicts = pd.concat([one.verdicts.assign(solver=one.name) for one in contenders])
+    theirs = verdicts[verdicts["solver"] != OURS]
+    tables = {NUMBERS: (numbers[numbers["solver"] != OURS], "%.9g"), VERDICTS: (theirs, "%.6g")}
     with folder.renewed(NUMBERS, VERDICTS, PAGE, FIGURES):
-        for name, table, digits in ((NUMBERS, numbers, "%.9g"), (VERDICTS, verdicts, "%.6g")):
+        for name, (table, digits) in tables.items():
             columns = ["solver", *table.columns.drop("solver")]
-            folder.put(name, text.csv(table[columns], digits))
+            folder.put(name, text_of_table(table[columns], digits))
         # the drawing libraries take half a second to import
         from orchestrator.benchmark import page
 
-        page.write(chosen, contenders, folder)
+        page.write(chosen, numbers, verdicts, folder)
+    failed, is_alone = failures(theirs), theirs["solver"].nunique() == 1
     lines = [
-        f"{f'{one.name}: ' if len(contenders) > 1 else ''}{row['scenes']}: {row['why']}"
-        for one in contenders
-        for row in failures(one).to_dict("records")
+        f"{'' if is_alone else f'{row.solver}: '}{row.scenes}: {row.why}"
+        for row in failed.itertuples()
     ]
     if len(lines) > LISTED:
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
-    return Outcome(lines, summary(contenders).to_string(index=False), folder.root / PAGE)
+    return Outcome(lines, summary(theirs).to_string(index=False), folder.root / PAGE)

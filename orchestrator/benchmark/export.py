@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import pipeline, plan, tables
-from orchestrator.benchmark import exact, measured, pack
+from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.pack import KINDS, STUDY, Pack, Problem
 from orchestrator.errors import InputError, SolverError
 from orchestrator.plan import Plan
@@ -25,7 +25,6 @@ from orchestrator.study import fields, study
 from orchestrator.study.study import Group, Study
 from orchestrator.tables import Tables
 
-LEVELS = (1, 2, 3, 4, 5)
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
 DEFAULT = "first-look"
@@ -56,7 +55,7 @@ NAMED: dict[str, Callable[[Any], str]] = {
 """Columns that name a scene where they differ between the scenes of a study."""
 
 
-def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
+def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     """Write a pack, and return how many scenes it has.
 
     Parameters
@@ -65,7 +64,7 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         Its directory.
     source : Path or None
         Directory of a finished study. Without one the answers are formulas: levels 1 and 2.
-    levels : sequence of int
+    levels : collection of int
         The levels; empty for all that the source has.
 
     Raises
@@ -74,20 +73,16 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         If a level needs a study, or the study is not finished, not answered as it asks, or asks for
         beds that change or lie in space.
     """
+    levels = levels or (FORMULAS if source is None else {kind.level for kind in KINDS.values()})
+    kinds = [name for name, kind in KINDS.items() if kind.level in levels]
     if source is None:
-        lacking = sorted(set(levels) - set(FORMULAS))
-        if lacking:
-            raise InputError(
-                f"level {lacking[0]} needs the answers of a finished study",
-                where="--level",
-                remedy="name its directory with --from",
-            )
+        if lacking := sorted({*levels} - {*FORMULAS}):
+            what = f"level {lacking[0]} needs the answers of a finished study"
+            raise InputError(what, where="--level", remedy="name its directory with --from")
         asked = study.load(DEFAULT)
-        chosen = levels or FORMULAS
-        programs = {"liggghts": liggghts.version()} if 2 in chosen and _has_decks() else {}
-        kinds = [kind for kind, one in KINDS.items() if one.level in chosen]
-        made = (one for one, _ in problems(asked, plan.make(asked), {}, Path(), kinds))
-        return pack.write(root, made, (asked.name, asked.text), programs)
+        programs = {"liggghts": liggghts.version()} if 2 in levels and _has_decks() else {}
+        listed = (problem for problem, _ in problems(asked, plan.make(asked), {}, Path(), kinds))
+        return pack.write(root, listed, (asked.name, asked.text), programs)
     space = Workspace(source.absolute())
     asked, planned = pipeline.reopen(space)
     _check(asked, planned, source)
@@ -95,19 +90,15 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
         raise InputError("the study is not finished", where=str(source), remedy="run it to its end")
     times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
     if set(times.index) != set(planned.cases):
-        raise InputError(
-            "the study was run by another version of the program: its cases are others",
-            where=str(source),
-            remedy="run it again",
-        )
-    kinds = [kind for kind, one in KINDS.items() if one.level in (levels or LEVELS)]
-    results = tables.read(space, "tables")
-    sharing = {one.name: len(one.scenes) for one in planned.cells}
+        what = "the study was run by another version of the program: its cases are others"
+        raise InputError(what, where=str(source), remedy="run it again")
+    results = tables.read(space.folder, "tables")
+    sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
 
     def timed() -> Iterator[Problem]:
-        for one, runs in problems(asked, planned, results, space.cases, kinds):
+        for problem, runs in problems(asked, planned, results, space.cases, kinds):
             seconds = sum(times[run] / sharing.get(run, 1) for run in runs)
-            yield replace(one, seconds=seconds if runs else one.seconds)
+            yield replace(problem, seconds=seconds) if runs else problem
 
     programs = case.programs(space.cases, planned.cases)
     return pack.write(root, timed(), (asked.name, asked.text), programs)
@@ -115,14 +106,18 @@ def export(root: Path, source: Path | None, levels: Sequence[int]) -> int:
 
 def _check(asked: Study, planned: Plan, source: Path) -> None:
     """See that a study is one whose scenes a pack can hold."""
-    tolerance = not all(one.is_as_asked for one in planned.decisions.values())
-    changing = any(scene.protocol.update for scene in asked.scenes)
-    in_space = any(pile.bed.width for pile in planned.piles.values())
-    for is_so, what in (
-        (tolerance, f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"),
-        (changing, "protocol.update: a pack holds one flow over each bed"),
-        (in_space, "bed.width: a pack holds grains in the plane of the flow"),
-    ):
+    faults = {
+        f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask": not all(
+            answer.is_as_asked for answer in planned.decisions.values()
+        ),
+        "protocol.update: a pack holds one flow over each bed": any(
+            scene.protocol.update for scene in asked.scenes
+        ),
+        "bed.width: a pack holds grains in the plane of the flow": any(
+            pile.bed.width for pile in planned.piles.values()
+        ),
+    }
+    for what, is_so in faults.items():
         if is_so:
             remedy = "run the study without it into another directory"
             raise InputError(what, where=str(source), remedy=remedy)
@@ -135,10 +130,8 @@ def problems(
 
     Parameters
     ----------
-    asked : Study
-        The study.
-    planned : Plan
-        Its plan.
+    asked, planned : Study, Plan
+        The study and its plan.
     results : dict of str to DataFrame
         Its tables; for formulas alone it may be empty.
     cases : Path
@@ -146,38 +139,42 @@ def problems(
     kinds : collection of str
         Names of `KINDS`.
     """
-    names = scene_names(planned, asked)
     if "collision" in kinds:
-        for one in exact.checks():
-            yield _with_ours(one), ()
+        for check in scenes.checks():
+            yield _with_ours(check), ()
     cell_of = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
-    grains = [scene for scene in asked.scenes if scene.id not in planned.piles]
     thresholds = results.get("single_grain")
     ours = {} if thresholds is None else dict(thresholds.set_index("scene_id")["ustar_m_s"])
+    piles = planned.piles
+    # neither a theory's stress nor a channel's is a question at levels 3 and 5
+    solved = {i: p for i, p in piles.items() if p.model.cases and not p.scene.flow.depth}
 
     def unnamed() -> Iterator[tuple[Problem, tuple[str, ...]]]:
-        for scene in grains:
+        for scene in asked.scenes:
+            if scene.id in piles:
+                continue
             if "closed-form" in kinds:
-                yield exact.closed_form(scene), ()
-            if "pivot" in kinds and exact.has_pivot(scene):
+                yield scenes.closed_form(scene), ()
+            if "pivot" in kinds and scenes.has_pivot(scene):
                 runs = (cell_of[scene.id],) if scene.id in ours else ()
-                yield exact.pivot(scene, ours.get(scene.id, np.nan)), runs
-        # neither a theory's stress nor a channel's is a question at levels 3 and 5
-        solved = [p for p in planned.piles.values() if p.model.cases and not p.scene.flow.depth]
+                yield scenes.pivot(scene, ours.get(scene.id, np.nan)), runs
         if "flow" in kinds:
-            for pile in {pile.flow.name: pile for pile in solved}.values():
-                yield measured.flow(pile, results), (pile.flow.name,)
-        if not {"pile", "line"} & {*kinds}:
-            return
-        for bed in measured.beds(planned.piles.values(), results, cases):
+            for pile in {pile.flow.name: pile for pile in solved.values()}.values():
+                yield scenes.flow(pile, results), (pile.flow.name,)
+        for asked_id, pile in piles.items():
+            # replicas of lattices are in the intervals of the others
+            if pile.bed.is_replica or pile.scene.protocol.method != "dem":
+                continue
             if "pile" in kinds:
-                yield measured.pile(bed), (bed.pile.case.name,)
+                yield scenes.bed("pile", pile, results, cases), (pile.case.name,)
             # grains on other beds are given at level 4 alone, one by one
-            if "line" in kinds and bed.pile in solved and bed.pile.bed.is_triangle:
-                yield measured.line(bed), (bed.pile.flow.name, bed.pile.case.name)
+            if "line" in kinds and asked_id in solved and pile.bed.is_triangle:
+                both = pile.flow.name, pile.case.name
+                yield scenes.bed("line", pile, results, cases), both
 
-    for one, runs in unnamed():
-        yield replace(one, name=names[one.name]), runs
+    names = scene_names(planned, asked)
+    for problem, runs in unnamed():
+        yield replace(problem, name=names[problem.name]), runs
 
 
 def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
@@ -187,8 +184,8 @@ def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
     piles = {name: pile.scene for name, pile in planned.piles.items()}
     of_flow = {"alpha_deg", "h_m", "z0_over_d", "nu_m2_s"}
     names: dict[str, str] = {}
-    for kind, scenes in (("grain", grains), ("pile", piles), ("flow", flows)):
-        values = pd.DataFrame([fields.used(scene) for scene in scenes.values()], index=[*scenes])
+    for kind, listed in (("grain", grains), ("pile", piles), ("flow", flows)):
+        values = pd.DataFrame([fields.used(scene) for scene in listed.values()], index=[*listed])
         columns = [name for name in NAMED if name in values and values[name].nunique() > 1]
         if kind == "flow":
             columns = [name for name in columns if name in of_flow]
@@ -205,15 +202,15 @@ def _has_decks() -> bool:
     return shutil.which(liggghts.PROGRAM) is not None
 
 
-def _with_ours(one: Problem) -> Problem:
+def _with_ours(check: Problem) -> Problem:
     """A check of the contact law with the answer of our deck, if LIGGGHTS is installed."""
     if not _has_decks():
-        return one
+        return check
     with tempfile.TemporaryDirectory() as folder:
-        answer, took = run_check(one.kind, one.parameters, Path(folder) / "deck")
+        answer, took = run_check(check.kind, check.parameters, Path(folder) / "deck")
     keys = ["quantity", "at"]
-    ours = one.expected[keys].merge(answer, on=keys, how="left")["value"]
-    return replace(one, expected=one.expected.assign(ours=ours), seconds=took.seconds)
+    ours = check.expected[keys].merge(answer, on=keys, how="left")["value"]
+    return replace(check, expected=check.expected.assign(ours=ours), seconds=took.seconds)
 
 
 class Took(NamedTuple):
@@ -224,27 +221,36 @@ class Took(NamedTuple):
 
 
 class Ours:
-    """The solvers of this package on the scenes of a pack.
+    """The solvers of this package on the scenes of a pack, in a directory of cases.
 
-    Parameters
-    ----------
-    chosen : Pack
-        The pack.
-    root : Path
-        Directory of the cases.
+    Raises
+    ------
+    InputError
+        If the study of the pack names a file, or lacks one of the scenes named: the pack is of
+        another version of the program.
     """
 
-    def __init__(self, chosen: Pack, root: Path) -> None:
-        text = (chosen.root / STUDY).read_text(encoding="utf-8")
+    def __init__(self, chosen: Pack, names: Sequence[str], root: Path) -> None:
+        path = chosen.root / STUDY
+        try:
+            text = path.read_text(encoding="utf-8")
+        except ValueError as error:
+            raise InputError(f"it cannot be read: {error}", where=str(path)) from None
         self.pack, self.root = chosen, root
-        self.study = study.parse(text, name="benchmark", where=str(chosen.root / STUDY))
+        self.study = study.parse(text, name="benchmark", where=str(path))
+        if self.study.text != text:
+            what = "its study names a file; a pack has the text of each in [profiles]"
+            raise InputError(what, where=str(path), remedy="export the pack again")
         planned = plan.make(self.study)
-        names = scene_names(planned, self.study)
-        scenes = {names[one.id]: one for one in self.study.scenes}
+        digests = scene_names(planned, self.study)
         piles = planned.piles.values()
-        flows = {names[run.id[:12]]: p.scene for p in piles for run in p.model.cases}
-        self.scenes = scenes | flows
+        flows = {digests[run.id[:12]]: p.scene for p in piles for run in p.model.cases}
+        self.scenes = {digests[scene.id]: scene for scene in self.study.scenes} | flows
         self.times: dict[str, Took] = {}
+        for name in names:
+            if chosen.scenes[name]["kind"] not in CHECKS and name[2:] not in self.scenes:
+                what = f"no scene of its study is {name}: it is of another version of the program"
+                raise InputError(what, where=str(chosen.root), remedy="export it again")
 
     def answer(self, name: str) -> tuple[pd.DataFrame, Took]:
         """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its time.
@@ -254,69 +260,38 @@ class Ours:
         SolverError
             If a solver failed.
         """
-        kind = self.pack.scenes[name]["kind"]
-        if kind in CHECKS:
-            return run_check(kind, self.pack.scenes[name], self.root / "checks")
-        group = Group("benchmark", (self.scenes[self._key(name)],), str(self.pack.root / STUDY))
+        given = self.pack.scenes[name]
+        if given["kind"] in CHECKS:
+            return run_check(given["kind"], given, self.root / "checks")
+        group = Group("benchmark", (self.scenes[name[2:]],), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
         # several scenes share a flow or a poured bed, which is run once
         shared = [r for p in planned.piles.values() for r in (*p.model.cases, *p.pouring)]
-        needed = {"closed-form": [], "flow": shared}.get(kind, [*planned.cases.values()])
+        needed: Sequence[Case] = [*planned.cases.values()]
+        needed = {"closed-form": [], "flow": shared}.get(given["kind"], needed)
         for run in needed:
             if run not in shared or run.name not in self.times:
-                self._run(run)
+                engine.execute(run, self.root, LIMIT_S)
+                state = case.done_state(run, self.root) or {}
+                self.times[run.name] = Took(float(state["solver_s"]), float(state["cpu_s"]))
         done = {run.name for run in needed}
         results = tables.make(asked, planned, self.root, done) if needed else {}
-        ((problem, runs),) = problems(asked, planned, results, self.root, [kind])
+        ((problem, runs),) = problems(asked, planned, results, self.root, [given["kind"]])
         answer = problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
-        if kind == "pile":
+        if given["kind"] == "pile":
             steps = pd.read_csv(self.root / runs[0] / "samples.csv")["step"].iloc[-1]
-            row = {"quantity": ["steps"], "at": [""], "value": [float(steps)]}
-            answer = pd.concat([answer, pd.DataFrame(row)], ignore_index=True)
-        took = [self.times[run] for run in runs] or [Took()]
-        return answer, Took(sum(t.seconds for t in took), sum(t.cpu_s for t in took))
-
-    def check(self, name: str) -> None:
-        """See that a scene can be answered.
-
-        Raises
-        ------
-        InputError
-            If the pack's study has no such scene: the pack is of another version of the program.
-        """
-        if self.pack.scenes[name]["kind"] not in CHECKS and self._key(name) not in self.scenes:
-            raise InputError(
-                f"no scene of its study is {name}: it is of another version of the program",
-                where=str(self.pack.root),
-                remedy="export it again",
-            )
-
-    def _key(self, name: str) -> str:
-        return name.partition("-")[2]
-
-    def _run(self, run: Case) -> None:
-        engine.execute(run, self.root, LIMIT_S)
-        state = case.done_state(run, self.root) or {}
-        self.times[run.name] = Took(float(state["solver_s"]), float(state["cpu_s"]))
+            row = pd.DataFrame({"quantity": ["steps"], "at": [""], "value": [float(steps)]})
+            answer = pd.concat([answer, row])
+        times = [self.times[run] for run in runs] or [Took()]
+        return answer, Took(*map(sum, zip(*times, strict=True)))
 
 
 def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Took]:
-    """Run one of the decks for the contact law.
+    """Run one of the decks for the contact law, a kind of `CHECKS`, with the entries of its scene.
 
-    Parameters
-    ----------
-    kind : str
-        One of `CHECKS`.
-    given : mapping
-        The parameters of the scene.
-    folder : Path
-        Where it runs; what is there is removed.
-
-    Raises
-    ------
-    SolverError
-        If it did not come to its end.
+    It runs in a folder, whose content is removed. Raises SolverError if it does not come to its
+    end.
     """
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(case.templates() / "liggghts", folder)
@@ -327,15 +302,14 @@ def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.Dat
         unit = float(np.sqrt(given["d_m"] * given["reduced_gravity_m_s2"]))
         variables["speed"] = given["speed_m_s"] / unit
     elif kind == "passing":
+        push = given["force_n"] * np.tan(np.radians(given["beta_deg"])) / given["weight_n"]
         names = ("displacement_criterion", "stiffness")
-        variables |= {"push": exact.push_of(given), **{name: given[name] for name in names}}
+        variables |= {"push": float(push), **{name: given[name] for name in names}}
     command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
     for name, value in variables.items():
         command += ["-var", name, repr(value)]
-    log = folder / "log.check"
-    ended = process.run(
-        command, cwd=folder / "checks", log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT
-    )
+    work, log = folder / "checks", folder / "log.check"
+    ended = process.run(command, cwd=work, log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT)
     printed = log.read_text(errors="replace")
     if ended.returncode != 0 or "the check has ended" not in printed:
         raise SolverError("the check did not come to its end", where=str(log), remedy="see it")

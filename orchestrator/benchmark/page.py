@@ -2,9 +2,10 @@
 
 import textwrap
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,13 +13,13 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.benchmark import compare, pack
-from orchestrator.benchmark.compare import Contender
+from orchestrator.benchmark.compare import OURS
 from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
 from orchestrator.physics import curves
 from orchestrator.report import document, settings
-from orchestrator.report.document import Section
-from orchestrator.report.style import Figure
+from orchestrator.report.document import Section, sheet
+from orchestrator.report.style import DIAMETERS, WATER, Figure
 from orchestrator.runs.files import Folder
 
 PANELS = 6
@@ -27,7 +28,6 @@ FLOOR = 1e-6
 """Least error of a logarithmic axis: exact formulas and reruns have less."""
 EXPECTED = "0.25"
 """Colour of the expected answer, and of ours."""
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
 MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
 """Markers of the levels."""
 LIMITS = (
@@ -55,46 +55,51 @@ SHOWN = {
     **{"ratio": "ratio", "cpu_ratio": "CPU ratio", "peak_mib": "MiB"},
 }
 """Columns of the table of scenes."""
+Look = dict[str, Any]
 
 
-def write(chosen: Pack, contenders: Sequence[Contender], folder: Folder) -> None:
-    """Put the page and its figures into a directory."""
-    verdicts = pd.concat([one.verdicts.assign(solver=one.name) for one in contenders])
-    machine = chosen.manifest.machine
+def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
+    """Put the page and its figures into a directory; the tables are those of `compare.judge`."""
+    theirs = verdicts[verdicts["solver"] != OURS]
+    machine, names = chosen.manifest.machine, theirs["solver"].unique().tolist()
     where = f" on {machine['processor']} with {machine['cores']} cores" if machine else ""
     text = (
-        f"{verdicts['passed'].sum()} of {len(verdicts)} scenes passed. The pack was exported"
+        f"{theirs['passed'].sum()} of {len(theirs)} scenes passed. The pack was exported"
         f"{where}; the programs below gave its expected answers.\n\n{ERRORS}"
     )
-    failed = pd.concat([compare.failures(one).assign(solver=one.name) for one in contenders])
+    failed = compare.failures(theirs)
     failed["why"] = failed["why"].map(lambda why: textwrap.fill(why, 100))
-    scenes = verdicts[[*SHOWN]].assign(
-        error=100 * verdicts["error"],
-        worst=100 * verdicts["worst"],
-        passed=np.where(verdicts["passed"], "yes", "no"),
-    )
+    percent = {name: 100 * theirs[name] for name in ("error", "worst")}
+    scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
+    moved = "Grains that have moved, "
     with settings.own(), warnings.catch_warnings():
-        # the name of a solver may have letters that the font has not
+        # the name of a solver may have letters that the font has not, or be no formula
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        beds = [figure for figure in _beds(chosen, contenders) if figure]
+        matplotlib.rcParams["text.parse_math"] = False
+        beds = [
+            _panels(*(chosen, numbers, verdicts, kind), *(stem, title, panel))
+            for kind, stem, title, panel in (
+                ("flow", "stress", "Friction velocity along the bed", _along_bed),
+                ("pile", "moved", f"{moved}under the given stress", _moved),
+                ("line", "moved-line", f"{moved}with the solver's own flow", _moved),
+            )
+        ]
+        figures = [figure for figure in (*beds, _shields(chosen, numbers)) if figure]
         sections = [
-            Section("Levels", text, (), (_sheet(compare.summary(contenders)),), LIMITS),
-            Section("What failed", tables=(_sheet(failed[["solver", "scenes", "kind", "why"]]),)),
-            Section("Beds", THRESHOLDS, beds, (_sheet(thresholds(chosen, contenders)),)),
-            Section(
-                "Time and error", COSTS, _speed(contenders), (_sheet(costs(chosen, contenders)),)
-            ),
+            Section("Levels", text, (), (_sheet(compare.summary(theirs)),), LIMITS),
+            Section("What failed", tables=(_sheet(failed),)),
+            Section("Beds", THRESHOLDS, figures, (_sheet(thresholds(chosen, numbers)),)),
+            Section("Time and error", COSTS, _speed(verdicts), (_sheet(costs(chosen, verdicts)),)),
             Section("Scenes", tables=(_sheet(scenes.rename(columns=SHOWN)),)),
         ]
-        names = ", ".join(one.name for one in contenders)
-        title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
-        shown = [one for one in sections if one.figures or any(len(table) for table in one.tables)]
+        title = f"Against the pack “{printable(chosen.root.name)}”: {', '.join(names)}"
+        shown = [part for part in sections if part.figures or any(map(len, part.tables))]
         document.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
 
 
-def _sheet(table: pd.DataFrame) -> Any:
+def _sheet(table: pd.DataFrame) -> pd.DataFrame:
     # heads are typeset: an underscore of a solver's name would lower the letters after it
-    return document.sheet(table.rename(columns=lambda name: name.replace("_", " ")))
+    return sheet(table.rename(columns=lambda name: name.replace("_", " ")))
 
 
 def about(chosen: Pack, scene: str) -> str:
@@ -102,113 +107,99 @@ def about(chosen: Pack, scene: str) -> str:
     given = chosen.scenes[scene]
     size = f"d = {1e3 * given['d_m']:g} mm" if "d_m" in given else f"z₀ = {given['z0_m']:.3g} m"
     packing = f", {given['packing']}" if "packing" in given else ""
-    seed = f" {given['seed']}" if "seed" in given else ""
+    seed = f" {given['seed']:g}" if "seed" in given else ""
     return f"{given['alpha_deg']:g}°, {size}{packing}{seed}{', lift-off' * ('lift_off' in given)}"
 
 
-def thresholds(chosen: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
+def _solvers(table: pd.DataFrame) -> list[str]:
+    """Names of the solvers, ours first."""
+    return [OURS, *(name for name in table["solver"].unique() if name != OURS)]
+
+
+def thresholds(chosen: Pack, numbers: pd.DataFrame) -> pd.DataFrame:
     """The threshold Shields numbers of piles: ours, each solver's, the interval."""
-    numbers = contenders[0].numbers
     asked = numbers[numbers["quantity"].eq("shields") & numbers["at"].ne("")]
+    first = asked[asked["solver"] == OURS]
     table = {
-        "scene": asked["scene"],
-        "pile": [about(chosen, scene) for scene in asked["scene"]],
-        "n/N": [f"{float(at):.0%}" for at in asked["at"]],
+        "scene": first["scene"].tolist(),
+        "pile": [about(chosen, scene) for scene in first["scene"]],
+        "n/N": [f"{float(at):.0%}" for at in first["at"]],
     }
-    for one in (compare.ours(contenders), *contenders):
-        answer = one.numbers["answer"][asked.index]
-        is_inside, is_tolerated = (
-            compare.within(asked, answer, tolerance) for tolerance in (0.0, asked["tolerance"])
-        )
-        marks = np.select([answer.isna() | is_inside, is_tolerated], ["", " *"], " **")
-        pairs = zip(answer, marks, strict=True)
-        table[one.name] = ["—" if x != x else f"{x:#.3g}{mark}" for x, mark in pairs]
-    ends = zip(asked["low"], asked["high"], strict=True)
+    for solver in _solvers(asked):
+        rows = asked[asked["solver"] == solver]
+        is_fine = rows["answer"].isna() | compare.within(rows, 0.0)
+        marks = np.select([is_fine, compare.within(rows, rows["tolerance"])], ["", " *"], " **")
+        pairs = zip(rows["answer"], marks, strict=True)
+        table[solver] = ["—" if x != x else f"{x:#.3g}{mark}" for x, mark in pairs]
+    ends = zip(first["low"], first["high"], strict=True)
     table["interval"] = [f"{low:#.3g} ... {high:#.3g}" for low, high in ends]
     return pd.DataFrame(table)
 
 
-def costs(chosen: Pack, contenders: Sequence[Contender]) -> pd.DataFrame:
+def costs(chosen: Pack, verdicts: pd.DataFrame) -> pd.DataFrame:
     """CPU time of each pile, ours and each solver's, and the grain-steps of a second of it."""
-    verdicts = contenders[0].verdicts
-    scenes = verdicts["scene"][verdicts["kind"] == "pile"].tolist()
+    piles = verdicts[verdicts["kind"] == "pile"]
+    scenes = piles["scene"].unique().tolist()
     # of the fixed grains a solver may leave out those that nothing can touch
-    mobile = np.array([pack.mobile_grains(chosen, scene) for scene in scenes], dtype=float)
-    table: dict[str, Any] = {
-        "scene": scenes,
-        "pile": [about(chosen, scene) for scene in scenes],
-        "mobile": mobile,
-    }
-    for one in (compare.ours(contenders), *contenders):
-        piles = one.verdicts.set_index("scene").loc[scenes]
-        table[f"{one.name}, s"] = piles["cpu_s"].where(piles["answered"]).to_numpy()
-        table[f"{one.name} over ours"] = piles["cpu_ratio"].to_numpy()
-        table[f"{one.name}, M/s"] = (mobile * piles["steps"] / piles["cpu_s"] / 1e6).to_numpy()
+    grains = (chosen.root / pack.SCENES / scene / "grains.csv" for scene in scenes)
+    mobile = np.array([(pd.read_csv(path)["kind"] != "fixed").sum() for path in grains], float)
+    table: dict[str, Any] = {"scene": scenes, "pile": [about(chosen, scene) for scene in scenes]}
+    table["mobile"] = mobile
+    for solver in _solvers(piles):
+        rows = piles[piles["solver"] == solver]
+        table[f"{solver}, s"] = rows["cpu_s"].where(rows["answered"]).to_numpy()
+        table[f"{solver} over ours"] = rows["cpu_ratio"].to_numpy()
+        table[f"{solver}, M/s"] = mobile * (rows["steps"] / rows["cpu_s"] / 1e6).to_numpy()
     return pd.DataFrame(table).dropna(axis="columns", how="all")
 
 
-def _looks(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
+def _looks(table: pd.DataFrame) -> dict[str, Look]:
     """A colour for each solver, and rings one in the other: equal answers hide none."""
-    sizes = range(2 * len(contenders) + 1, 1, -2)
-    return [
-        {"color": COLOURS[number % len(COLOURS)], "ms": size, "mfc": "none", "mew": 0.7}
-        for number, size in enumerate(sizes)
-    ]
+    names = _solvers(table)[1:]
+    looks: dict[str, Look] = {OURS: {"color": EXPECTED, "ms": 3}}
+    for number, name in enumerate(names):
+        colour, size = DIAMETERS[number % len(DIAMETERS)], 2 * (len(names) - number) + 1
+        looks[name] = {"color": colour, "ms": size, "mfc": "none", "mew": 0.7}
+    return looks
 
 
-def _legends(canvas: Canvas, contenders: Sequence[Contender], *others: Line2D) -> None:
-    names = [
-        Line2D([], [], color=look["color"], lw=2.5, label=one.name)
-        for one, look in zip(contenders, _looks(contenders), strict=True)
-    ]
+def _canvas(height: float, looks: dict[str, Look], levels: Any, *samples: Line2D) -> Canvas:
+    """A canvas with a legend of the solvers above, and one of levels and samples below."""
+    canvas = Canvas(figsize=(7.0, height), layout="compressed")
+    names = [Line2D([], [], color=one["color"], lw=2.5, label=name) for name, one in looks.items()]
     canvas.legend(handles=names, loc="outside upper center", ncols=6)
-    canvas.legend(handles=list(others), loc="outside lower center", ncols=3)
-
-
-def _canvas(height: float) -> Canvas:
-    return Canvas(figsize=(7.0, height), layout="compressed")
-
-
-def _beds(chosen: Pack, contenders: Sequence[Contender]) -> list[Figure | None]:
-    moved = "Grains that have moved, "
-    return [
-        _panels(
-            chosen, contenders, "flow", "stress", "Friction velocity along the bed", _along_bed
-        ),
-        _panels(chosen, contenders, "pile", "moved", f"{moved}under the given stress", _moved),
-        _panels(
-            chosen, contenders, "line", "moved-line", f"{moved}with the solver's own flow", _moved
-        ),
-        _shields(chosen, contenders),
-    ]
+    marks: Look = {"color": "0.3", "mfc": "none", "ls": "none"}
+    below = [Line2D([], [], marker=MARKERS[n], label=f"level {n}", **marks) for n in levels]
+    canvas.legend(handles=[*samples, *below], loc="outside lower center", ncols=4)
+    return canvas
 
 
 def _panels(
     chosen: Pack,
-    contenders: Sequence[Contender],
+    numbers: pd.DataFrame,
+    verdicts: pd.DataFrame,
     kind: str,
     stem: str,
     title: str,
-    panel: Callable[[Axes, pd.DataFrame, list[Any]], None],
+    panel: Callable[[Axes, pd.DataFrame, dict[str, Look]], None],
 ) -> Figure | None:
     """A panel for some scenes of a kind; none if nobody answered any."""
-    answered = pd.concat([one.verdicts[one.verdicts["answered"]] for one in contenders])
+    answered = verdicts[verdicts["answered"] & (verdicts["solver"] != OURS)]
     names = answered["scene"][answered["kind"] == kind].unique().tolist()
     if not names:
         return None
     drawn = [names[i] for i in np.unique(np.linspace(0, len(names) - 1, PANELS).astype(int))]
-    columns = min(len(drawn), 3)
+    columns, looks = min(len(drawn), 3), _looks(numbers)
+    looks.pop(OURS)
     lines = -(-len(drawn) // columns)
-    canvas = _canvas(0.8 + 2.0 * lines)
+    sample = Line2D([], [], color=EXPECTED, label="expected, interval")
+    canvas = _canvas(0.8 + 2.0 * lines, looks, (), sample)
     axes = canvas.subplots(lines, columns, squeeze=False).ravel()
     for ax, name in zip(axes, drawn, strict=False):
-        rows = contenders[0].numbers[contenders[0].numbers["scene"] == name]
-        answers = [one.numbers["answer"][rows.index] for one in contenders]
-        panel(ax, rows, list(zip(answers, _looks(contenders), strict=True)))
+        panel(ax, numbers[numbers["scene"] == name], looks)
         ax.set_title(f"{textwrap.fill(name, 36)}\n{about(chosen, name)}", size=6.5)
     for ax in axes[len(drawn) :]:
         ax.remove()
-    _legends(canvas, contenders, Line2D([], [], color=EXPECTED, label="expected, interval"))
     caption = (
         f"{len(drawn)} of {len(names)} scenes. The line and its band are the expected answer and"
         " its interval, the rings are the solvers'."
@@ -216,88 +207,76 @@ def _panels(
     return Figure(stem, title, caption, (), canvas)
 
 
-def _along_bed(ax: Axes, rows: pd.DataFrame, answers: list[Any]) -> None:
-    here = rows[rows["quantity"] == "ustar_over_ustar0"]
-    s = here["at"].astype(float)
-    ax.plot(s, here["value"], color=EXPECTED)
-    for answer, look in answers:
-        ax.plot(s, answer[here.index], "o", **look)
+def _along_bed(ax: Axes, rows: pd.DataFrame, looks: dict[str, Look]) -> None:
+    for solver, here in rows[rows["quantity"] == "ustar_over_ustar0"].groupby("solver"):
+        s = here["at"].astype(float)
+        if solver == OURS:
+            ax.plot(s, here["value"], color=EXPECTED)
+        else:
+            ax.plot(s, here["answer"], "o", **looks[str(solver)])
     ax.set(xlim=(-3, 12), xlabel="s/h", ylabel="u*/u*₀")
 
 
-def _moved(ax: Axes, rows: pd.DataFrame, answers: list[Any]) -> None:
-    here = rows[rows["quantity"] == "moved"]
-    load_step = here["at"].astype(float)
-    total = here["value"].iloc[-1] + rows["value"][rows["quantity"] == "not_moved"].sum()
-    ax.fill_between(load_step, here["low"] / total, here["high"] / total, color="0.85", lw=0)
-    ax.plot(load_step, here["value"] / total, color=EXPECTED)
-    for answer, look in answers:
-        ax.plot(load_step, answer[here.index] / total, "o", **look)
+def _moved(ax: Axes, rows: pd.DataFrame, looks: dict[str, Look]) -> None:
+    for solver, of in rows.groupby("solver"):
+        here = of[of["quantity"] == "moved"]
+        load_step = here["at"].astype(float)
+        total = here["value"].iloc[-1] + of["value"][of["quantity"] == "not_moved"].sum()
+        if solver == OURS:
+            ax.fill_between(
+                load_step, here["low"] / total, here["high"] / total, color="0.85", lw=0
+            )
+            ax.plot(load_step, here["value"] / total, color=EXPECTED)
+        else:
+            ax.plot(load_step, here["answer"] / total, "o", **looks[str(solver)])
     ax.set(ylim=(0, 1), xlabel="load step", ylabel="n/N")
 
 
-def _shields(chosen: Pack, contenders: Sequence[Contender]) -> Figure | None:
-    numbers = contenders[0].numbers
-    here = numbers[numbers["quantity"] == "shields"]
-    if here.empty:
+def _shields(chosen: Pack, numbers: pd.DataFrame) -> Figure | None:
+    asked = numbers[numbers["quantity"] == "shields"]
+    if asked.empty:
         return None
-    scenes = pd.DataFrame([chosen.scenes[name] for name in here["scene"]])
+    given = pd.DataFrame([chosen.scenes[name] for name in asked["scene"]], asked.index)
     # of theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu
-    excess = (
-        (scenes["rho_sol_kg_m3"] / scenes["rho_f_kg_m3"] - 1) * scenes["g_m_s2"] * scenes["d_m"]
-    )
-    unit = (np.sqrt(excess) * scenes["d_m"] / scenes["nu_m2_s"]).to_numpy(float)
-    level, theta = scenes["level"].to_numpy(), here["value"].to_numpy(float)
-    canvas = _canvas(3.8)
+    excess = (given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1) * given["g_m_s2"] * given["d_m"]
+    unit = np.sqrt(excess) * given["d_m"] / given["nu_m2_s"]
+    answer = asked["answer"].where(asked["answer"] > 0)
+    table = asked.assign(level=given["level"], reynolds=unit * np.sqrt(answer), answer=answer)
+    looks, levels = _looks(numbers), np.unique(table["level"])
+    looks.pop(OURS)
+    samples = {"curves for water": WATER, "expected, interval": EXPECTED}
+    lines = [Line2D([], [], color=colour, label=label) for label, colour in samples.items()]
+    canvas = _canvas(3.8, looks, levels, *lines)
     ax = canvas.subplots()
     for curve in curves.WATER:
-        ax.plot(*curve.points(), color="#74aed6", lw=0.8)
-    spread = np.abs(here[["low", "high"]].to_numpy(float).T - theta)
-    ax.errorbar(unit * np.sqrt(theta), theta, spread, fmt="none", ecolor=EXPECTED, elinewidth=0.7)
-    for one, look in zip(contenders, _looks(contenders), strict=True):
-        answer = one.numbers["answer"][here.index].to_numpy(float)
-        answer = np.where(answer > 0, answer, np.nan)
-        for number in np.unique(level):
-            at = level == number
-            ax.plot(unit[at] * np.sqrt(answer[at]), answer[at], MARKERS[number], **look)
-    reynolds = unit * np.sqrt(theta)
-    ax.set(
-        xscale="log", yscale="log", xlabel=r"$Re^\star = u^\star d/\nu$", ylabel="Shields number"
-    )
-    ax.set_xlim(reynolds.min() / 3, reynolds.max() * 3)
+        ax.plot(*curve.points(), color=WATER, lw=0.8)
+    here = table[table["solver"] == OURS]
+    theta, x = here["value"], unit[here.index] * np.sqrt(here["value"])
+    spread = [theta - here["low"], here["high"] - theta]
+    ax.errorbar(x, theta, spread, fmt="none", ecolor=EXPECTED, elinewidth=0.7)
+    groups: Any = table[table["solver"] != OURS].groupby(["solver", "level"])
+    for (solver, level), rows in groups:
+        ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
+    ax.set(xscale="log", yscale="log", xlabel="Re* = u* d/ν", ylabel="Shields number")
+    ax.set_xlim(x.min() / 3, x.max() * 3)
     ax.set_ylim(max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
-    water = Line2D([], [], color="#74aed6", label="curves for water")
-    expected = Line2D([], [], color=EXPECTED, label="expected, interval")
-    _legends(canvas, contenders, expected, *_markers(level), water)
     caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
     return Figure("shields", "Thresholds", caption, (), canvas)
 
 
-def _markers(levels: Any) -> list[Line2D]:
-    return [
-        Line2D([], [], color="0.3", marker=MARKERS[n], mfc="none", ls="none", label=f"level {n}")
-        for n in np.unique(levels)
-    ]
-
-
-def _speed(contenders: Sequence[Contender]) -> list[Figure]:
+def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     """Error against CPU time, each solver's and ours, where times are known."""
-    everybody = (compare.ours(contenders), *contenders)
-    tables = [one.verdicts for one in everybody]
-    if not any((table["cpu_s"] * table["worst"]).notna().any() for table in tables):
+    known = verdicts[(verdicts["cpu_s"] * verdicts["worst"]).notna()]
+    if known.empty:
         return []
-    canvas = _canvas(3.8)
+    looks = _looks(verdicts)
+    canvas = _canvas(3.8, looks, np.unique(known["level"]))
     ax = canvas.subplots()
-    own = {"color": EXPECTED, "ms": 3, "mew": 0.7}
-    looks = [own, *({**look, "ms": 4} for look in _looks(contenders))]
-    for table, look in zip(tables, looks, strict=True):
-        for level, rows in table.groupby("level"):
-            ax.plot(
-                rows["cpu_s"], rows["worst"].clip(lower=FLOOR), MARKERS[int(str(level))], **look
-            )
+    groups: Any = known.groupby(["solver", "level"])
+    for (solver, level), rows in groups:
+        errors = rows["worst"].clip(lower=FLOOR)
+        ax.plot(rows["cpu_s"], errors, MARKERS[level], **looks[solver])
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
-    ours = Line2D([], [], color=EXPECTED, lw=2.5, label="ours")
-    _legends(canvas, contenders, ours, *_markers(tables[0]["level"]))
     caption = (
         "Each point is a scene: CPU time, and largest relative error of its judged numbers; ours is"
         f" filled. Errors below {FLOOR:g} are drawn there: at levels 3 to 5 the expected answer is"

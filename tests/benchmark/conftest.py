@@ -1,93 +1,59 @@
-"""Packs that several tests read: none of them may change one."""
+"""Packs that several tests read, none of which may change one, and solvers that go wrong."""
 
+import shlex
+import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from orchestrator import pipeline
+from orchestrator.benchmark import compare
+from orchestrator.benchmark.compare import Choice, Limits, Outcome
 from orchestrator.benchmark.export import export
 from orchestrator.study import study
 from tests.conftest import Shared
 
 ROOT = Path(__file__).parents[2]
 NATIVE = ROOT / "examples" / "native"
-STUDY = """
+PROTOCOL = "[protocol]\nload_increment = 0.05\nwaiting_time = 6.0\ntime_step = 0.3\n"
+SMALL = f"""{PROTOCOL}
 [flow]
 [grain]
 diameter = 1e-3
 stiffness = 1e3
-[protocol]
-load_increment = 0.05
-waiting_time = 6.0
-time_step = 0.3
 [[group]]
 name = "piles"
-bed = { kind = "pile", height = 0.01, slope_deg = 20.0, mobile_layers = 1 }
+bed = {{ kind = "pile", height = 0.01, slope_deg = 20.0, mobile_layers = 1 }}
 [[group]]
 name = "grains"
-bed = { slope_deg = 10.0 }
+bed = {{ slope_deg = 10.0 }}
 """
 """One small pile, one grain."""
-
-
-def _exported(root: Path, source: Path | None, levels: tuple[int, ...] = ()) -> Path:
-    """A pack, exported unless it is there."""
-    if not (root / "manifest.json").exists():
-        export(root, source, levels)
-    return root
-
-
-@pytest.fixture(scope="session")
-def formulas(shared: Shared) -> Path:
-    """A pack of levels 1 and 2."""
-    with shared("packs") as folder:
-        return _exported(folder / "formulas", None)
-
-
-@pytest.fixture(scope="session")
-def finished(shared: Shared) -> Path:
-    """The directory of a finished study."""
-    with shared("studies") as folder:
-        asked = study.parse(STUDY, name="small", where="small")
-        assert not pipeline.run(asked, folder / "small", workers=2).failures
-        return folder / "small"
-
-
-@pytest.fixture(scope="session")
-def all_levels(finished: Path, shared: Shared) -> Path:
-    """A pack of all levels."""
-    with shared("packs") as folder:
-        return _exported(folder / "all", finished)
-
-
-THEORY = """
+THEORY = f"""{PROTOCOL}
+final_fraction = 0.8
 [flow]
 model = "hill"
-[forces]
-law = "{law}"
 [grain]
-diameter = {diameter}
+diameter = 5e-4
 stiffness = 1e3
-[protocol]
-load_increment = 0.05
-waiting_time = 6.0
-time_step = 0.3
-final_fraction = 0.8
+[forces]
+law = "%s"
 [[group]]
 name = "pile"
-bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", {bed} }}
+bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", %s }}
 """
 """A pile under the stress of a theory, which needs no OpenFOAM."""
-
-
-POURED = """
+POURED = f"""{PROTOCOL}
+final_fraction = 0.4
+fractions = [0.1, 0.3]
 [fluid]
 density = 1000.0
 viscosity = 1e-6
 [grain]
 diameter = 1e-3
 density = 2650.0
-sizes = { sigma_g = 1.3 }
+sizes = {{ sigma_g = 1.3 }}
 stiffness = 1e3
 [bed]
 kind = "pile"
@@ -98,42 +64,82 @@ poured_depth = 4.0
 packing = "poured"
 [flow]
 model = "hill"
-[protocol]
-load_increment = 0.05
-waiting_time = 6.0
-final_fraction = 0.4
-fractions = [0.1, 0.3]
 """
 """A poured hump of grains of many sizes."""
 
 
-def _theory(folder: Path, **fields: object) -> Path:
-    """A pack of level 4."""
-    return _packed(folder, THEORY.format(**fields))
+def _pack(shared: Shared, name: str, text: str = "", levels: tuple[int, ...] = ()) -> Path:
+    """A pack of a study, which lies beside it; without a text one of formulas."""
+    with shared(f"pack-{name}") as folder:
+        root, source = folder / "pack", folder / "study" if text else None
+        if not (root / "manifest.json").exists():
+            if source:
+                asked = study.parse(text, name=name, where=name)
+                assert not pipeline.run(asked, source, workers=2).failures
+            export(root, source, levels)
+        return root
 
 
-def _packed(folder: Path, text: str) -> Path:
-    asked = study.parse(text, name="theory", where="theory")
-    assert not pipeline.run(asked, folder / "study", workers=1).failures
-    return _exported(folder / "pack", folder / "study", (4,))
+@pytest.fixture(scope="session")
+def formulas(shared: Shared) -> Path:
+    """A pack of levels 1 and 2."""
+    return _pack(shared, "formulas")
+
+
+@pytest.fixture(scope="session")
+def all_levels(shared: Shared) -> Path:
+    """A pack of all levels."""
+    return _pack(shared, "small", SMALL)
 
 
 @pytest.fixture(scope="session")
 def lift_off(shared: Shared) -> Path:
     """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
-    with shared("lift-off") as folder:
-        return _theory(folder, law="low", diameter=5e-4, bed="mobile_layers = 1")
+    return _pack(shared, "lift-off", THEORY % ("low", "mobile_layers = 1"), (4,))
 
 
 @pytest.fixture(scope="session")
 def poured(shared: Shared) -> Path:
-    """A pack of one poured bed; the study lies beside it."""
-    with shared("poured") as folder:
-        return _packed(folder, POURED)
+    """A pack of one poured bed."""
+    return _pack(shared, "poured", POURED, (4,))
 
 
 @pytest.fixture(scope="session")
 def level_rows(shared: Shared) -> Path:
     """A pack of one pile of level rows, which empties in chains."""
-    with shared("level-rows") as folder:
-        return _theory(folder, law="high", diameter=5e-4, bed='packing = "horizontal"')
+    return _pack(shared, "level-rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
+
+
+LIMITS = Limits(seconds=60.0, memory=2**29)
+SCENE = Choice(patterns=("2-incline-5",))
+RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
+"""Command of the example."""
+HEAD = """
+import math, os, sys, time
+from pathlib import Path
+sys.path.insert(0, {native!r})
+import solver
+case, out = map(Path, sys.argv[1:])
+"""
+TAIL = "\nsys.exit(solver.main(case, out))\n"
+AFTER = "\ncode = solver.main(case, out)\ntext = out.read_text()\n"
+"""Beginning of a body that changes the answer of the right solver."""
+
+
+def program(folder: Path, body: str) -> str:
+    """The command of a solver that is the example but for something."""
+    path = folder / "my solver.py"
+    path.write_text(HEAD.format(native=str(NATIVE)) + body)
+    return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
+
+
+def run(
+    pack: Path, folder: Path, body: str, choice: Choice = SCENE, limits: Limits = LIMITS
+) -> Outcome:
+    """Run a solver of such a body on a pack, into `results` of a folder."""
+    return compare.run(pack, program(folder, body), folder / "results", choice, limits)
+
+
+def verdicts_in(folder: Path) -> pd.DataFrame:
+    """The verdicts of that run, by scene."""
+    return pd.read_csv(folder / "results" / "verdicts.csv").set_index("scene")

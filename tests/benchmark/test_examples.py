@@ -14,8 +14,7 @@ from orchestrator import pipeline
 from orchestrator.benchmark import compare
 from orchestrator.benchmark.compare import Choice, Limits, Outcome
 from orchestrator.runs.workspace import Workspace
-from tests.benchmark.conftest import NATIVE, ROOT
-from tests.benchmark.programs import RIGHT
+from tests.benchmark.conftest import NATIVE, RIGHT, ROOT
 
 EXAMPLES = ROOT / "examples"
 ENGINES = {

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
-from orchestrator.benchmark import measured
+from orchestrator.benchmark import scenes
 from orchestrator.benchmark.compare import place_of
 from orchestrator.benchmark.export import scene_names
 from orchestrator.paper import PRESETS
@@ -42,9 +42,9 @@ def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None
     level, name = expected["scene"].str[0], expected["scene"].str[2:]
     for number, wanted in (("1", grains), ("3", flows), ("4", piles), ("5", piles)):
         assert set(name[level == number]) == wanted
-    scenes = pd.read_csv(FOLDER / "scenes.csv")
-    assert set(scenes["scene"]) == set(expected["scene"])
-    assert {"u_e_height_m", "lid_height_m"} <= set(scenes)
+    entries = pd.read_csv(FOLDER / "scenes.csv")
+    assert set(entries["scene"]) == set(expected["scene"])
+    assert {"u_e_height_m", "lid_height_m"} <= set(entries)
 
 
 def test_numbers_are_within_their_own_intervals(expected: pd.DataFrame) -> None:
@@ -69,11 +69,10 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
         assert case.done_state(one, tmp_path)
     results = tables.make(asked, planned, tmp_path, planned.done(tmp_path))
     names = scene_names(plan.make(paper), paper)
-    beds = measured.beds(planned.piles.values(), results, tmp_path)
-    assert len(beds) >= 2
-    for bed in beds:
-        for problem in (measured.flow(bed.pile, results), measured.pile(bed)):
-            scene = f"{problem.level}-{names[problem.name]}"
+    assert len(planned.piles) >= 2
+    for pile in planned.piles.values():
+        for problem in (scenes.flow(pile, results), scenes.bed("pile", pile, results, tmp_path)):
+            scene = f"{problem.scene[0]}-{names[problem.name]}"
             stated, fresh = (
                 table.assign(place=table["at"].map(place_of))
                 for table in (expected[expected["scene"] == scene], problem.expected)

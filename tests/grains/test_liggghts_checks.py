@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from orchestrator.benchmark.exact import passing_time
+from orchestrator.benchmark.scenes import passing_time
 from tests.conftest import Deck
 
 MU = math.tan(math.radians(35))
