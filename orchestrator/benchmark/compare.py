@@ -341,8 +341,10 @@ def _read(results: Path, names: Sequence[str]) -> tuple[dict[Any, float], pd.Dat
         }
         rows.append(row)
     table = pd.DataFrame(rows)
-    numbers = {key: pd.to_numeric(table[key], errors="coerce") for key in (*times, STEPS)}
-    return answers, table.assign(**numbers)
+    for key in (*times, STEPS):  # anybody may have written the times
+        number = pd.to_numeric(table[key], errors="coerce")
+        table[key] = number.where(number.between(0, LARGEST, inclusive="neither"))
+    return answers, table
 
 
 def judge(

@@ -109,7 +109,7 @@ def test_counts_are_whole_and_make_n(
 ) -> None:
     body = AFTER + (
         "head, *rows = [line.split(',') for line in text.splitlines()]\n"
-        f"lines = [f'{{q}},{{at}},{{{body}}}' for q, at, v in rows]\n"
+        f"lines = [','.join([q, at, str({body})]) for q, at, v in rows]\n"
         "out.write_text('\\n'.join([','.join(head), *lines, '']))\n"
     )
     (line,) = run(all_levels, tmp_path, body, Choice(patterns=("4-*",))).failures

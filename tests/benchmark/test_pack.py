@@ -117,15 +117,17 @@ def test_levels_times_and_our_answers(all_levels: Path) -> None:
     times = pd.read_csv(all_levels / "times.csv").set_index("scene")["seconds"]
     assert set(times.index) == set(chosen.scenes)
     assert times.gt(0).all()
-    for given in chosen.scenes.values():
-        if given["kind"] == "flow":
+    for entries in chosen.scenes.values():
+        if entries["kind"] == "flow":
             continue
-        weight = given["mass_kg"] * given["reduced_gravity_m_s2"]
-        assert given["weight_n"] == pytest.approx(weight, rel=1e-12)
-        if given["kind"] != "closed-form":
-            assert given["spring_n_m"] == pytest.approx(given["stiffness"] * weight / given["d_m"])
-            unit = given["d_m"] / given["reduced_gravity_m_s2"]
-            assert given["time_unit_s"] ** 2 == pytest.approx(unit)
+        weight = entries["mass_kg"] * entries["reduced_gravity_m_s2"]
+        assert entries["weight_n"] == pytest.approx(weight, rel=1e-12)
+        if entries["kind"] != "closed-form":
+            assert entries["spring_n_m"] == pytest.approx(
+                entries["stiffness"] * weight / entries["d_m"]
+            )
+            unit = entries["d_m"] / entries["reduced_gravity_m_s2"]
+            assert entries["time_unit_s"] ** 2 == pytest.approx(unit)
 
 
 def _deck(case: Path) -> pd.DataFrame:
@@ -262,7 +264,7 @@ def test_beds_that_no_pack_holds_are_refused(fields: str, tmp_path: Path) -> Non
     space = Workspace(tmp_path)
     with space.held(STUDY, "held"):
         space.describe(STUDY, "held", [], study=text, tolerance=None)
-    with pytest.raises(InputError, match="bed.width|protocol.update"):
+    with pytest.raises(InputError, match=r"bed\.width|protocol\.update"):
         export(tmp_path / "pack", tmp_path, ())
 
 
