@@ -92,7 +92,7 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     if set(times.index) != set(planned.cases):
         what = "the study was run by another version of the program: its cases are others"
         raise InputError(what, where=str(source), remedy="run it again")
-    results = tables.read(space.folder, "tables")
+    results = tables.read(space, "tables")
     sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
 
     def timed() -> Iterator[Problem]:

@@ -262,7 +262,7 @@ def test_beds_that_no_pack_holds_are_refused(fields: str, tmp_path: Path) -> Non
     text = f'grain.diameter = 1e-3\nbed.kind = "pile"\nbed.slope_deg = 20.0\n{fields}\n'
     text += 'protocol.method = "dem"\nflow.first_cell_height = 1e-3\n'
     space = Workspace(tmp_path)
-    with space.held(STUDY, "held"):
+    with claimed(tmp_path, STUDY, "held"):
         space.describe(STUDY, "held", [], study=text, tolerance=None)
     with pytest.raises(InputError, match=r"bed\.width|protocol\.update"):
         export(tmp_path / "pack", tmp_path, ())
