@@ -184,8 +184,7 @@ class Opened:
     @property
     def answer(self) -> str:
         """The answer, in words and a short table."""
-        results = self._results
-        return report.said(results.study, results.plan, results.tables, results.cases)
+        return report.said(self._results)
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from orchestrator import __version__, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.report import Guest
+from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
@@ -163,7 +164,8 @@ def prune(directory: Path) -> str:
     with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
-        shown = {case.name for case in report.drawn_from(study, planned, made, space.cases)}
+        results = Results(study, planned, made, space.cases)
+        shown = {case.name for case in report.drawn_from(results)}
         return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
 
 
@@ -181,14 +183,15 @@ def _draw(
     """
     space.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
-    results = tables.make(study, planned, space.cases, states)
+    made = tables.make(study, planned, space.cases, states)
+    results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
     with space.renewed(but=MARKERS):
-        tables.write(results, space, "tables")
+        tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
-        report.write(study, planned, results, times, causes, space, guests)
-    answer = report.said(study, planned, results, space.cases)
+        report.write(results, times, causes, space, guests)
+    answer = report.said(results)
     if not failures:
         terminal.check()
         marker = {**_drawn_of(study, planned, space), "answer": answer}

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.errors import OrchestratorError
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from markupsafe import Markup
 
-    from orchestrator.plan import Plan
     from orchestrator.report.results import Results
     from orchestrator.report.style import Figure
     from orchestrator.runs.case import Case
@@ -27,14 +25,9 @@ FIGURES = "figures"
 
 @dataclass(frozen=True)
 class Addition:
-    """The part of a study's page that a guest adds.
+    """The part of a study's page that a guest adds: a section before the figures, and files.
 
-    Attributes
-    ----------
-    section : Markup
-        A section of the page, before its figures.
-    files : mapping of str to str
-        Texts beside the page, by the names of their files.
+    `files` are the texts of files beside the page, by their names.
     """
 
     section: "Markup"
@@ -46,33 +39,29 @@ Guest = Callable[["Study", "Tables", Sequence[str]], Addition | None]
 
 
 def write(
-    study: "Study",
-    plan: "Plan",
-    tables: "Tables",
+    results: "Results",
     timings: "pd.DataFrame",
     failures: Mapping[str, str],
     folder: "Folder",
     guests: Sequence[Guest] = (),
 ) -> None:
-    """Draw the figures of a study and write its page.
+    """Draw the figures of a study and write its page into its directory.
 
     Parameters
     ----------
-    study, plan, tables
-        As the pipeline made them.
+    results : Results
+        The study with its plan, tables and cases.
     timings : DataFrame
         Wall times of the finished cases.
     failures : mapping of str to str
         The cases that failed, with why.
     folder : Folder
-        The study's directory: it holds ``cases`` and gets ``figures`` and the page.
+        The study's directory.
     guests : sequence of callable
         Guests that may add to the page.
     """
     from orchestrator.report import page, settings, words
-    from orchestrator.report.results import Results
 
-    results = Results(study, plan, tables, folder.root / "cases")
     faults: list[str] = []
     with settings.own():
         figures = list(_drawn(results, folder, faults))
@@ -80,12 +69,14 @@ def write(
         print(f"a figure could not be drawn: {fault}", file=sys.stderr)
     figures.sort(key=lambda figure: (not figure.first, not figure.leads))
     names = [figure.name for figure in figures]
-    added = [part for part in (guest(study, tables, names) for guest in guests) if part]
+    added = [part for guest in guests if (part := guest(results.study, results.tables, names))]
     for name, text in (item for part in added for item in part.files.items()):
         folder.put(name, text)
     parts = {**words.contents(results, timings, failures), "faults": faults}
+    parts["sections"] = [part.section for part in added]
+    entries = [{**page.entry(figure), "number": n} for n, figure in enumerate(figures, 1)]
     terminal.check()
-    folder.put(PAGE, page.render(parts, figures, [part.section for part in added]))
+    folder.put(PAGE, page.fill("page.html.j2", **parts, figures=entries))
 
 
 def _drawn(results: "Results", folder: "Folder", faults: list[str]) -> "Iterator[Figure]":
@@ -111,19 +102,17 @@ def _drawn(results: "Results", folder: "Folder", faults: list[str]) -> "Iterator
         terminal.check()
 
 
-def drawn_from(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> "list[Case]":
+def drawn_from(results: "Results") -> "list[Case]":
     """The cases whose bulky files the page's pictures are drawn from."""
     from orchestrator.report import bed, flows
-    from orchestrator.report.results import Results
 
-    results = Results(study, plan, tables, cases)
-    if "pile_threshold" not in tables:
+    if "pile_threshold" not in results.tables:
         return []
     shown = [run for _, pile in bed.chosen(results) for run in pile.runs]
     return [*shown, *(pile.flow for pile in flows.drawn(results))]
 
 
-def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
+def said(results: "Results") -> str:
     """The answer of a study for a terminal: thresholds with their intervals, and sentences.
 
     Raises
@@ -132,13 +121,12 @@ def said(study: "Study", plan: "Plan", tables: "Tables", cases: Path) -> str:
         If the tables lack columns, as those of another version do.
     """
     from orchestrator.report import words
-    from orchestrator.report.results import Results
 
     try:
-        return words.text(Results(study, plan, tables, cases))
+        return words.text(results)
     except KeyError as error:
         raise OrchestratorError(
             f"its tables lack {error}: another version of this program wrote them",
-            where=str(cases.parent),
+            where=str(results.cases.parent),
             remedy="`orchestrator study` of the same file runs it again",
         ) from None

@@ -16,15 +16,15 @@ WIDTH = 60
 """Letters of a line over a panel."""
 LISTS = ("obstacles",)
 """Columns of fields that are lists: an empty cell is an empty list."""
-FRACTION = Info("fraction", "n/N", "%")
-"""The fraction of grains at which a threshold is read; no field of its own."""
+OTHERS = {"fraction": Info("fraction", "n/N", "%"), "by": Info("by")}
+"""Words of columns of tables that are no fields."""
 OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
 """Scopes of fields that have no effect by other methods."""
 
 
 def words(column: str) -> Info:
     """The words of a column."""
-    return FRACTION if column == "fraction" else fields.COLUMNS[column].info
+    return OTHERS[column] if column in OTHERS else fields.COLUMNS[column].info
 
 
 def plain(column: str, value: Any) -> str:

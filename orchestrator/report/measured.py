@@ -7,12 +7,13 @@ own line, over the Re* that a study has grains of.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
+from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
 from orchestrator.report import labels, theory
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
@@ -33,28 +34,16 @@ NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
 DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
 """Decades of Re* in which there are measurements."""
 HEAD = (
-    "force law",
-    "β",
-    "z₀",
-    "Re* where it is within the measured 10 to 90 %",
-    f"decades, of {DECADES:.1f}",
-    "factor from the medians: median",
-    "worst",
+    *("force law", "β", "z₀", "Re* where it is within the measured 10 to 90 %"),
+    *(f"decades, of {DECADES:.1f}", "factor from the medians: median", "worst"),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One force law on one bed, and how it compares with the measurements.
+    """A force law on a bed, and how it compares with the measurements.
 
-    Attributes
-    ----------
-    law : str
-        Name of the force law.
-    bed : Bed
-        The bed.
-    first, last : float
-        Re* between which the study has grains.
+    `first` and `last` are the Re* between which the study has grains.
     """
 
     law: str
@@ -80,15 +69,14 @@ class Fit:
         return np.where(answers, self.law_line(reynolds), np.nan)
 
     @cached_property
-    def answered(self) -> BoolArray:
-        """Where on the grid it has an answer."""
-        return np.isfinite(self.line(GRID))
+    def on_grid(self) -> FloatArray:
+        """Tau on the grid."""
+        return self.line(GRID)
 
     @cached_property
     def met(self) -> BoolArray:
         """Where on the grid it is from the tenth to the ninetieth percentile."""
-        tau = self.line(GRID)
-        return (tau >= TENTHS) & (tau <= NINETIETHS)
+        return (self.on_grid >= TENTHS) & (self.on_grid <= NINETIETHS)
 
     @property
     def decades(self) -> float:
@@ -98,8 +86,7 @@ class Fit:
     @cached_property
     def factors(self) -> FloatArray:
         """Factor from the median of each range of Re*, above or below; NaN without an answer."""
-        ratio = self.line(MIDDLES) / MEDIANS
-        return np.where(MIDDLES >= FACTORS_FROM, np.maximum(ratio, 1 / ratio), np.nan)
+        return np.where(MIDDLES >= FACTORS_FROM, _factor(self.line(MIDDLES), MEDIANS), np.nan)
 
     @property
     def median_factor(self) -> float:
@@ -116,14 +103,18 @@ class Fit:
         return float(self.factors[at]), float(MIDDLES[at])
 
 
+def _factor(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.maximum(a / b, b / a)
+
+
 def fits(results: Results) -> list[Fit]:
     """The combinations of a study's single grains on a flat bed: the widest first, then nearest.
 
     Unverified force laws take no part.
     """
     grains = results.beds("grain")
-    grains = grains[~grains["force_law"].isin([n for n, law in LAWS.items() if law.unverified])]
-    flat = grains[grains["alpha_deg"] == 0]
+    verified = grains["force_law"].map({name: not law.unverified for name, law in LAWS.items()})
+    flat = grains[(grains["alpha_deg"] == 0) & verified.astype(bool)]
     combinations = [
         Fit(str(law), theory.bed_of(group), *theory.span(group))
         for (law, *_), group in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
@@ -133,10 +124,7 @@ def fits(results: Results) -> list[Fit]:
 
 def best(ranked: Sequence[Fit]) -> list[Fit]:
     """The first of each law."""
-    firsts: dict[str, Fit] = {}
-    for fit in ranked:
-        firsts.setdefault(fit.law, fit)
-    return list(firsts.values())
+    return list({fit.law: fit for fit in reversed(ranked)}.values())[::-1]
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
@@ -154,23 +142,32 @@ def _ranges(chosen: BoolArray) -> str:
     return ", ".join(f"{number(low)} … {number(high)}" for low, high in ranges(chosen))
 
 
+def section(results: Results) -> dict[str, Any] | None:
+    """The words of the page's section on measurements; None without single grains on a flat bed."""
+    ranked = fits(results)
+    if not ranked:
+        return None
+    return {
+        "source": MEASURED_SOURCE,
+        "start": FACTORS_FROM,
+        "sentences": list(sentences(results.beds("grain"), ranked)),
+        "best": sheet(best(ranked)),
+        "every": sheet(ranked),
+    }
+
+
 def sheet(listed: Iterable[Fit]) -> pd.DataFrame:
     """A row for each combination of law, entrainment angle and z0/d."""
     rows = []
     for fit in listed:
-        worst, at = fit.worst
-        judged = np.isfinite(worst)
-        rows.append(
-            (
-                labels.value("force_law", fit.law),
-                f"{fit.bed.entrainment_angle_deg:g}°",
-                labels.ratio_of(fit.bed.roughness_ratio, "d"),
-                _ranges(fit.met) or "nowhere",
-                f"{fit.decades:.1f}",
-                f"{fit.median_factor:.2f}" if judged else "—",
-                f"{worst:.2f} at Re* = {number(at)}" if judged else "—",
-            )
+        law, ratio = (
+            labels.value("force_law", fit.law),
+            labels.ratio_of(fit.bed.roughness_ratio, "d"),
         )
+        row = (law, f"{fit.bed.entrainment_angle_deg:g}°", ratio, _ranges(fit.met) or "nowhere")
+        worst, at = fit.worst
+        factors = (f"{fit.median_factor:.2f}", f"{worst:.2f} at Re* = {number(at)}")
+        rows.append((*row, f"{fit.decades:.1f}", *(factors if worst < np.inf else ("—", "—"))))
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
@@ -180,60 +177,45 @@ def sentences(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     if np.isfinite(worst) and first.decades:
         facts = {"count": len(ranked), "decades": DECADES, "start": FACTORS_FROM}
         yield caption("best_law", fit=first, at=number(at), **facts)
-    unmet = np.any([fit.answered for fit in ranked], axis=0)
+    unmet = np.any([np.isfinite(fit.on_grid) for fit in ranked], axis=0)
     unmet &= ~np.any([fit.met for fit in ranked], axis=0)
     if unmet.any():
         yield caption("unmet", ranges=_ranges(unmet))
-    yield from _small(ranked)
-    yield from _air(grains, ranked)
-
-
-def _small(ranked: Sequence[Fit]) -> Iterator[str]:
-    """Up to which Re* the published curves for water lie above every law."""
+    # up to which Re* the published curves for water lie above every law
     grid = np.geomspace(min(fit.first for fit in ranked), BINS[-1].high, 1000)
     low, _ = theory.water_band(grid)
     lines = np.array([fit.law_line(grid) for fit in ranked])
     highest = np.where(np.isfinite(lines), lines, -np.inf).max(axis=0)
     above = np.isfinite(highest) & (low > highest)
     if above[grid < 1].any():
-        first = int(above.argmax())
-        last = first + int((~np.append(above[first:], False)).argmax()) - 1
-        ends = [first, last]
-        numbers = [number(reynolds) for reynolds in grid[ends]]
-        facts = {"curve": low[ends], "law": highest[ends], "begin": BINS[0].low}
-        yield caption("small_reynolds", ends=numbers, **facts)
+        start = int(above.argmax())
+        ends = [start, start + int((~np.append(above[start:], False)).argmax()) - 1]
+        curve, law, numbers = low[ends], highest[ends], [number(at) for at in grid[ends]]
+        yield caption("small_reynolds", ends=numbers, curve=curve, law=law, begin=BINS[0].low)
+    yield from _air(grains, ranked)
 
 
 def _air(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     """Published curves for air against the medians for water at the same Re*."""
     read = []
     for x, y in theory.air_lines(grains).values():
-        order = np.argsort(x, kind="stable")
-        logs = np.log(x[order]), np.log(y[order])
-        read.append(np.exp(np.interp(np.log(MIDDLES), *logs, left=np.nan, right=np.nan)))
-    there = np.isfinite(read).any(axis=0) if read else np.array([False])
-    if not there.any():
+        order, ends = np.argsort(x, kind="stable"), {"left": np.nan, "right": np.nan}
+        read.append(np.interp(np.log(MIDDLES), np.log(x[order]), np.log(y[order]), **ends))
+    covered = np.isfinite(read).any(axis=0) if read else np.array([False])
+    if not covered.any():
         return
-    at, water = MIDDLES[there], MEDIANS[there]
-    air = np.exp(np.nanmean(np.log(np.array(read)[:, there]), axis=0))
-
-    def off(fit: Fit, other: FloatArray) -> float:
-        """Median factor from a curve; infinite if the fit has less than half of the places."""
-        ratio = (fit.line(at) / other)[np.isfinite(fit.line(at))]
-        if 2 * len(ratio) < len(at):
-            return np.inf
-        return float(np.median(np.maximum(ratio, 1 / ratio)))
-
-    distances = [off(fit, air) for fit in ranked]
-    nearest = int(np.argmin(distances))
-    fit = ranked[nearest]
+    at, water = MIDDLES[covered], MEDIANS[covered]
+    air = np.exp(np.nanmean(np.array(read)[:, covered], axis=0))
+    # a law that answers at less than half of the places cannot be compared
+    lines = {fit: fit.line(at) for fit in ranked}
+    judged = {fit: y for fit, y in lines.items() if 2 * np.isfinite(y).sum() >= len(at)}
+    off = {fit: [np.nanmedian(_factor(y, to)) for to in (air, water)] for fit, y in judged.items()}
+    nearest = min(off, key=lambda fit: off[fit][0]) if off else None
     ratio = air / water
     yield caption(
         "air",
         ratio=(ratio.min(), np.median(ratio), ratio.max()),
         span=f"{number(at[0])} … {number(at[-1])}",
-        widest=distances[0] if np.isfinite(distances[0]) else None,
-        nearest=distances[nearest] if np.isfinite(distances[nearest]) else None,
-        name=fit.name,
-        from_water=off(fit, water),
+        nearest=nearest,
+        off=off[nearest] if nearest else None,
     )

@@ -1,9 +1,8 @@
-"""The templates: the page of a study, captions, and values in HTML."""
+"""The templates: pages, captions, and values in HTML."""
 
 import base64
 import json
 import re
-from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -16,24 +15,6 @@ if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
 FOLDER = Path(__file__).parent
-
-
-def render(
-    parts: Mapping[str, Any], figures: Sequence["Figure"], sections: Sequence[Markup] = ()
-) -> str:
-    """The HTML of a study's page.
-
-    Parameters
-    ----------
-    parts : mapping of str to Any
-        The values that `words.contents` gives.
-    figures : sequence of Figure
-        With their images.
-    sections : sequence of Markup
-        Sections of guests, before the figures.
-    """
-    entries = [{**entry(item), "number": n} for n, item in enumerate(figures, 1)]
-    return fill("page.html.j2", **parts, sections=sections, figures=entries)
 
 
 def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:

@@ -52,9 +52,8 @@ class Results:
             table = self.tables.get(name, pd.DataFrame())
             if len(table):
                 extra = [item for item in self.scenes if item not in table or item == "scene_id"]
-                table = table.merge(
-                    self.scenes[extra], on="scene_id", how="left", validate="many_to_one"
-                )
+                scenes = self.scenes[extra]
+                table = table.merge(scenes, on="scene_id", how="left", validate="many_to_one")
             self._joins[name] = table if len(table) else pd.DataFrame()
         return self._joins[name]
 
@@ -74,10 +73,8 @@ class Results:
             return piles
         here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
         here = seeds_as_one(here)
-        order = here.assign(
-            valid=valid(here), dem=here["answered_method"] == "dem", wears=here["update"] > 0
-        )
-        by = ["valid", "d_m", "dem", "wears", "z0_over_d"]
+        order = here.assign(dem=here["answered_method"] == "dem", wears=here["update"] > 0)
+        by = ["usable", "d_m", "dem", "wears", "z0_over_d"]
         order = order.sort_values(by, ascending=[False] * 4 + [True], kind="stable")
         return order.sort_values("alpha_deg", kind="stable")
 
@@ -132,25 +129,19 @@ def split(
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     """Thresholds of piles that differ in their seed alone as one row, with all others as they are.
 
-    A row has the means over the usable seeds, over all seeds where none is usable; its interval
-    holds those of these seeds. The columns ``seeds`` and ``of_seeds`` have the number of these
-    seeds and of all, ``least`` and ``largest`` the range of their thresholds.
+    A row has the means over the usable seeds, over all seeds where none is usable. The columns
+    ``seeds`` and ``of_seeds`` have the number of these seeds and of all, ``least`` and ``largest``
+    the range of their thresholds.
     """
-    if rows.empty or rows["seed"].nunique() < 2:
-        ends = {"least": rows["shields"], "largest": rows["shields"]} if len(rows) else {}
-        return rows.assign(**ends, seeds=1, of_seeds=1)
-    merged = []
     keys = [*fields.others(rows, "seed"), "fraction"]
-    for _, twins in rows.groupby(keys, dropna=False, sort=False):
-        chosen = twins[valid(twins)] if valid(twins).any() else twins
-        row = chosen.iloc[0].copy()
-        row[MEANS] = chosen[MEANS].mean()
-        row["least"], row["largest"] = chosen["shields"].min(), chosen["shields"].max()
-        row["shields_low"] = chosen[["shields_low", "shields_high"]].min(axis=None)
-        row["shields_high"] = chosen[["shields_low", "shields_high"]].max(axis=None)
-        row["seeds"], row["of_seeds"] = len(chosen), len(twins)
-        merged.append(row)
-    return pd.DataFrame(merged)
+    twins = valid(rows).groupby([rows[key] for key in keys], dropna=False)
+    rows = rows.assign(of_seeds=twins.transform("size"))[valid(rows) | ~twins.transform("any")]
+    groups = rows.groupby(keys, dropna=False)
+    tau = groups["shields"]
+    ends = {"least": tau.transform("min"), "largest": tau.transform("max")}
+    means = {name: groups[name].transform("mean") for name in MEANS}
+    rows = rows.assign(**means, **ends, seeds=tau.transform("size"))
+    return rows.drop_duplicates(keys)
 
 
 def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":

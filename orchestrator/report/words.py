@@ -1,6 +1,6 @@
 """The answer of a study in sentences and tables, and all other words of its page."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import metadata
 from platform import python_version
 from typing import Any
@@ -14,7 +14,6 @@ from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.calibration import lowest_floor
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
 from orchestrator.report import labels, theory
 from orchestrator.report.page import caption
@@ -24,12 +23,10 @@ from orchestrator.report.results import (
     held,
     measured_hills,
     nearest_fraction,
-    seeds_as_one,
     split,
     valid,
 )
-from orchestrator.runs.case import IDENTITY
-from orchestrator.runs.files import read_json
+from orchestrator.runs import case
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form
 
@@ -43,23 +40,23 @@ PACKAGES = (
     *("gmsh", "jinja2", "matplotlib", "meshio", "numpy"),
     *("pandas", "pydantic", "pyvista", "scipy", "vtk"),
 )
-SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
-"""Columns that each row of the table of piles tells."""
+EACH = ("alpha_deg", "d_m", "force_law")
+"""Columns that each row of a table of single piles tells."""
+RANGES = ("alpha_deg", "force_law")
+"""Columns that each row of a table of ranges tells."""
+FLUID = ("rho_f_kg_m3", "nu_m2_s")
 
 
 def text(results: Results) -> str:
     """The short table, then the sentences, for a terminal."""
     answer = "\n".join(sentences(results)) or "No case has given a result yet."
-    table = sheet(results)
+    table = short(results)
     if table is None:
         return answer
     rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = (
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )
-    return "\n".join([*lines, "", answer])
+    padded = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    return "\n".join([*padded, "", answer])
 
 
 def sentences(results: Results) -> list[str]:
@@ -68,7 +65,7 @@ def sentences(results: Results) -> list[str]:
     table = piles if len(piles) else grains
     if table.empty:
         return []
-    usable = int(valid(table).sum())
+    usable = int(table["usable"].sum())
     count = f"Usable: {usable} of {len(table)} thresholds."
     warnings = [count] if usable < len(table) else []
     if piles.empty:
@@ -88,7 +85,13 @@ def sentences(results: Results) -> list[str]:
         names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
         error = max(item.known.total for item in chosen)
         warnings.append(caption("defaults", names=names, error=error, floor=lowest_floor()))
-    warnings += _tolerance(piles, results.study.tolerance)
+    rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
+    if tolerance and len(rows):
+        low = 1 - rows["shields_model_low"] / rows["shields"]
+        high = rows["shields_model_high"] / rows["shields"] - 1
+        if tolerance < float(((low + high) / 2).min()):
+            facts = {"ends": (low.max(), high.max()), "share": rows["model_share"].mode().iloc[0]}
+            warnings.append(caption("tolerance", tolerance=tolerance, **facts))
     return [*hills, *(_pile(row, results, telling) for row in ends), *warnings]
 
 
@@ -96,8 +99,7 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
     size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
     name = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
-    flow, why = _flow(row, row["ustar0_m_s"]), "" if row["usable"] else row["why_not"]
-    return caption("pile", row=row, name=name, single=single, flow=flow, why=why)
+    return caption("pile", row=row, name=name, single=single, flow=_flow(row, row["ustar0_m_s"]))
 
 
 def _grains(grains: pd.DataFrame) -> Iterator[str]:
@@ -107,13 +109,11 @@ def _grains(grains: pd.DataFrame) -> Iterator[str]:
     here = here.sort_values("d_m", kind="stable")
     for at in sorted({0, len(here) - 1}):
         row = here.iloc[at]
-        names = ("ustar_m_s", "shields_dem")
-        if pd.isna(row["ustar_m_s"]):
-            names = ("ustar_closed_form_m_s", "shields_closed_form")
-        ustar, shields = (row[name] for name in names)
+        by = "closed_form" if pd.isna(row["ustar_m_s"]) else "dem"
+        flow = _flow(row, row["ustar_closed_form_m_s" if by == "closed_form" else "ustar_m_s"])
         size, slope = labels.millimetres(row["d_m"]), labels.value("alpha_deg", row["alpha_deg"])
-        facts = {"flow": _flow(row, ustar), "why": "" if row["usable"] else row["why_not"]}
-        yield caption("one_grain", size=size, slope=slope, shields=shields, **facts)
+        shields = row[f"shields_{by}"]
+        yield caption("one_grain", row=row, size=size, slope=slope, shields=shields, flow=flow)
 
 
 def _flow(row: pd.Series, ustar: float) -> str:
@@ -132,39 +132,33 @@ def _hills(results: Results) -> Iterator[str]:
     for hill, rows in measured_hills(results):
         names = [labels.value("turbulence_model", name) for name in rows["turbulence_model"]]
         ends = dict(zip(names, rows["reattachment_over_h"], strict=True))
-        yield caption(
-            "hill",
-            hill=hill,
-            ends={name: end for name, end in ends.items() if pd.notna(end)},
-            without=[name for name, end in ends.items() if pd.isna(end)],
-            measured=rows["measured_reattachment_over_h"].iloc[0],
-            verified=rows["measured_verified"].all(),
-        )
+        measured = rows["measured_reattachment_over_h"].iloc[0]
+        facts = {"measured": measured, "verified": rows["measured_verified"].all()}
+        yield caption("hill", hill=hill, ends=ends, **facts)
 
 
-def _tolerance(piles: pd.DataFrame, tolerance: float | None) -> Iterator[str]:
-    """A warning about a tolerance below the interval of the model's own choices."""
-    rows = piles.dropna(subset=["shields", "shields_model_low"])
-    if not tolerance or rows.empty:
-        return
-    low = 1 - rows["shields_model_low"] / rows["shields"]
-    high = rows["shields_model_high"] / rows["shields"] - 1
-    if tolerance < float(((low + high) / 2).min()):
-        ends, share = (low.max(), high.max()), rows["model_share"].mode().iloc[0]
-        yield caption("tolerance", tolerance=tolerance, ends=ends, share=share)
-
-
-def sheet(results: Results) -> pd.DataFrame | None:
+def short(results: Results) -> pd.DataFrame | None:
     """The thresholds in at most a screen: of few piles each, of many their range by slope."""
-    piles = results.joined("pile_threshold")
-    if piles.empty:
+    rows = results.joined("pile_threshold")
+    if rows.empty:
         return grains(results)
-    here = piles[piles["fraction"] == nearest_fraction(piles)]
-    one_each = seeds_as_one(here)
-    if len(one_each) <= FEW:
-        return _each(one_each)
-    tau = f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
-    return _ranges(here, ["alpha_deg", "force_law"], tau, "shields", "ustar0_m_s")
+    here = rows[rows["fraction"] == nearest_fraction(rows)]
+    keys = [*EACH, *labels.varying(here, *EACH)]
+    few = len(here[keys].drop_duplicates()) <= FEW
+    return _thresholds(
+        here, keys if few else RANGES, f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
+    )
+
+
+def piles(results: Results) -> pd.DataFrame | None:
+    """The thresholds of the piles at every fraction, with the name of the case last."""
+    rows = results.joined("pile_threshold")
+    if rows.empty:
+        return None
+    keys = [*EACH, "z0_over_d", "nu_m2_s"]
+    keys += [*labels.varying(rows, *keys, "fraction"), "seed", "fraction"]
+    keys = [key for key in keys if key != "seed" or rows[key].nunique() > 1]
+    return _thresholds(rows, keys, "τ_c", more=("count", "case"))
 
 
 def grains(results: Results) -> pd.DataFrame | None:
@@ -172,115 +166,56 @@ def grains(results: Results) -> pd.DataFrame | None:
     rows = results.joined("single_grain")
     if rows.empty:
         return None
-    dem, values = rows["answered_method"] == "dem", {}
-    for name in ("shields", "ustar"):
-        unit = "_m_s" if name == "ustar" else ""
-        run = f"{name}_dem" if name == "shields" else name
-        for end in ("", "_low", "_high"):
-            exact = rows[f"{name}_closed_form{unit}"]
-            values[f"{name}{end}"] = rows[f"{run}{end}{unit}"].where(dem, exact)
+    dem = rows["answered_method"] == "dem"
+    values = {
+        f"shields{end}": rows[f"shields_dem{end}"].where(dem, rows["shields_closed_form"])
+        for end in ("", "_low", "_high")
+    }
+    values["ustar0_m_s"] = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
     by = dem.map({True: "DEM", False: "closed form"})
-    keys = ["alpha_deg", "force_law", "by"]
-    return _ranges(rows.assign(by=by, **values), keys, "τ_c", "shields", "ustar")
+    return _thresholds(rows.assign(by=by, **values), [*RANGES, "by"], "τ_c")
 
 
-def _each(rows: pd.DataFrame) -> pd.DataFrame:
-    """A row for each pile; seeds are one."""
-    telling = labels.varying(rows, "alpha_deg", "d_m", "force_law")
-    cells = []
-    for _, row in rows.sort_values(["alpha_deg", "d_m"], kind="stable").iterrows():
-        cell = {
-            "slope": labels.value("alpha_deg", row["alpha_deg"]),
-            "d": labels.millimetres(row["d_m"]),
-            "forces": labels.value("force_law", row["force_law"]),
-        }
-        for item in telling:
-            told = labels.is_told(item, row[item])
-            cell[labels.words(item).label] = labels.value(item, row[item]) if told else "—"
-        if (rows["of_seeds"] > 1).any():
-            ends = f": {row['least']:.4f} … {row['largest']:.4f}" if row["seeds"] > 1 else ""
-            cell["τ_c of each seed"] = f"{row['seeds']} of {row['of_seeds']}{ends}"
-        low, high = row["shields_model_low"], row["shields_model_high"]
-        model = "—" if pd.isna(low) else f"{low:.3f} … {high:.3f}, most by {row['model_share']}"
-        reached = pd.notna(row["shields"])
-        cell |= {
-            f"τ_c at n/N = {row['fraction']:.0%}": _number(row["shields"], ".4f"),
-            "interval": _interval(row["shields_low"], row["shields_high"]),
-            "model's interval": model if reached else "—",
-            "u*₀, m/s": _number(row["ustar0_m_s"], ".3f"),
-            "usable": "yes" if row["usable"] else f"no: {row['why_not']}",
-        }
-        cells.append(cell)
-    return pd.DataFrame(cells)
-
-
-def _ranges(
-    rows: pd.DataFrame, keys: list[str], tau: str, shields: str, ustar: str
+def _thresholds(
+    rows: pd.DataFrame, keys: Sequence[str], tau: str, more: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """Ranges of usable thresholds by some columns; fluids are never merged."""
-    fluids = [item for item in ("rho_f_kg_m3", "nu_m2_s") if rows[item].nunique() > 1]
-    cells = []
-    for _, group in split(rows, *keys, *fluids):
-        first, usable = group.iloc[0], group[valid(group)]
-        cells.append(
-            {
-                "slope": labels.value("alpha_deg", first["alpha_deg"]),
-                "d": f"{_span(group['d_m'] * 1e3, 'g')} mm",
-                "forces": labels.value("force_law", first["force_law"]),
-                **{labels.words(item).symbol: labels.value(item, first[item]) for item in fluids},
-                **({"by": first["by"]} if "by" in keys else {}),
-                tau: _span(usable[shields], ".4f"),
-                "interval": _interval(
-                    usable[f"{shields}_low"].min(), usable[f"{shields}_high"].max()
-                ),
-                "u*₀, m/s": _span(usable[ustar], ".3f"),
-                "usable": f"{len(usable)} of {len(group)}",
-            }
-        )
-    return pd.DataFrame(cells)
+    """A row for all thresholds that agree in some columns: the ranges of the usable ones.
 
+    Of none that is usable the range of all is told. `more` are columns to be told at the end.
+    """
+    ranges = "d_m" not in keys
+    if ranges:  # fluids are never merged
+        keys = [*keys, *(name for name in FLUID if rows[name].nunique() > 1)]
+    rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
+    by = [rows[key] for key in keys]
+    groups = rows.groupby(by, dropna=False, sort=False)
+    count, usable, first = groups.size(), groups["usable"].sum(), groups.first()
+    told = rows["usable"] | ~groups["usable"].transform("any")
+    shown = rows.select_dtypes("number").where(told).groupby(by, dropna=False, sort=False)
+    low, high = shown.min(), shown.max()
 
-def _number(value: float, form: str) -> str:
-    return "—" if pd.isna(value) else format(float(value), form)
+    def span(form: str, *columns: str, scale: float = 1.0) -> list[str]:
+        values = pd.concat([low[list(columns)], high[list(columns)]], axis=1).to_numpy() * scale
+        ends = zip(values.min(axis=1), values.max(axis=1), strict=True)
+        texts = (dict.fromkeys(format(float(end), form) for end in pair) for pair in ends)
+        return ["—" if "nan" in text else " … ".join(text) for text in texts]
 
-
-def _interval(low: float, high: float) -> str:
-    return "—" if pd.isna(low) or pd.isna(high) else f"{min(low, high):.4f} … {max(low, high):.4f}"
-
-
-def _span(values: pd.Series, form: str) -> str:
-    ends = (values.min(), values.max())
-    return " … ".join(dict.fromkeys(_number(value, form) for value in ends))
-
-
-def piles(results: Results) -> pd.DataFrame | None:
-    """The thresholds of the piles, a row for each, with the name of its case last."""
-    rows = results.joined("pile_threshold")
-    if rows.empty:
-        return None
-    extra = labels.varying(rows, *SHOWN, "fraction")
-    cells = []
-    for _, group in split(rows, "alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "scene_id"):
-        row = group.iloc[0]
-        slope, ratio = labels.value("alpha_deg", row["alpha_deg"]), row["z0_over_d"]
-        cell = {
-            "pile: α, d, z₀": f"{slope}, {labels.millimetres(row['d_m'])},\n"
-            f"{labels.ratio_of(ratio, 'd')}",
-            "forces, ν in m²/s": f"{labels.value('force_law', row['force_law'])}, "
-            f"{row['nu_m2_s']:g}",
-            **({"other choices": "\n".join(labels.told(row, extra))} if extra else {}),
-            "N": str(row["count"]),
-        }
-        for _, item in group.sort_values("fraction").iterrows():
-            interval = _interval(item["shields_low"], item["shields_high"])
-            cell[f"τ_c at n/N = {item['fraction']:.0%}"] = (
-                str(item["why_not"])
-                if pd.isna(item["shields"])
-                else f"{item['shields']:.4f}\n({interval})\nu*₀ {item['ustar0_m_s']:.3f} m/s"
-            )
-        cells.append({**cell, "case": row["case"] if isinstance(row["case"], str) else ""})
-    table = pd.DataFrame(cells).fillna("—")
-    return table[[*(item for item in table if item != "case"), "case"]]
+    index = first.index.to_frame(index=False)
+    table = {labels.words(key).label: [labels.value(key, v) for v in index[key]] for key in keys}
+    if ranges:
+        table["diameter, mm"] = span("g", "d_m", scale=1e3)
+    table[tau] = span(".4f", "shields")
+    table["interval"] = span(".4f", "shields_low", "shields_high")
+    if "shields_model_low" in rows:
+        wide = span(".3f", "shields_model_low", "shields_model_high")
+        shares = zip(wide, first["model_share"], strict=True)
+        table["model's interval"] = [f"{a}, most by {b}" if a != "—" else a for a, b in shares]
+    table["u*₀, m/s"] = span(".3f", "ustar0_m_s")
+    ends = zip(usable, count, first["why_not"], strict=True)
+    table["usable"] = [
+        f"no: {why}" if not n else "yes" if of == 1 else f"{n} of {of}" for n, of, why in ends
+    ]
+    return pd.DataFrame({**table, **{name: first[name].map(str).tolist() for name in more}})
 
 
 def single_grains(results: Results) -> pd.DataFrame | None:
@@ -289,41 +224,35 @@ def single_grains(results: Results) -> pd.DataFrame | None:
     if rows.empty:
         return None
     exact = rows["ustar_closed_form_m_s"]
-    width = (rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2
     rows = rows.assign(
-        holds=np.where(valid(rows), "yes", "no"),
+        **{"force law": [labels.value("force_law", law) for law in rows["force_law"]]},
+        **{"law holds": np.where(valid(rows), "yes", "no")},
         protocol=np.where(held(rows), "holds", "ramps"),
         off=rows["ustar_m_s"] / exact - 1,
-        width=width,
+        size=(rows["ustar_m_s"] / exact - 1).abs(),
+        width=(rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2,
     )
-    cells = [
-        {
-            "forces": labels.value("force_law", group["force_law"].iloc[0]),
-            "law holds": group["holds"].iloc[0],
-            "protocol": group["protocol"].iloc[0],
-            "grains": str(len(group)),
-            "never moved": str(int(group["off"].isna().sum())),
-            "mean of u*/u*(closed form) − 1": f"{group['off'].mean():+.3%}",
-            "largest |u*/u*(closed form) − 1|": f"{group['off'].abs().max():.3%}",
-            "median half width of the interval": f"±{group['width'].median():.3%}",
-        }
-        for _, group in split(rows, "force_law", "holds", "protocol")
-    ]
-    table = pd.DataFrame(cells)
-    return table.sort_values(["forces", "law holds", "protocol"], ascending=False)
+    groups = rows.groupby(["force law", "law holds", "protocol"])
+    table = {
+        "grains": groups.size().map(str),
+        "never moved": (groups.size() - groups["off"].count()).map(str),
+        "mean of u*/u*(closed form) − 1": groups["off"].mean().map("{:+.3%}".format),
+        "largest |u*/u*(closed form) − 1|": groups["size"].max().map("{:.3%}".format),
+        "median half width of the interval": groups["width"].median().map("±{:.3%}".format),
+    }
+    return pd.DataFrame(table).reset_index()
 
 
 def force_laws(results: Results) -> pd.DataFrame:
     """The force laws of the scenes: where each holds, and where it was taken from."""
     rows = []
-    for name, law in LAWS.items():
-        if (results.scenes["force_law"] == name).any():
-            low, high = law.reynolds
-            parts = [f"Re* ≥ {low:g}"] if low > 0 else []
-            parts += [f"Re* < {high:g}"] if np.isfinite(high) else []
-            if np.isfinite(law.drag_end):
-                parts.append(f"V d/ν < {law.drag_end:g} (drag: {law.drag_law})")
-            rows.append((law.label, ", ".join(parts) or "every Re*", law.reference))
+    for law in (LAWS[name] for name in LAWS if (results.scenes["force_law"] == name).any()):
+        low, high = law.reynolds
+        parts = [f"Re* ≥ {low:g}"] if low > 0 else []
+        parts += [f"Re* < {high:g}"] if np.isfinite(high) else []
+        if np.isfinite(law.drag_end):
+            parts.append(f"V d/ν < {law.drag_end:g} (drag: {law.drag_law})")
+        rows.append((law.label, ", ".join(parts) or "every Re*", law.reference))
     return pd.DataFrame(rows, columns=["force law", "holds for", "source"])
 
 
@@ -345,33 +274,21 @@ def parameters(results: Results) -> pd.DataFrame:
 def _values(column: pd.Series) -> str:
     values = list(column.dropna().unique())
     if all(isinstance(value, str) for value in values):
-        return ", ".join(sorted(map(str, values)))
-    numbers = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
-    return (
-        ", ".join(numbers)
-        if len(numbers) <= FEW
-        else f"{len(numbers)} from {numbers[0]} to {numbers[-1]}"
-    )
+        return ", ".join(sorted(values))
+    listed = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
+    many = f"{len(listed)} from {listed[0]} to {listed[-1]}"
+    return ", ".join(listed) if len(listed) <= FEW else many
 
 
 def programs(results: Results) -> pd.DataFrame:
     """The solvers by what the cases say of them, and the libraries."""
-    used: dict[str, set[str]] = {}
-    for name in results.plan.cases:
-        identity = read_json(results.cases / name / IDENTITY)
-        solvers = identity.get("programs", {}) if isinstance(identity, dict) else {}
-        for program, version in solvers.items():
-            used.setdefault(str(program), set()).add(str(version))
-    return versions({program: ", ".join(sorted(values)) for program, values in used.items()})
+    return versions(case.programs(results.cases, results.plan.cases))
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
     """Solvers with their versions, this package, and the libraries that are not among them."""
     rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
-    installed = {item.metadata["Name"].lower(): item.version for item in metadata.distributions()}
-    rows += [
-        (name, installed.get(name, "not installed")) for name in PACKAGES if name not in solvers
-    ]
+    rows += [(name, metadata.version(name)) for name in PACKAGES if name not in solvers]
     return pd.DataFrame(rows, columns=["program", "version"])
 
 
@@ -379,56 +296,44 @@ def times(timings: pd.DataFrame) -> pd.DataFrame | None:
     """Wall time of the finished cases by their kind: in the solver, and outside it."""
     if timings.empty:
         return None
-    rows = []
-    for name, group in [
-        *((str(kind), group) for (kind,), group in split(timings, "kind")),
-        ("all", timings),
-    ]:
-        wall = group["solver_s"] + group["outside_s"]
-        seconds = (group["solver_s"].sum(), group["outside_s"].sum(), wall.max())
-        rows.append((name, str(len(group)), *(f"{value:.1f}" for value in seconds)))
+    every = pd.concat([timings, timings.assign(kind="all")])
+    wall = every["solver_s"] + every["outside_s"]
+    groups = every.assign(wall=wall).groupby("kind", sort=False)
+    sums = groups.agg({"case": "size", "solver_s": "sum", "outside_s": "sum", "wall": "max"})
+    seconds = sums[["solver_s", "outside_s", "wall"]].map("{:.1f}".format)
+    table = pd.concat([sums["case"].astype(str), seconds], axis=1).reset_index()
     head = ["kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s"]
-    return pd.DataFrame(rows, columns=head)
+    return table.set_axis(head, axis=1)
 
 
 def levels(results: Results) -> pd.DataFrame | None:
     """On which fidelity levels the piles were answered, why, and what is known of them."""
-    table = results.joined("pile_threshold")
     rows = []
+    table = results.joined("pile_threshold")
     for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
-        error = group["error_estimate"].max()
-        rows.append(
-            {
-                "flow | grains": f"{flow} | {grain}",
-                "description": fidelity.meaning([str(flow), str(grain)]),
-                "reason": str(why),
-                "piles": str(group["scene_id"].nunique()),
-                "known error of τ_c, up to": "not known"
-                if pd.isna(error)
-                else f"{100 * error:.1f} %",
-            }
-        )
-    return pd.DataFrame(rows) if rows else None
+        meaning, error = fidelity.meaning([str(flow), str(grain)]), group["error_estimate"].max()
+        known = "not known" if pd.isna(error) else f"{error:.1%}"
+        rows.append((f"{flow} | {grain}", meaning, why, str(group["scene_id"].nunique()), known))
+    head = ["flow | grains", "description", "reason", "piles", "known error of τ_c, up to"]
+    return pd.DataFrame(rows, columns=head) if rows else None
 
 
 def checks(results: Results) -> pd.DataFrame | None:
     """The piles that DEM answered as well: how far the cheap answers are from it."""
-    rows = [
-        {
-            "piles": f"{labels.amount(item['alpha_deg'], '°')}, {item['packing']}, "
-            f"{labels.value('force_law', item['force_law'])}",
-            "d": f"{1e3 * item['d_m']:g} mm",
-            "n/N": f"{item['fraction']:.0%}",
-            "τ_c": f"{item['shields']:.4g}",
-            "by DEM": f"{item['shields_dem']:.4g} "
-            f"({item['shields_dem_low']:.4g} … {item['shields_dem_high']:.4g})",
-            "difference": f"{100 * item['difference']:+.1f} %",
-            "agree": "yes" if item["agree"] else "no",
-            "case": str(item["case"]),
-        }
-        for item in results.tables.get("check", pd.DataFrame()).to_dict("records")
-    ]
-    return pd.DataFrame(rows) if rows else None
+    table = results.tables.get("check", pd.DataFrame())
+    if table.empty:
+        return None
+    keys, dem = ["alpha_deg", "packing", "force_law", "d_m", "fraction"], table["shields_dem"]
+    ends = zip(dem, table["shields_dem_low"], table["shields_dem_high"], strict=True)
+    cells = {
+        **{labels.words(key).label: [labels.value(key, v) for v in table[key]] for key in keys},
+        "τ_c": table["shields"].map("{:.4g}".format),
+        "by DEM": [f"{tau:.4g} ({low:.4g} … {high:.4g})" for tau, low, high in ends],
+        "difference": table["difference"].map("{:+.1%}".format),
+        "agree": table["agree"].map({True: "yes", False: "no"}),
+        "case": table["case"].map(str),
+    }
+    return pd.DataFrame(cells)
 
 
 def remarks(results: Results) -> dict[str, Any]:
@@ -457,65 +362,42 @@ def remarks(results: Results) -> dict[str, Any]:
     return counts
 
 
+SHEETS: tuple[Callable[[Results], Any], ...] = (
+    *(short, piles, grains, single_grains, levels, checks, remarks, force_laws, parameters),
+    programs,
+)
+"""The parts of the page that its template knows by the names of these functions."""
+
+
 def contents(
     results: Results, timings: pd.DataFrame, failures: Mapping[str, str]
 ) -> dict[str, Any]:
     """The words and numbers of the page beside its figures, by the names of its template.
 
-    Parameters
-    ----------
-    results : Results
-        The results of the study.
-    timings : DataFrame
-        Wall times of the finished cases.
-    failures : mapping of str to str
-        Causes by name of case.
+    `timings` are the wall times of the finished cases, `failures` the causes by name of case.
     """
     from orchestrator.report import flows, measured  # both import what draws
 
-    ranked = measured.fits(results)
-    eq10 = flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else (0.0, 0.0)
-    methods = set(results.scenes["answered_method"])
-    run = [pile.scene for pile in results.plan.piles.values()]
-    root, names = (
-        results.cases.name,
-        [n for n in results.plan.cases if (results.cases / n).is_dir()],
-    )
-    foams = (path for name in names for path in sorted((results.cases / name).glob("*.foam")))
+    methods, root = set(results.scenes["answered_method"]), results.cases
+    piles = results.plan.piles.values()
+    names = [name for name in results.plan.cases if (root / name).is_dir()]
+    foams = (path for name in names for path in sorted((root / name).glob("*.foam")))
     foam = next(foams, None)
     return {
+        **{sheet.__name__: sheet(results) for sheet in SHEETS},
+        "results": results,
         "title": results.study.title,
-        "study": results.study,
-        "scene_count": len(results.scenes),
-        "case_count": len(results.plan.cases),
-        "piles": piles(results),
-        "grains": grains(results),
-        "single_grains": single_grains(results),
-        "levels": levels(results),
-        "checks": checks(results),
-        "remarks": remarks(results),
-        "paper_pair": bool(results.scenes["force_law"].isin(theory.PAIR).any()),
-        "force_laws": force_laws(results),
-        "measured_source": MEASURED_SOURCE,
-        "factors_from": measured.FACTORS_FROM,
-        "measured": list(measured.sentences(results.beds("grain"), ranked)) if ranked else None,
-        "best_laws": measured.sheet(measured.best(ranked)),
-        "every_law": measured.sheet(ranked),
         "answer": sentences(results),
-        "short": sheet(results),
-        "failures": failures,
-        "links": {name: quote(f"{root}/{name}/") for name in names},
-        "tables": list(results.tables),
-        "parameters": parameters(results),
-        "programs": programs(results),
+        "measured": measured.section(results),
         "times": times(timings),
-        "wall_stress": bool(results.flows),
-        "eq10_mean": eq10[0],
-        "eq10_crest": eq10[1],
+        "failures": failures,
+        "links": {name: quote(f"{root.name}/{name}/") for name in names},
+        "paper_pair": results.scenes["force_law"].isin(theory.PAIR).any(),
+        "eq10": flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else None,
         "by_dem": "dem" in methods,
-        "without_dem": bool(methods - {"dem"}),
-        "mixed": any(scene.grain.sizes is not None for scene in run),
-        "strips": any(pile.bed.width for pile in results.plan.piles.values()),
+        "without_dem": methods - {"dem"},
+        "mixed": any(pile.scene.grain.sizes is not None for pile in piles),
+        "strips": any(pile.bed.width for pile in piles),
         "example_case": names[-1] if names else "NAME",
         "example_foam": f"{foam.parent.name}/{foam.name}" if foam else "",
     }

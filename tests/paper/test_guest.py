@@ -50,7 +50,8 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
     (tmp_path / "cases").mkdir()
     grains = {name: results.tables[name] for name in ("scenes", "single_grain")}
     asked, guests = replace(results.study, text=text), (paper.report_card,)
-    report.write(asked, results.plan, grains, pd.DataFrame(), {}, Folder(tmp_path), guests)
+    study_ = replace(results, study=asked, tables=grains)
+    report.write(study_, pd.DataFrame(), {}, Folder(tmp_path), guests)
     page = (tmp_path / report.PAGE).read_text(encoding="utf-8")
     assert ('id="claims"' in page) == (tmp_path / paper.CLAIMS).exists() == is_paper
     if is_paper:

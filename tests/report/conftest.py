@@ -21,7 +21,7 @@ def page(results: Results) -> Path:
 
 def write(results: Results, out: Path, failures: dict[str, str]) -> Path:
     times = tables.timings(results.plan, results.plan.done(results.cases))
-    report.write(results.study, results.plan, results.tables, times, failures, Folder(out))
+    report.write(results, times, failures, Folder(out))
     return out / report.PAGE
 
 

@@ -88,7 +88,7 @@ def test_curves_and_points_of_two_layers_are_told_apart(two: Results) -> None:
 def test_rows_of_two_layers_are_told_apart(two: Results) -> None:
     sheet = words.piles(two)
     assert sheet is not None
-    assert set(sheet["other choices"]) == {"mobile layers = 1", "mobile layers = 2"}
+    assert set(sheet["mobile layers"]) == {"1", "2"}
 
 
 def test_page_lists_every_parameter(results: Results) -> None:

@@ -76,7 +76,7 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
         for n in range(words.FEW)
     ]
     study = copies(results, *fluids)
-    sheet = words.sheet(study)
+    sheet = words.short(study)
     assert sheet is not None
     assert len(sheet) == 2
     said = " ".join(words.sentences(study))
@@ -103,11 +103,10 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     study = copies(
         results, *({"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas))
     )
-    sheet = words.sheet(study)
+    sheet = words.short(study)
     assert sheet is not None
     (row,) = sheet.to_numpy().tolist()
-    assert "3 of 3: 0.0400 … 0.0900" in row
-    assert "0.0600" in row
+    assert {"3 of 3", "0.0400 … 0.0900"} <= set(row)
     first, *_ = words.sentences(study)
     assert "τ_c = 0.06 in the mean of 3 seeds (0.04 … 0.09)" in first
 

@@ -50,10 +50,10 @@ def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
     said = words.sentences(grains)
     assert said[0].startswith("One grain of 0.05 mm on 0° starts to move at u* ")
-    assert words.sheet(grains) is not None
+    assert words.short(grains) is not None
     without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
     exact = replace(grains, tables={**grains.tables, "single_grain": without})
-    sheet = words.sheet(exact)
+    sheet = words.short(exact)
     assert sheet is not None
     (method,) = set(sheet["by"])
     assert method == "closed form"
@@ -66,7 +66,7 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     first, *others = words.sentences(changed)
     assert first.endswith("(not usable: Re* 2 is below 30).")
     assert others[0] == "Usable: 0 of 4 thresholds."
-    sheet = words.sheet(changed)
+    sheet = words.short(changed)
     assert sheet is not None
     assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
 
