@@ -83,6 +83,8 @@ def _parser() -> Parser:
         command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
         count, text = os.cpu_count() or 1, "cases at a time"
         command.add_argument("--workers", type=_workers, default=count, metavar="N", help=text)
+        text = "say what would run, how long and how large, and end"
+        command.add_argument("--plan", action="store_true", help=text)
         return command
 
     study = add_run("study", _study, "run what is missing of a study, and draw it", "first-look")
@@ -93,8 +95,6 @@ def _parser() -> Parser:
     study.add_argument("--tolerance", type=float, metavar="X", help=text)
     text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
     study.add_argument("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
-    text = "say what would run, how long and how large, and end"
-    study.add_argument("--plan", action="store_true", help=text)
     calculator.add(commands)
     for name, text in (
         ("status", "what of a study is done, running, failed and why"),
@@ -142,12 +142,18 @@ def _study(options: Namespace) -> int:
 
 def _experiment(options: Namespace) -> int:
     """Run an experiment; all but the maps of stability are on the scenes of a study."""
-    from orchestrator import face
+    from orchestrator import face, plan
+    from orchestrator.runs.workspace import Workspace
 
-    experiment = import_module(f"orchestrator.experiments.{options.command}")
+    module = import_module(f"orchestrator.experiments.{options.command}")
     out = options.out or Path("results") / options.command
     studies = [face.load(options.source)] if "source" in options else []
-    return _end(experiment.run(*studies, out, workers=options.workers))
+    experiment = module.experiment(*studies, out)
+    if options.plan:
+        cases = Workspace(out.absolute()).cases
+        print("\n".join(plan.expected(experiment.planned, cases, options.workers)))
+        return 0
+    return _end(experiment.run(out, workers=options.workers))
 
 
 def _on_directory(options: Namespace) -> int:

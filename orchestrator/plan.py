@@ -143,26 +143,28 @@ def settled(study: Study, directory: Path) -> Plan:
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
     plan = settled(study, directory)
-    missing = plan.missing(directory).values()
-
-    def number(count: int, noun: str) -> str:
-        return f"{count} {noun}{'' if count == 1 else 's'}"
 
     def counted(names: Iterable[str]) -> str:
         return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
 
-    yield f"{study.title}: {number(len(study.scenes), 'scene')}"
+    yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
     for group in study.groups:
         regimes = counted(str(regime_of(scene)) for scene in group.scenes)
         laws = counted(scene.forces.law for scene in group.scenes)
-        count = number(len(group.scenes), "scene")
+        count = _number(len(group.scenes), "scene")
         outside = sum(not law_holds(scene) for scene in group.scenes)
         note = f"; in {outside} the law does not hold for a single grain" if outside else ""
         yield f"  {group.name}: {count}; regimes: {regimes}; force laws: {laws}{note}"
     for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
         yield f"  {times} answered: {why}"
+    yield from expected(plan, directory, workers)
+
+
+def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
+    """Lines of text: the cases of a plan by kind, expected time and disk."""
+    missing = plan.missing(directory).values()
     todo = Counter(case.kind for case in missing)
-    yield f"{number(len(plan.cases), 'case')}, {len(missing)} to run"
+    yield f"{_number(len(plan.cases), 'case')}, {len(missing)} to run"
     for kind, times in Counter(case.kind for case in plan.cases.values()).items():
         yield f"  {kind}: {times}, {todo[kind]} to run"
     # a chain of cases takes at least the sum of its times, however many run beside it
@@ -170,6 +172,10 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
     runs = max(sum(case.cost_s for case in missing) / workers, max(chains, default=0.0))
     size = sum(BYTES.get(case.kind, OTHER_BYTES) for case in missing)
-    expected = f"about {human(runs + plan.drawing_s)} with {number(workers, 'worker')}"
+    time = f"about {human(runs + plan.drawing_s)} with {_number(workers, 'worker')}"
     rest = f"{human(plan.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
-    yield f"expected: {expected}, {rest}"
+    yield f"expected: {time}, {rest}"
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -5,18 +5,30 @@ on the cheapest levels that feel it.
 """
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
+from matplotlib import colormaps
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.experiments import experiment
-from orchestrator.experiments.experiment import Runs, Tables, label
+from orchestrator.experiments.experiment import (
+    Experiment,
+    Runs,
+    Tables,
+    figure,
+    label,
+    piles,
+    texts,
+)
 from orchestrator.fidelity import calibration, limits
 from orchestrator.fidelity.calibration import FROZEN
 from orchestrator.fidelity.decision import Decision, on_levels
@@ -24,21 +36,21 @@ from orchestrator.fidelity.levels import (
     AS_ASKED,
     PEELING,
     Fields,
-    Level,
     Pair,
     changed,
     level,
     value_of,
 )
+from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile import line as bed_line
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.laws import LAWS
-from orchestrator.pipeline import Finished
-from orchestrator.report import document
-from orchestrator.report.document import Section
+from orchestrator.report import style
+from orchestrator.report.document import Section, sheet
 from orchestrator.study.closed_form import law_holds
-from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
+from orchestrator.tables.piles import shields
 
 COARSE = level("flow", "coarse")
 """The level of a solved flow; another flow model is kept."""
@@ -46,11 +58,14 @@ DYNAMIC, DYNAMIC_POURED = level("grains", "1 layer, fast"), level("grains", "4 l
 """Levels for a choice that dynamics alone feel; on poured beds, with more layers."""
 SEEDS = (1, 2, 3)
 """Other draws of a random packing that are as good."""
-QUANTITIES = ("shields", "ustar0")
+QUANTITIES = {"shields": "Shields number $θ$", "ustar0": "undisturbed friction velocity $u^*_0$"}
 """The Shields number of the mean stress on the moved grains, and the undisturbed friction velocity
 at which they moved."""
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
+BLUE, ORANGE = "#0072b2", "#d55e00"
+MOST_PILES = 4
+"""Piles whose wear is drawn; the table has all."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +78,7 @@ class Choice:
         What tables and figures call it, and why its alternatives are as good.
     field : str
         The field that it changes.
-    values, times, beside : tuple
+    values, times, beside : sequence
         Its alternatives: values of the field, factors of the scene's value, and sums to it.
     packings : str
         Whether "all" piles have it, "lattices" or "poured" beds alone.
@@ -76,19 +91,18 @@ class Choice:
     name: str
     why: str
     field: str
-    values: tuple[Any, ...] = ()
-    times: tuple[float, ...] = ()
-    beside: tuple[float, ...] = ()
+    values: Sequence[Any] = ()
+    times: Sequence[float] = ()
+    beside: Sequence[float] = ()
     packings: str = "all"
     of_solved_flow: bool = False
     dynamic: bool = False
 
     def levels(self, scene: Scene) -> Pair:
         """The levels on which it is changed in a scene."""
-        grains: Level = PEELING
-        if self.dynamic:
-            grains = DYNAMIC_POURED if scene.is_poured else DYNAMIC
-        return Pair(COARSE if scene.flow.model == "solve" else AS_ASKED, grains)
+        dynamic = DYNAMIC_POURED if scene.is_poured else DYNAMIC
+        flow = COARSE if scene.flow.model == "solve" else AS_ASKED
+        return Pair(flow, dynamic if self.dynamic else PEELING)
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """The scene with each alternative that it can have, by the alternative's name."""
@@ -101,17 +115,23 @@ class Choice:
             except InputError:  # the scene cannot have it
                 continue
             if other != scene and (self.name != "force law" or law_holds(other)):
-                yield f"{self.name}: {name}", other
+                yield name, other
 
     def _alternatives(self, scene: Scene) -> dict[str, Fields]:
         if self.name == "packing":
-            return _packings(scene)
+            if scene.is_poured:
+                return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
+            gaps = {"bed.packing": "disordered", "bed.disorder": 0.05}
+            return {
+                "rows along the slope": {"bed.packing": "aligned"},
+                "level rows": {"bed.packing": "horizontal"},
+                **{f"random gaps, seed {seed}": {**gaps, "bed.seed": seed} for seed in SEEDS},
+            }
         if self.name == "force law":  # peeling knows no torque
             laws = {name: law for name, law in LAWS.items() if not law.turns}
             return {law.label: {self.field: name} for name, law in laws.items()}
-        value = value_of(scene, self.field)
-        if self.name == "first cell":
-            value = scene.first_cell_height
+        of_cell = self.name == "first cell"
+        value = scene.first_cell_height if of_cell else value_of(scene, self.field)
         return {
             **{f"{one}": {self.field: one} for one in self.values},
             **{f"{by:g} times": {self.field: by * value} for by in self.times},
@@ -119,28 +139,8 @@ class Choice:
         }
 
 
-def _packings(scene: Scene) -> dict[str, Fields]:
-    """Other seeds of a poured bed; else the other packings of the plane, random gaps by seeds."""
-    if scene.is_poured:
-        return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
-    gaps = {"bed.packing": "disordered", "bed.disorder": 0.05}
-    return {
-        "rows along the slope": {"bed.packing": "aligned"},
-        "level rows": {"bed.packing": "horizontal"},
-        **{f"random gaps, seed {seed}": {**gaps, "bed.seed": seed} for seed in SEEDS},
-    }
-
-
-def _choices() -> tuple[Choice, ...]:
-    rows = tomllib.loads(Path(__file__).with_name("choices.toml").read_text(encoding="utf-8"))
-    lists = ("values", "times", "beside")
-    return tuple(
-        Choice(**{**row, **{key: tuple(row.get(key, ())) for key in lists}})
-        for row in rows["choice"]
-    )
-
-
-CHOICES = _choices()
+_FILE = Path(__file__).with_name("choices.toml")
+CHOICES = [Choice(**row) for row in tomllib.loads(_FILE.read_text(encoding="utf-8"))["choice"]]
 """Every shared choice."""
 
 
@@ -149,7 +149,7 @@ class Change(NamedTuple):
 
     scene: Scene
     choice: Choice
-    name: str
+    alternative: str
     base: str
     other: str
 
@@ -157,55 +157,46 @@ class Change(NamedTuple):
 def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     """The alternatives of each pile of a study, and the piles to be answered, by name."""
     listed, asked = [], {}
-    for scene in study.scenes:
-        for choice in CHOICES if isinstance(scene.bed, PileBed) else ():
+    for scene in piles(study):
+        for choice in CHOICES:
             levels = choice.levels(scene)
-            base, *others = (
-                (f"{scene.id} | {levels.text} | {name}", name, pile)
-                for name, pile in ((BASE, scene), *choice.scenes(scene))
-            )
-            for key, _, pile in (base, *others):
-                asked[key] = on_levels(pile, levels, "the budget changes one choice")
-            listed += [Change(scene, choice, name, base[0], key) for key, name, _ in others]
+            start, why = f"{scene.id} | {levels.text} | ", "the budget changes one choice"
+            asked[start + BASE] = on_levels(scene, levels, why)
+            for name, other in choice.scenes(scene):
+                key = f"{start}{choice.name}: {name}"
+                asked[key] = on_levels(other, levels, why)
+                listed.append(Change(scene, choice, name, start + BASE, key))
     return listed, asked
 
 
-def run(study: Study, out: Path, *, workers: int) -> Finished:
-    """Change each shared choice alone, on the piles of a study, and draw what that moves.
+def experiment(study: Study, out: Path) -> Experiment:
+    """What each shared choice is worth, changed alone on the piles of a study.
 
     Raises
     ------
     InputError
-        If the study has no pile or one is beyond a limit of the methods, or the directory cannot
-        be used.
-    SolverError
-        If a solver is missing.
-    OrchestratorError
-        If no run came to its end.
+        If the study has no pile or one is beyond a limit of the methods.
     """
     limits.check_study(study)
     listed, asked = changes(study)
-    if not asked:
-        remedy = 'give a group `bed.kind = "pile"`'
-        raise InputError("there is no pile in this study", where=study.name, remedy=remedy)
     planned = plan.of(asked, study.name, cases=out.absolute() / "cases")
 
-    def make(runs: Runs) -> tuple[Tables, Callable[[], list[Section]]]:
+    def tables(runs: Runs) -> Tables:
         moved = measure(listed, runs)
-        if moved.empty:
-            raise experiment.nothing_ran(out, "no run came to its end: no share is known")
         shared = shares(moved)
-        tables = {"changes": moved, "shares": shared, "budget": known(shared)}
-        return tables, lambda: _sections(listed, tables, runs)
+        return {"changes": moved, "shares": shared, "budget": known(shared)}
 
-    limit_s = study.time_limit_s
-    finished = experiment.run(
-        "budget", "What a threshold is worth", planned, out, make, workers=workers, limit_s=limit_s
-    )
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
-    needed = {run.name for change in listed for run in planned.piles[change.base].runs}
-    failures = {name: error for name, error in finished.failures.items() if name in needed}
-    return Finished(finished.page, finished.started, failures)
+    failing = {run.name for change in listed for run in planned.piles[change.base].runs}
+    return Experiment(
+        "budget",
+        "What a threshold is worth",
+        planned,
+        tables,
+        lambda tables, runs: _sections(listed, tables, runs),
+        study.time_limit_s,
+        failing=failing,
+    )
 
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
@@ -222,7 +213,7 @@ def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
             "scene": label(change.scene),
             "model_class": calibration.model_class(change.scene),
             "choice": change.choice.name,
-            "alternative": change.name.partition(": ")[2],
+            "alternative": change.alternative,
             "fraction": before.fraction,
             "shields": after.tau / before.tau - 1,
             "ustar0": after.ustar0 / before.ustar0 - 1,
@@ -255,62 +246,105 @@ def known(shared: pd.DataFrame) -> pd.DataFrame:
 
 def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]:
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
-    from orchestrator.experiments import budget_figures as figures
-
-    words, figure, sheet = experiment.texts("budget"), experiment.figure, document.sheet
+    words, of = texts("budget"), runs.planned.piles
     moved, shared = tables["changes"], tables["shares"]
-    title, all_scenes = "All choices together", _together(shared)
-    sections = [Section(title, words["together"], (), [sheet(all_scenes)], [words["limit"]])]
-    piles = runs.planned.piles
-    worn = [
-        (piles[change.base], piles[change.other])
-        for change in listed
-        if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
-    ]
-    if worn:
-        frozen = moved[moved["choice"] == FROZEN]
-        table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
-        table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
-        drawn = figures.curves(worn, runs.cases)
-        chart = figure("wear", "Frozen bed and bed that changes", words["wear"], drawn)
-        title = "The bed that changes"
-        sections.append(Section(title, words["changing"], (chart,), [sheet(table)]))
+    rows, tornados = [], []
     for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
-        name, drawn = str(scene["scene"].iloc[0]), figures.tornado(scene)
-        chart = figure(f"tornado-{number}", name, words["scene"], drawn)
+        name, largest = str(scene["scene"].iloc[0]), scene.groupby("choice", sort=False)[ENDS].max()
+        row = {"scene": name}
+        for quantity, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
+            low, high = calibration.together(largest, quantity)
+            row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
+            widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
+            row[f"{symbol}: largest share"] = str(widths.idxmax())
+        rows.append(row)
         ends = zip(100 * scene["shields_low"], 100 * scene["shields_high"], strict=True)
         share = [f"−{low:.1f} … +{high:.1f}" for low, high in ends]
         heads = [f"change of θ at {fraction:.0%}, %" for fraction in scene["fraction"]]
-        table = scene.assign(share=share, head=heads)
-        wide = table.pivot_table("share", "choice", "head", aggfunc="first", sort=False)
-        sections.append(Section(name, "", (chart,), [sheet(wide.reset_index())]))
+        wide = scene.assign(share=share, head=heads).pivot_table(
+            "share", "choice", "head", aggfunc="first", sort=False
+        )
+        chart = figure(f"tornado-{number}", name, tornado(largest), words["scene"])
+        tornados.append(Section(name, "", (chart,), [sheet(wide.reset_index())]))
+    title, all_scenes = "All choices together", sheet(pd.DataFrame(rows))
+    sections = [Section(title, words["together"], (), [all_scenes], [words["limit"]])]
+    frozen = moved[moved["choice"] == FROZEN]
+    if len(frozen):
+        worn = [
+            (of[change.base], of[change.other])
+            for change in listed
+            if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
+        ]
+        table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
+        table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
+        drawn = curves(worn[:MOST_PILES], runs.cases)
+        chart = figure("wear", "Frozen bed and bed that changes", drawn, words["wear"])
+        title = "The bed that changes"
+        sections.append(Section(title, words["changing"], (chart,), [sheet(table)]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
-    choices = pd.DataFrame(kept, columns=["choice", "alternatives", "why"])
+    sheets = [sheet(pd.DataFrame(kept, columns=["choice", "alternatives", "why"]))]
     # a flow model may refuse a bed
-    scenes = {key: change.scene for change in listed for key in (change.base, change.other)}
-    rows = []
-    for key, asked in scenes.items():
-        if not runs.are_done(key):
-            failed = (runs.failures.get(run.name) for run in piles[key].runs)
-            why = "; ".join(error.what for error in failed if error)
-            rows.append((label(asked), key.rpartition(" | ")[2], why))
-    lost = pd.DataFrame(rows, columns=["scene", "alternative", "why"]).drop_duplicates()
-    text = "" if lost.empty else "The alternatives of the second table have no answer."
-    sheets = [sheet(table) for table in (choices, lost) if len(table)]
-    return [*sections, Section("The choices and their alternatives", text, tables=sheets)]
+    lost = [
+        (label(change.scene), f"{change.choice.name}: {change.alternative}", "; ".join(causes))
+        for change in listed
+        if not runs.are_done(change.other)
+        for runs_of in [of[change.other].runs]
+        for causes in [[runs.failures[r.name].what for r in runs_of if r.name in runs.failures]]
+    ]
+    text = "The alternatives of the second table have no answer." * bool(lost)
+    if lost:
+        sheets.append(sheet(pd.DataFrame(lost, columns=["scene", "alternative", "why"])))
+    last = Section("The choices and their alternatives", text, tables=sheets)
+    return [*sections, *tornados, last]
 
 
-def _together(shared: pd.DataFrame) -> pd.DataFrame:
-    """A row for each scene: the shares of all choices together, and the largest of them."""
-    rows = []
-    for _, scene in shared.groupby("scene_id", sort=False):
-        largest = scene.groupby("choice", sort=False)[ENDS].max()
-        row = {"scene": scene["scene"].iloc[0]}
-        for name, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
-            low, high = calibration.together(largest, name)
-            row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
-            widths = largest[f"{name}_low"] + largest[f"{name}_high"]
-            row[f"{symbol}: largest share"] = str(widths.idxmax())
-        rows.append(row)
-    return pd.DataFrame(rows)
+def tornado(largest: pd.DataFrame) -> Canvas:
+    """The largest share of each choice of one scene over the fractions; rows are the choices."""
+    largest = largest.loc[largest.max(axis=1).sort_values().index]
+    total = [end for name in QUANTITIES for end in calibration.together(largest, name)]
+    rows = pd.concat([largest, pd.DataFrame([total], columns=ENDS, index=["all together"])])
+    canvas = style.canvas(0.28 * len(rows) + 1.0)
+    ax, bar = canvas.subplots(), 0.38
+    for name, offset, colour in zip(QUANTITIES, (bar / 2, -bar / 2), (BLUE, ORANGE), strict=True):
+        low, high = 100 * rows[f"{name}_low"], 100 * rows[f"{name}_high"]
+        ax.barh(np.arange(len(rows)) + offset, low + high, bar, left=-low, color=colour, lw=0)
+    ax.axvline(0.0, color="0.2", lw=0.8)
+    ax.axhline(len(largest) - 0.5, color="0.7", lw=0.6)
+    ax.set_yticks(range(len(rows)), list(rows.index))
+    ax.set_xlabel("change of the threshold, %")
+    ax.grid(axis="x", lw=0.4, color="0.85")
+    looks = zip((BLUE, ORANGE), QUANTITIES.values(), strict=True)
+    style.legends(canvas, [Patch(color=colour, label=text) for colour, text in looks], [])
+    return canvas
+
+
+def curves(shown: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
+    """A row for each pile, frozen and changing: θ at each n/N, and its bed line in each round."""
+    canvas = style.canvas(1.9 * len(shown) + 0.6)
+    grid = canvas.subplots(len(shown), 2, squeeze=False)
+    for (left, right), (frozen, changing) in zip(grid, shown, strict=True):
+        for pile, colour, dashes in ((frozen, "0.5", "--"), (changing, BLUE, "-")):
+            whole = pile.packing.count
+            count = round(max(pile.scene.protocol.fractions) * whole)
+            fractions = np.arange(1, count + 1) / whole
+            tau = np.array([row.tau for row in pile.thresholds(cases, fractions.tolist())])
+            left.plot(fractions, shields(pile.scene, tau), color=colour, ls=dashes)
+        left.set(xlim=(0, max(changing.scene.protocol.fractions)), ylabel="Shields number $θ$")
+        left.set_ylim(bottom=0)
+        left.set_title(label(frozen.scene), loc="left", fontsize=8)
+        h, rounds = changing.line.h, changing.flows
+        for number, flow in enumerate(rounds):
+            line = bed_line(changing, flow, cases)
+            shade = colormaps["YlGnBu"](0.35 + 0.65 * number / len(rounds))
+            right.plot(np.array(line.x) / h, np.array(line.z) / h, color=shade, lw=0.9)
+        end = float(changing.line.crest[0]) / h + 0.4
+        right.set(xlim=(changing.line.x[1] / h, end), ylabel="z / h")
+    grid[-1, 0].set_xlabel("n/N")
+    grid[-1, 1].set_xlabel("x / h")
+    samples = [
+        Line2D([], [], color="0.5", ls="--", label="flow of the whole pile"),
+        Line2D([], [], color=BLUE, label="flow of the bed as it is"),
+    ]
+    style.legends(canvas, samples, [])
+    return canvas

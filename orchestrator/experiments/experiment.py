@@ -1,7 +1,7 @@
 """An experiment: scenes in, runs, tables, one page of figures."""
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,16 +10,17 @@ from typing import Any
 import pandas as pd
 
 from orchestrator import pipeline
-from orchestrator.errors import OrchestratorError
+from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import document, settings
 from orchestrator.report.document import Section
 from orchestrator.report.style import Figure
-from orchestrator.runs.case import programs
+from orchestrator.runs import case
 from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace, claimed
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import text
 
 Tables = Mapping[str, pd.DataFrame]
@@ -27,84 +28,107 @@ Tables = Mapping[str, pd.DataFrame]
 
 @dataclass(frozen=True)
 class Runs:
-    """What the runs of an experiment left.
-
-    Attributes
-    ----------
-    planned : Plan
-        The scenes and their runs.
-    cases : Path
-        Where the runs lie.
-    done : mapping
-        The markers of the finished runs, by name.
-    failures : mapping of str to OrchestratorError
-        The runs that failed.
-    """
+    """Plan and directory of the runs; by name the markers of those done, and the failures."""
 
     planned: Plan
     cases: Path
     done: Mapping[str, Mapping[str, Any]]
     failures: Mapping[str, OrchestratorError]
 
-    @property
-    def cpu_s(self) -> dict[str, float]:
-        """Processor seconds of the finished runs, by name."""
-        return {name: state["cpu_s"] for name, state in self.done.items()}
-
     def are_done(self, *piles: str) -> bool:
         """Whether all runs of some piles of the plan are done, by their names."""
         return all(self.planned.piles[key].is_run(self.done) for key in piles)
 
+    def cpu_s(self, runs: Sequence[case.Case]) -> float:
+        """Processor seconds of some runs; NaN if one is not done."""
+        return sum(float(self.done.get(run.name, {}).get("cpu_s", "nan")) for run in runs)
 
-def run(
-    name: str,
-    title: str,
-    planned: Plan,
-    out: Path,
-    make: Callable[[Runs], tuple[Tables, Callable[[], Sequence[Section]]]],
-    *,
-    workers: int,
-    limit_s: float,
-    repeats: Callable[[Path], bool] = lambda directory: True,
-) -> Finished:
-    """Run what is missing of an experiment, write its tables and draw its page.
 
-    Parameters
+@dataclass(frozen=True)
+class Experiment:
+    """What an experiment runs and makes.
+
+    Attributes
     ----------
     name, title : str
         Of the experiment and of its page.
     planned : Plan
         Its scenes and runs.
-    out : Path
-        Its directory; an experiment that is there already is continued.
-    make : callable
-        From the runs, the tables by name, and a function that draws the sections of the page.
-    workers : int
-        Cases at a time.
+    tables : callable
+        The tables by name, the main one first; where that is empty, nothing is known.
+    sections : callable
+        The sections of the page.
     limit_s : float
         Time after which a case is stopped, s.
-    repeats : callable
-        Whether a case that failed, by its directory, is run again.
+    verdicts : container of str
+        How a run ends that failed and is not run again: its failure is the answer.
+    failing : container of str, optional
+        The runs whose failure counts as one of the experiment, by name; by default all.
     """
-    space = Workspace(out.absolute())
-    with claimed(space.root, EXPERIMENT, name) as folder:
-        space.describe(EXPERIMENT, name, list(planned.cases))
-        missing = planned.missing(space.cases).items()
-        todo = {key: case for key, case in missing if repeats(space.cases / key)}
-        failures = pipeline.complete(todo, space, workers=workers, limit_s=limit_s)
-        tables, draw = make(Runs(planned, space.cases, planned.done(space.cases), failures))
-        with settings.own(), folder.renewed(but=MARKERS):
-            for key, table in tables.items():
-                folder.put(f"tables/{key}.csv", text.csv(table))
-            solvers = programs(space.cases, planned.cases)
-            document.write(title, draw(), folder, space.page.name, solvers)
-    return Finished(space.page, len(todo), failures)
+
+    name: str
+    title: str
+    planned: Plan
+    tables: Callable[[Runs], Tables]
+    sections: Callable[[Tables, Runs], Sequence[Section]]
+    limit_s: float = TIME_LIMIT_S
+    verdicts: Container[str] = ()
+    failing: Container[str] | None = None
+
+    def run(self, out: Path, *, workers: int) -> Finished:
+        """Run what is missing in a directory, write the tables and draw the page.
+
+        Raises
+        ------
+        InputError
+            If the directory cannot be used.
+        SolverError
+            If a solver is missing.
+        OrchestratorError
+            If too little ran to its end for a table.
+        """
+        space, planned = Workspace(out.absolute()), self.planned
+        with claimed(space.root, EXPERIMENT, self.name) as folder:
+            space.describe(EXPERIMENT, self.name, list(planned.cases))
+            missing = planned.missing(space.cases).items()
+            ends = {name: case.ended(space.cases / name)[0] for name, _ in missing}
+            todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
+            failures = pipeline.complete(todo, space, workers=workers, limit_s=self.limit_s)
+            runs = Runs(planned, space.cases, planned.done(space.cases), failures)
+            tables = self.tables(runs)
+            if next(iter(tables.values())).empty:
+                remedy = "`orchestrator status` names the causes; the same command continues"
+                what = "no reference ran to its end: nothing is known"
+                raise OrchestratorError(what, where=str(out), remedy=remedy)
+            with settings.own(), folder.renewed(but=MARKERS):
+                for key, table in tables.items():
+                    folder.put(f"tables/{key}.csv", text.csv(table))
+                solvers = case.programs(space.cases, planned.cases)
+                sections = self.sections(tables, runs)
+                document.write(self.title, sections, folder, space.page.name, solvers)
+        if self.failing is not None:
+            failures = {name: error for name, error in failures.items() if name in self.failing}
+        return Finished(space.page, len(todo), failures)
 
 
-def nothing_ran(out: Path, what: str) -> OrchestratorError:
-    """The error of an experiment of which no run came to its end."""
-    remedy = "`orchestrator status` names the causes; the same command continues"
-    return OrchestratorError(what, where=str(out), remedy=remedy)
+def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:
+    """The piles of a study with their beds; with `by_dem`, lattices that DEM answers.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    chosen = {
+        scene: scene.bed
+        for scene in study.scenes
+        if isinstance(scene.bed, PileBed)
+        and not (by_dem and (scene.is_poured or scene.protocol.method != "dem"))
+    }
+    if not chosen:
+        what = f"there is no pile{' that is answered by DEM and is not poured' * by_dem}"
+        raise InputError(what, where=study.name, remedy='give a group `bed.kind = "pile"`')
+    return chosen
 
 
 @cache
@@ -114,7 +138,7 @@ def texts(name: str) -> dict[str, str]:
     return dict(tomllib.loads(file.read_text(encoding="utf-8"))[name])
 
 
-def figure(name: str, title: str, caption: str, canvas: Any) -> Figure:
+def figure(name: str, title: str, canvas: Any, caption: str = "") -> Figure:
     """A figure of the page."""
     return Figure(name, title, caption, (), canvas)
 
@@ -123,13 +147,15 @@ def label(scene: Scene) -> str:
     """A pile in a few words."""
     bed, fluid, d = scene.bed, scene.fluid, scene.grain.diameter
     assert isinstance(bed, PileBed)
-    rows = {"aligned": "rows along the slope", "horizontal": "level rows"}
-    packing = rows.get(bed.packing, f"{bed.packing}, seed {bed.seed}")
-    if bed.packing == "disordered":
-        packing = f"gaps up to {bed.disorder:g} d, seed {bed.seed}"
+    packing = {
+        "aligned": "rows along the slope",
+        "horizontal": "level rows",
+        "disordered": f"gaps up to {bed.disorder:g} d, seed {bed.seed}",
+        "poured": f"poured, seed {bed.seed}",
+    }[bed.packing]
     form = "level" if bed.is_level else f"{bed.slope_deg:g}°"
     if not bed.is_triangle and not bed.is_level:
         form = f"{'profile' if bed.profile else bed.shape}, {form}"
-    strip = [f"strip of {bed.width:g} d"] if bed.width else []
+    strip = f", strip of {bed.width:g} d" if bed.width else ""
     size = f"{1e3 * d:g} mm, ρ_f {fluid.density:g} kg/m³, ν {fluid.viscosity:g} m²/s"
-    return ", ".join([form, size, scene.forces.law, packing, *strip])
+    return f"{form}, {size}, {scene.forces.law}, {packing}{strip}"

@@ -12,17 +12,30 @@ are as many as the load steps by which the fast level finds the same curve.
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from adjustText import adjust_text
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
 
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
-from orchestrator.errors import InputError
-from orchestrator.experiments import experiment
-from orchestrator.experiments.experiment import Runs, Tables
+from orchestrator.experiments.experiment import (
+    Experiment,
+    Runs,
+    Tables,
+    figure,
+    label,
+    piles,
+    texts,
+)
 from orchestrator.fidelity import calibration, limits
 from orchestrator.fidelity.decision import Decision, as_asked, on_levels
 from orchestrator.fidelity.levels import (
@@ -31,7 +44,6 @@ from orchestrator.fidelity.levels import (
     GRAINS,
     LEVELS,
     PEELING,
-    Level,
     Pair,
     changed,
     level,
@@ -41,88 +53,81 @@ from orchestrator.fidelity.levels import (
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
-from orchestrator.pipeline import Finished
-from orchestrator.report import document
-from orchestrator.report.document import Section
+from orchestrator.report import style
+from orchestrator.report.document import Section, sheet
+from orchestrator.report.style import Look
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
-from orchestrator.types import Row
+from orchestrator.types import FloatArray, Row
 
-FINE, REFERENCE_GRAINS = level("flow", "fine"), level("grains", "reference")
-SOFT = level("grains", "soft reference")
-REFERENCE = Pair(FINE, REFERENCE_GRAINS)
-AGAIN = Pair(FINE, SOFT)
-"""The same with every number of the grains' run changed: the uncertainty of the reference."""
-LEVEL_REFERENCE, LEVEL_AGAIN = Pair(FLAT, REFERENCE_GRAINS), Pair(FLAT, SOFT)
-"""The same over a level bed, over which no flow is solved."""
-FLOW_REFERENCE, FINER = Pair(FINE, PEELING), Pair(level("flow", "finest"), PEELING)
-REFERENCES = ((REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), (FLOW_REFERENCE, FINER))
-"""The reference of a scene is the first of these that it has; beside it one that is as good."""
-FAST = level("grains", "1 layer, fast")
-USED = tuple(
-    Pair(level("flow", flow), level("grains", name))
-    for flow, names in {
-        "hill": ("pivot", "peeling"),
-        "shared": ("peeling",),
-        "coarse": ("1 layer, coarse", "1 layer, fast"),
-        "standard": ("1 layer, fast", "1 layer, slow"),
-    }.items()
-    for name in names
+FINE, FAST = level("flow", "fine"), level("grains", "1 layer, fast")
+WHOLE = level("grains", "full pile, fast")
+REFERENCES = (
+    (("fine", "reference"), ("fine", "soft reference")),
+    (("flat", "reference"), ("flat", "soft reference")),
+    (("fine", "peeling"), ("finest", "peeling")),
+)
+"""The reference of a scene is the first of these pairs that it has (over a level bed no flow is
+solved); beside it stands a pair as good with all of its numbers changed: the uncertainty."""
+USED = (
+    *(("hill", "pivot"), ("hill", "peeling"), ("shared", "peeling")),
+    *(("coarse", "1 layer, coarse"), ("coarse", "1 layer, fast")),
+    *(("standard", "1 layer, fast"), ("standard", "1 layer, slow")),
 )
 """Pairs as they are used together."""
 CURVE = np.arange(0.05, 0.86, 0.05)
 """Fractions at which whole curves are compared."""
-ERRORS = ("error_10", "error_30", "error_50", "error_70", "error_curve")
-WHOLE = level("grains", "full pile, fast")
+HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {"error_curve": "whole curve"}
+"""Columns of errors and the heads of their panels."""
 STEPS = {"protocol.load_increment": 0.2, "protocol.waiting_time": 10.0, "protocol.time_step": 0.2}
 """Few load steps, on which the time of one is measured for the naive route."""
 LEVEL_PAIR = ["flow_level", "grain_level"]
+FLOOR = 1e-3
+"""Errors below it are drawn on it."""
+BANDS = {
+    "reference_error": ("error of the reference itself", "0.88"),
+    "model_floor": ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
+}
+METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
+"""How the grains were answered; colours that are told apart by all."""
+FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
-def run(study: Study, out: Path, *, workers: int) -> Finished:
-    """Measure what each level costs and how far it is off, on the piles of a study.
+def experiment(study: Study, out: Path) -> Experiment:
+    """What each level costs and how far it is off, on the piles of a study.
 
     Raises
     ------
     InputError
-        If the study has no pile that is answered by DEM or is beyond a limit of the methods, or the
-        directory cannot be used.
-    SolverError
-        If a solver is missing.
-    OrchestratorError
-        If no reference ran to its end.
+        If the study has no pile that is answered by DEM, or one is beyond a limit of the methods.
     """
     limits.check_study(study)
-    routes, pairs = naive_routes(small_pile(study)), decisions(study)
-    cases = out.absolute() / "cases"
-    planned = plan.of({**pairs, **routes}, study.name, cases=cases)
+    routes, pairs = naive_routes(study), decisions(study)
+    planned = plan.of({**pairs, **routes}, study.name, cases=out.absolute() / "cases")
 
-    def make(runs: Runs) -> tuple[Tables, Callable[[], Sequence[Section]]]:
+    def tables(runs: Runs) -> Tables:
         measured = points(pairs, runs)
         compared = errors(measured)
-        if compared.empty:
-            raise experiment.nothing_ran(out, "no reference ran to its end: no error is known")
+        front = together(compared)[["packing", *LEVEL_PAIR, "pareto"]]
         fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
-        tables = {
-            "points": with_front(compared),
+        return {
+            "points": compared.merge(front, how="left").fillna({"pareto": False}),
             "levels": known_errors(measured),
-            "naive": naive_costs(list(routes), fast, runs),
+            "naive": naive_costs(routes, fast, runs),
         }
-        return tables, lambda: _sections(tables)
 
     title, limit_s = "Speed against accuracy", study.time_limit_s
-    return experiment.run("ladder", title, planned, out, make, workers=workers, limit_s=limit_s)
+    return Experiment("ladder", title, planned, tables, _sections, limit_s)
 
 
 def decisions(study: Study) -> dict[str, Decision]:
     """Every pile of a study on its pairs of levels, by names for the plan."""
     return {
         f"{scene.id} | {pair.text}": on_levels(scene, pair, "the ladder measures these levels")
-        for scene in study.scenes
-        if isinstance(scene.bed, PileBed)
-        for pair in _pairs(scene, scene.bed)
+        for scene, bed in piles(study).items()
+        for pair in _pairs(scene, bed)
     }
 
 
@@ -130,29 +135,22 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
     line, by_dem = of_bed(bed), scene.protocol.method == "dem"
     exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
     flows, grains = (
-        [one for one in levels if one.takes(scene) and exposed <= (one.most_grains or math.inf)]
+        [level for level in levels if level.takes(scene) and exposed <= level.most_grains]
         for levels in (FLOW, GRAINS)
     )
     # neither over a level bed nor on a bed in space can the levels of the flow be measured
-    if bed.is_level or bed.width:
-        yield from (Pair(FLAT if bed.is_level else FINE, one) for one in grains if by_dem)
-        return
-    yield from (Pair(one, PEELING) for one in flows)
+    solved = not (bed.is_level or bed.width)
+    if solved:
+        yield from (Pair(flow, PEELING) for flow in flows)
     if by_dem:
-        yield from (Pair(FINE, one) for one in grains)
-        yield from (pair for pair in USED if pair.flow in flows)
+        yield from (Pair(FLAT if bed.is_level else FINE, level) for level in grains)
+    if solved and by_dem:
+        used = (Pair(level("flow", flow), level("grains", name)) for flow, name in USED)
+        yield from (pair for pair in used if pair.flow in flows)
 
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
-    """A row for each scene and pair whose runs are done: its cost and its thresholds.
-
-    Parameters
-    ----------
-    pairs : mapping of str to Decision
-        As `decisions` gives them.
-    runs : Runs
-        Of the same scenes.
-    """
+    """A row for each scene and pair whose runs are done: its cost and its thresholds."""
     rows = []
     for key, decision in pairs.items():
         pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
@@ -160,13 +158,13 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             continue
         started = time.process_time()
         motion = pile.motion(runs.cases)
-        here_s = time.process_time() - started if pair.grains.name in ("pivot", "peeling") else 0.0
+        here_s = time.process_time() - started if pair.grains.name in METHODS else 0.0
         names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
         names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
         speed, density = pile.face(runs.cases).speed, scene.fluid.density
         row: Row = {
             "scene_id": scene.id,
-            "scene": experiment.label(scene),
+            "scene": label(scene),
             **point(scene),
             "packing": packing(scene) + (", level bed" if pile.bed.is_level else ""),
             "asked": scene.protocol.method,
@@ -176,157 +174,124 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "grain_level": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
             "model_floor": calibration.floor(calibration.model_class(scene)),
-            "flow_s": sum(runs.cpu_s[run.name] for run in pile.model.cases),
-            "grains_s": here_s + sum(runs.cpu_s[run.name] for run in pile.method.cases),
+            "flow_s": runs.cpu_s(pile.model.cases),
+            "grains_s": here_s + runs.cpu_s(pile.method.cases),
         }
         taus = {name: of_pile(motion, speed, at, density).tau for name, at in names.items()}
         rows.append({**row, **taus})
     return pd.DataFrame(rows)
 
 
-def errors(found: pd.DataFrame) -> pd.DataFrame:
+def errors(points: pd.DataFrame) -> pd.DataFrame:
     """The points with their relative errors against the reference that their scene has.
 
     `reference_error` is how far the reference itself moved when all of its numbers were changed.
     """
-    parts = [_against(rows) for _, rows in found.groupby("scene_id", sort=False)]
+    parts = [points.iloc[:0]]
+    for _, scene in points.groupby("scene_id", sort=False):
+        rows = scene.set_index(LEVEL_PAIR)
+        best, again = next((both for both in REFERENCES if both[0] in rows.index), (None, None))
+        if best is None:
+            continue
+        taus, curve = (rows.filter(regex=f"^{start}_").astype(float) for start in ("tau", "curve"))
+        taus, curve = (table.div(table.xs(best)).sub(1) for table in (taus, curve))
+        error = {f"error_{round(100 * float(str(name)[4:]))}": taus[name] for name in taus}
+        compared = rows.assign(
+            **error,
+            error_curve=curve.abs().mean(axis=1),
+            cost_core_s=rows["flow_s"] + rows["grains_s"],
+            reference_error=taus.xs(again).abs().max() if again in rows.index else math.nan,
+        )
+        parts.append(compared.reset_index()[[*scene, *compared.columns.difference(scene.columns)]])
     return pd.concat(parts, ignore_index=True)
 
 
-def _against(rows: pd.DataFrame) -> pd.DataFrame:
-    index = {
-        tuple(pair): at for at, pair in zip(rows.index, rows[LEVEL_PAIR].to_numpy(), strict=True)
-    }
-    names = [tuple(tuple(one.name for one in pair) for pair in pairs) for pairs in REFERENCES]
-    best, again = next((one for one in names if one[0] in index), names[0])
-    if best not in index:
-        return rows.iloc[:0]
-    taus, curve = (rows.filter(regex=f"^{start}_").astype(float) for start in ("tau", "curve"))
-    taus, curve = (table / table.loc[index[best]] - 1 for table in (taus, curve))
-    unsure = taus.loc[index[again]].abs().max() if again in index else math.nan
-    named = {f"error_{round(100 * float(str(name)[4:]))}": taus[name] for name in taus}
-    return rows.assign(
-        **named,
-        error_curve=curve.abs().mean(axis=1),
-        cost_core_s=rows["flow_s"] + rows["grains_s"],
-        reference_error=unsure,
-    )
+def together(points: pd.DataFrame) -> pd.DataFrame:
+    """One row for each pair and packing of piles by DEM: the mean cost, the largest signed errors.
 
-
-def with_front(table: pd.DataFrame) -> pd.DataFrame:
-    """Mark the pairs that no other of their packing beats in both cost and error.
-
-    A pair counts with its mean cost and its largest error over the scenes; a fraction that was not
-    reached leaves it out.
+    `pareto` marks the pairs that no other of their packing and model beats in both, by the largest
+    error over the four fractions; a pair that did not reach one is left out.
     """
-    worst = table.filter(regex=r"^error_\d+$").abs().max(axis=1, skipna=False)
-    rows = table.assign(worst=worst)[table["same_model"] & (table["asked"] == "dem")]
-    keys = ["packing", *LEVEL_PAIR]
-    pairs = rows.groupby(keys).agg(
-        cost=("cost_core_s", "mean"), worst=("worst", lambda values: values.max(skipna=False))
-    )
-    front = set()
-    for _, both in pairs.groupby("packing"):
-        values = both.to_numpy(float)
-        for key, one in zip(both.index, values, strict=True):
-            beaten = ((values <= one).all(axis=1) & (values < one).any(axis=1)).any()
-            if np.isfinite(one).all() and not beaten:
-                front.add(key)
-    return table.assign(pareto=[tuple(key) in front for key in table[keys].to_numpy()])
-
-
-def together(measured: pd.DataFrame) -> pd.DataFrame:
-    """One row for each pair and packing: the mean cost, the largest errors with their signs."""
 
     def largest(values: pd.Series) -> float:
         return math.nan if values.isna().any() else float(max(values, key=abs))
 
-    groups = measured.groupby(["packing", *LEVEL_PAIR], sort=False)
-    return groups.agg(
-        **{name: (name, largest) for name in ERRORS},
+    rows = points[points["asked"] == "dem"].groupby(["packing", *LEVEL_PAIR], sort=False)
+    table = rows.agg(
+        **{name: (name, largest) for name in HEADS},
         piles=("scene_id", "size"),
         cost_core_s=("cost_core_s", "mean"),
         reference_error=("reference_error", "max"),
         model_floor=("model_floor", "min"),
         same_model=("same_model", "first"),
-        pareto=("pareto", "first"),
     ).reset_index()
+    each = table[[*HEADS][:-1]].to_numpy(float)
+    worst = each[np.arange(len(each)), np.nan_to_num(np.abs(each)).argmax(axis=1)]
+    whole = np.isfinite(each).all(axis=1)
+    table = table.assign(largest=np.where(whole, worst, math.nan), pareto=False)
+    for _, alike in table[table["same_model"]].groupby("packing"):
+        table.loc[alike.index, "pareto"] = _front(
+            alike[["cost_core_s", "largest"]].abs().to_numpy(float)
+        )
+    return table
 
 
-def known_errors(found: pd.DataFrame) -> pd.DataFrame:
+def _front(values: FloatArray) -> list[bool]:
+    """Which rows are finite and not beaten in all columns by another."""
+    beaten = [((values <= row).all(axis=1) & (values < row).any(axis=1)).any() for row in values]
+    return [bool(np.isfinite(row).all() and not by) for row, by in zip(values, beaten, strict=True)]
+
+
+def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Known error of each level, by class of scene and fraction; `calibration` reads it.
 
     The error is the largest over the scenes, infinite where only one of level and reference reached
     the fraction. The uncertainty is how far the reference itself moved on scenes of that class.
     """
-    on_level = found["class_flow"] == calibration.LEVEL_BED
-    beside = on_level.map({True: FLAT.name, False: FINE.name})
-    grains = found[(found["flow_level"] == beside) & (found["asked"] == "dem")]
-    flow = found[(found["grain_level"] == PEELING.name) & found["same_model"]]
-    rows = [
-        *_known("grains", grains, REFERENCE.grains, AGAIN.grains),
-        *_known("flow", flow, FINE, FINER.flow),
-    ]
+    beside = np.where(points["class_flow"] == calibration.LEVEL_BED, FLAT.name, FINE.name)
+    grains = points[(points["flow_level"] == beside) & (points["asked"] == "dem")]
+    flow = points[(points["grain_level"] == PEELING.name) & points["same_model"]]
+    rows: list[Row] = []
+    for part, name, table, best, again in (
+        ("grains", "grain_level", grains, "reference", "soft reference"),
+        ("flow", "flow_level", flow, "fine", "finest"),
+    ):
+        for scene_class, alike in table.groupby(f"class_{part}"):
+            levels = {key: rows.set_index("scene_id") for key, rows in alike.groupby(name)}
+            for key, one in levels.items() if best in levels else ():
+                for column in one.filter(regex="^tau_"):
+                    base = levels[best][column]
+                    # a finer flow is run on small piles alone, other grains on every pile
+                    unsure = 0.0 if part == "flow" else math.inf
+                    row: Row = {"part": part, "level": key, "scene_class": scene_class}
+                    row |= {"fraction": float(str(column)[4:]), "error": _shift(one[column], base)}
+                    row["uncertainty"] = (
+                        _shift(levels[again][column], base) if again in levels else unsure
+                    )
+                    row |= {"cost_core_s": float(one[f"{part}_s"].mean()), "scenes": len(one)}
+                    rows.append(row)
     return pd.DataFrame(rows).sort_values(["part", "level", "scene_class", "fraction"])
-
-
-def _known(part: str, table: pd.DataFrame, best: Level, again: Level) -> Iterator[Row]:
-    name = "flow_level" if part == "flow" else "grain_level"
-    for scene_class, alike in table.groupby(f"class_{part}", sort=True):
-        by_level = {key: rows.set_index("scene_id") for key, rows in alike.groupby(name)}
-        if best.name not in by_level:
-            continue
-        reference, other = by_level[best.name], by_level.get(again.name)
-        for key, rows in by_level.items():
-            for column in rows.filter(regex="^tau_"):
-                # a finer flow is run on small piles alone, other grains on every pile
-                unsure = 0.0 if part == "flow" else math.inf
-                yield {
-                    "part": part,
-                    "level": key,
-                    "scene_class": scene_class,
-                    "fraction": float(str(column)[4:]),
-                    "error": _shift(rows[column], reference[column]),
-                    "uncertainty": unsure
-                    if other is None
-                    else _shift(other[column], reference[column]),
-                    "cost_core_s": float(rows[f"{part}_s"].mean()),
-                    "scenes": len(rows),
-                }
 
 
 def _shift(values: pd.Series, reference: pd.Series) -> float:
     """The largest relative difference over the scenes that both have; infinite if there is none."""
     both = values.index.intersection(reference.index)
-    if both.empty:
-        return math.inf
     value, base = values[both], reference[both]
     # where neither reaches the fraction they agree; where one does, they could not differ more
     apart = (value / base - 1).abs().fillna(math.inf).where(value.notna() | base.notna(), 0.0)
-    return float(apart.max())
+    return float(apart.max()) if len(both) else math.inf
 
 
-def small_pile(study: Study) -> Scene:
-    """The lowest pile of a study, in grains, that is answered by DEM; a lattice.
+def naive_routes(study: Study) -> dict[str, Decision]:
+    """The lowest lattice of a study, in grains, by each naive route; first that of K = 1e6 N/m.
 
     Raises
     ------
     InputError
-        If it has none.
+        If it has none that is answered by DEM.
     """
-    heights = {
-        scene: scene.bed.height / scene.grain.diameter
-        for scene in study.scenes
-        if isinstance(scene.bed, PileBed) and scene.protocol.method == "dem" and not scene.is_poured
-    }
-    if not heights:
-        what = "it has no pile that is answered by DEM and is not poured"
-        raise InputError(what, where=study.name, remedy="add one: the naive route is run on it")
-    return min(heights, key=lambda scene: heights[scene])
-
-
-def naive_routes(scene: Scene) -> dict[str, Decision]:
-    """The scene by each naive route, by its name; that of the paper's K = 1e6 N/m comes first."""
+    lattices = piles(study, by_dem=True)
+    scene = min(lattices, key=lambda scene: lattices[scene].height / scene.grain.diameter)
     whole = changed(WHOLE.answer(scene), STEPS)
     stiffness = {"K = 1e6 N/m": paper_stiffness(scene), "K d/W = 1e4": 1e4}
     return {
@@ -335,46 +300,39 @@ def naive_routes(scene: Scene) -> dict[str, Decision]:
     }
 
 
-def naive_costs(routes: Sequence[str], fast: str, runs: Runs) -> pd.DataFrame:
-    """Cost of each route for the curve of a pile: route, core_s, extrapolated.
+def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
+    """Cost of each route for the curve of a pile: route, core_s (NaN if not run), extrapolated.
 
-    Parameters
-    ----------
-    routes : sequence of str
-        Names of the naive routes of the small pile.
-    fast : str
-        Name of the pile in question on the level `FAST`.
-    runs : Runs
-        The runs; what is not finished costs NaN.
+    The naive routes are of the small pile; `fast` is the pile in question on the level `FAST`.
     """
-    piles, cpu_s = runs.planned.piles, runs.cpu_s
-
-    def load_steps(pile: Pile) -> int:
-        return len(Motion.from_csv(runs.cases / pile.case.name).flow) - 1
-
-    def extrapolated(small: Pile, fast: Pile) -> float:
-        if not {small.case.name, fast.case.name} <= cpu_s.keys():
-            return math.nan
-        whole = Pile(WHOLE.answer(fast.scene), runs.cases)
-        grains = whole.packing.mobile.sum() / small.packing.mobile.sum()
-        return float(cpu_s[small.case.name] / load_steps(small) * grains * load_steps(fast))
-
-    rows = [(name, extrapolated(piles[name], piles[fast]), True) for name in routes]
-    rows.append((FAST.name, cpu_s.get(piles[fast].case.name, math.nan), False))
+    pile = runs.planned.piles[fast]
+    cost_s = runs.cpu_s(pile.method.cases)
+    rows = []
+    for route in routes:
+        small = runs.planned.piles[route]
+        naive_s = math.nan
+        if runs.are_done(route, fast):
+            whole = Pile(WHOLE.answer(pile.scene), runs.cases)
+            grains = whole.packing.mobile.sum() / small.packing.mobile.sum()
+            first, all_of_them = (
+                len(Motion.from_csv(runs.cases / run.case.name).flow) - 1 for run in (small, pile)
+            )
+            naive_s = runs.cpu_s(small.method.cases) / first * grains * all_of_them
+        rows.append((route, float(naive_s), True))
+    rows.append((FAST.name, cost_s, False))
     return pd.DataFrame(rows, columns=["route", "core_s", "extrapolated"])
 
 
-def _sections(tables: Tables) -> list[Section]:
-    """The sections of the page, from the tables ``points``, ``levels`` and ``naive``."""
-    from orchestrator.experiments import ladder_figures as figures
-
-    words = experiment.texts("ladder")
-    by_dem = together(tables["points"][tables["points"]["asked"] == "dem"])
-    means = by_dem[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *ERRORS]]
-    means = means.assign(**{name: 100 * by_dem[name] for name in ERRORS})
+def _sections(tables: Tables, runs: Runs) -> list[Section]:
+    words, pairs = texts("ladder"), together(tables["points"])
+    heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
+    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
+    means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))
+    means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(columns=heads)
+    columns = ["part", "level", "what it is"]
     meanings = pd.DataFrame(
         [(part, one.name, one.meaning) for part, levels in LEVELS.items() for one in levels],
-        columns=["part", "level", "what it is"],
+        columns=columns,
     )
     index = ["part", "scene_class", "level", "scenes", "cost_core_s"]
     known = (100 * tables["levels"].set_index([*index, "fraction"])["error"]).unstack("fraction")
@@ -382,32 +340,137 @@ def _sections(tables: Tables) -> list[Section]:
     order = {name: place for place, name in enumerate(meanings["level"])}
     known = known.reset_index().assign(order=lambda rows: rows["level"].map(order))
     known = known.sort_values(["part", "scene_class", "order"]).drop(columns="order")
-    heads = {name: f"{name.removeprefix('error_')} %" for name in ERRORS}
-    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
-    heads |= {"scene_class": "scene class"}
-    figure = experiment.figure
-    largest, fractions = figures.against_cost(by_dem), figures.by_fraction(by_dem)
+    known = known.rename(columns={"cost_core_s": "core-s", "scene_class": "scene class"})
+    largest, each = chart(pairs, {"largest": ""}), chart(pairs, HEADS)
     charts = [
-        figure("speed-against-accuracy", "Cost against error", words["largest"], largest),
-        figure("error-at-fractions", "The error at each fraction", words["fractions"], fractions),
+        figure("speed-against-accuracy", "Cost against error", largest, words["largest"]),
+        figure("error-at-fractions", "The error at each fraction", each, words["fractions"]),
     ]
+    gained, title = figure("gains", "Factors gained", gains(tables["naive"])), "The fidelity levels"
+    known_title = f"{title}, and what is known of them"
+    known_tables = [sheet(meanings), sheet(known)]
     return [
-        Section(
-            "Speed against accuracy",
-            words["accuracy"],
-            charts,
-            [document.sheet(means.rename(columns=heads).sort_values(["packing", "core-s"]))],
-        ),
+        Section("Speed against accuracy", words["accuracy"], charts, [sheet(means)]),
         Section(
             "What is gained over the naive route",
             words["naive"],
-            [figure("gains", "Factors gained", "", figures.gains(tables["naive"]))],
-            [document.sheet(tables["naive"])],
+            [gained],
+            [sheet(tables["naive"])],
         ),
-        Section(
-            "The fidelity levels, and what is known of them",
-            words["levels"],
-            tables=[document.sheet(meanings), document.sheet(known.rename(columns=heads))],
-            limits=[words["limit"]],
-        ),
+        Section(known_title, words["levels"], (), known_tables, [words["limit"]]),
     ]
+
+
+def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
+    """Errors against cost on logarithmic axes.
+
+    A row of panels for each packing, a column of them for each column of errors. A single column
+    has the number of every pair, the front and its names; several have the numbers on the front.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        A row for each pair of levels and packing, as `together` gives it.
+    columns : mapping of str to str
+        Columns of errors, and the heads of their panels.
+    """
+    single, names = len(columns) == 1, pairs["flow_level"] + ", " + pairs["grain_level"]
+    colours = pairs["grain_level"].map(METHODS).fillna(METHODS["DEM"])
+    table = pairs.assign(name=names, number=pd.factorize(names)[0] + 1, colour=colours)
+    packings = [rows for _, rows in table.groupby("packing", sort=False)]
+    height = (2.6 if single else 1.7) * len(packings) + 0.06 * table["number"].nunique() + 1.2
+    canvas = style.canvas(height)
+    grid = canvas.subplots(len(packings), len(columns), sharex=True, sharey=True, squeeze=False)
+    tags = []
+    for line, rows in zip(grid, packings, strict=True):
+        title = f"{rows['packing'].iloc[0]} packing"
+        line[0].set_ylabel("largest error of $τ_c$, %" if single else f"{title}\nerror of $τ_c$, %")
+        for ax, (column, head) in zip(line, columns.items(), strict=True):
+            ax.set_title(head or title, loc="left" if single else "center")
+            for name, (_, colour) in BANDS.items():
+                end = rows[name].max() if name == "reference_error" else rows[name].min()
+                ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=len(name) / 100)
+            tags.append((ax, _points(ax, rows, column, named=single)))
+    for ax in grid.ravel():
+        ax.set(xscale="log", yscale="log", ylim=(FLOOR / 1.5, None))
+        ax.yaxis.set_major_formatter(lambda value, _: f"{100 * value:g}")
+        for tolerance in (0.05, 0.2):
+            ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
+    grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
+    used = [style.entry(name, colour) for name, colour in METHODS.items()]
+    numbered = (table if single else table[table["pareto"]]).drop_duplicates("number")
+    style.legends(canvas, used, [*_numbers(numbered), *_marks(single=single)])
+    canvas.draw_without_rendering()  # labels are placed in a finished layout
+    for ax, texts_here in tags:
+        if texts_here:
+            arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
+            x, y = np.transpose([text.get_position() for text in texts_here])
+            adjust_text(texts_here, x, y, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100)
+        for text in texts_here:
+            text.set_in_layout(False)
+    return canvas
+
+
+def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[Any]:
+    """Draw the points of a panel, and the front; return their labels."""
+    shown = rows[(rows["cost_core_s"] > 0) & rows[column].notna()]
+    shown = shown.assign(y=shown[column].abs().clip(lower=FLOOR))
+    look: Look = {"fontsize": 6.0 if named else 5.5, "color": "0.1", "zorder": 5}
+    look["path_effects"] = [Stroke(linewidth=1.8, foreground="white"), Normal()]
+    tags: list[Any] = []
+    each: Any = shown.itertuples(index=False)
+    for row in each:
+        marker = "v" if getattr(row, column) < 0 else "^"
+        face = row.colour if row.same_model else "white"
+        point: Look = {"mfc": face, "mec": row.colour, "marker": marker, "ms": 5, "mew": 0.9}
+        ax.plot(row.cost_core_s, row.y, gid="point", zorder=3, **point)
+        if named or row.pareto:
+            text = f"{row.number}" + f": {row.name}" * (named and row.pareto)
+            tags.append(ax.text(row.cost_core_s, row.y, text, **look))
+    if named:
+        front = shown[shown["pareto"]].sort_values("cost_core_s")
+        ax.step(front["cost_core_s"], front["y"], where="post", **FRONT)
+    return tags
+
+
+def _numbers(rows: pd.DataFrame) -> list[Artist]:
+    each: Any = rows.itertuples(index=False)
+    return [
+        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
+        for row in each
+    ]
+
+
+def _marks(*, single: bool) -> list[Artist]:
+    """Samples of the markers, of the bands, and of the front of a single column."""
+    mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
+    return [
+        Line2D([], [], marker="^", mfc="0.2", label="threshold too high", **mark),
+        Line2D([], [], marker="v", mfc="0.2", label="threshold too low", **mark),
+        Line2D([], [], marker="^", mfc="white", label="hollow: another model", **mark),
+        *(Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()),
+        *([Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)] * single),
+    ]
+
+
+def gains(routes: pd.DataFrame) -> Canvas:
+    """How many times cheaper each route is than the first, the naive one; hatched if extrapolated.
+
+    `routes` is as `naive_costs` gives it; what was not measured has no bar.
+    """
+    canvas = style.canvas(0.34 * len(routes) + 0.75)
+    ax = canvas.subplots()
+    factor = routes["core_s"].iloc[0] / routes["core_s"]
+    bars = ax.barh(routes["route"], factor - 1, left=1, height=0.62, ec="#0072b2", fc="#0072b2")
+    for bar, extrapolated in zip(bars, routes["extrapolated"], strict=True):
+        if extrapolated:
+            bar.set(facecolor="white", hatch="////")
+    costs = zip(factor, routes["core_s"], strict=True)
+    ax.bar_label(bars, [f" {gain:,.0f} × ({cost:,.1f} s)" for gain, cost in costs], fontsize=7)
+    ax.set(xscale="log", xlabel="times cheaper than the naive route")
+    ax.set_xlim(0.8, factor.max() ** 1.5)  # the texts beyond the bars need a third of the width
+    ax.invert_yaxis()
+    ax.spines[["top", "right"]].set_visible(False)
+    sample = Patch(label="extrapolated, not run", fc="white", ec="#0072b2", hatch="////")
+    style.legends(canvas, [], [sample])
+    return canvas

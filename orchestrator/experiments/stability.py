@@ -9,28 +9,29 @@ place: beyond `WRONG` it is wrong, and nothing said so.
 
 import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
-from orchestrator.errors import InputError
-from orchestrator.experiments import experiment
-from orchestrator.experiments.experiment import Runs, Tables
-from orchestrator.fidelity import limits
+from orchestrator.experiments.experiment import Experiment, Runs, Tables, figure, texts
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
-from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
+from orchestrator.report import style
 from orchestrator.report.document import Section
+from orchestrator.report.style import Look
 from orchestrator.runs import case
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import TIME_LIMIT_S, make_scene
+from orchestrator.study.study import make_scene
 from orchestrator.types import Row
 
 FOLDER = Path(__file__).parent / "maps"
@@ -41,6 +42,14 @@ WRONG = 0.05
 """Relative error of tau_c from which an answer counts as wrong."""
 NOTICED = ("exploded", "noisy", "stalled")
 """How a run says that it failed."""
+VERDICTS = {
+    "good": ("#8cc5e8", "black", "G"),
+    "noisy": ("#f4ea7a", "black", "N"),
+    "wrong": ("#e0803a", "black", "W"),
+    "stalled": ("#c8c8c8", "black", "S"),
+    "exploded": ("#5b2a52", "white", "X"),
+}
+"""Colour of the cell and of its letter, and the letter, from the best to the worst verdict."""
 
 
 class Place(NamedTuple):
@@ -63,11 +72,6 @@ class Map(NamedTuple):
     places: tuple[Place, ...]
 
     @property
-    def limits(self) -> tuple[str, ...]:
-        """The limits that were read off it, in sentences."""
-        return limits.SAYS.get(self.name, ())
-
-    @property
     def fractions(self) -> list[float]:
         """The fractions at which one run is read along x; empty for other axes."""
         return [float(value) for value in self.data["x"].get("fractions", ())]
@@ -79,22 +83,11 @@ def load_all() -> list[Map]:
 
 
 def load(path: Path) -> Map:
-    """Read a map's file.
-
-    Raises
-    ------
-    InputError
-        If it is not one; naming the file and the field.
-    """
+    """Read a map's file."""
     data = tomllib.loads(path.read_text(encoding="utf-8"))
-    try:
-        _ = [data[name] for name in ("title", "question", "judge")]
-        across, down = ([*_axis(data[axis])] for axis in ("x", "y"))
-    except KeyError as missing:
-        raise InputError(f"{missing} is missing", where=str(path)) from None
     places = []
-    for y, below in down:
-        for x, beside in across:
+    for y, below in _axis(data["y"]):
+        for x, beside in _axis(data["x"]):
             changes = {**below, **beside}
             compared = {**changes, **data.get("reference", {})}
             scenes = (_scenes(data, fields, path.name) for fields in (changes, compared))
@@ -125,34 +118,26 @@ def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> 
     return next(resolved([make_scene(parts, where)]))
 
 
-def run(out: Path, *, workers: int) -> Finished:
-    """Run every map and say where each method fails.
-
-    Raises
-    ------
-    InputError
-        If the directory cannot be used.
-    SolverError
-        If a solver is missing.
-    """
+def experiment(out: Path) -> Experiment:
+    """Where each method fails: every map of the package."""
     maps = load_all()
 
-    def make(runs: Runs) -> tuple[Tables, Callable[[], list[Section]]]:
-        tables = [judge(one, runs) for one in maps]
-        return {"maps": pd.concat(tables, ignore_index=True)}, lambda: _sections(maps, tables)
+    def tables(runs: Runs) -> Tables:
+        return {"maps": pd.concat([judge(one, runs) for one in maps], ignore_index=True)}
 
-    finished = experiment.run(
-        "stability",
-        TITLE,
-        planned_for(maps),
-        out,
-        make,
-        workers=workers,
-        limit_s=TIME_LIMIT_S,
-        # a failure that is a verdict would come again
-        repeats=lambda directory: case.ended(directory)[0] not in NOTICED,
-    )
-    return Finished(finished.page, finished.started, {})
+    def sections(tables: Tables, runs: Runs) -> list[Section]:
+        table = tables["maps"]
+        sheet = figure("maps", TITLE, draw(maps, table))
+        sections = [Section("All maps", texts("stability")["maps"], (sheet,))]
+        for one in maps:
+            title, question = one.data["title"], one.data["question"]
+            drawn = figure(f"map-{one.name}", title, draw([one], table))
+            limits = one.data.get("limits", ())
+            sections.append(Section(title, question, (drawn,), limits=limits))
+        return sections
+
+    planned = planned_for(maps)
+    return Experiment("stability", TITLE, planned, tables, sections, verdicts=NOTICED, failing=())
 
 
 def planned_for(maps: Sequence[Map]) -> Plan:
@@ -210,8 +195,8 @@ def _errors(one: Map, place: Place, runs: Runs, fraction: float | None) -> Itera
     for scene, reference in zip(place.scenes, place.references, strict=True):
         if one.data["judge"] == "grain":  # against the closed form
             cells = next(cells for cells in runs.planned.cells if scene in cells.scenes)
-            found = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
-            yield float(found.value[cells.scenes.index(scene)]) ** 2 - 1
+            over = threshold.of_grains(Motion.from_csv(runs.cases / cells.name))
+            yield float(over.value[cells.scenes.index(scene)]) ** 2 - 1
         elif _failure(reference, runs):
             yield math.nan
         else:
@@ -224,14 +209,61 @@ def _errors(one: Map, place: Place, runs: Runs, fraction: float | None) -> Itera
                     yield math.inf if math.isnan(error) else error
 
 
-def _sections(maps: Sequence[Map], tables: Sequence[pd.DataFrame]) -> list[Section]:
-    """The page: the sheet of all maps, then each by itself."""
-    from orchestrator.experiments import stability_figures as figures
+def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
+    """Maps as grids of cells, two beside each other; `table` has the rows of `judge` of them all.
 
-    sheet = experiment.figure("maps", TITLE, "", figures.sheet(maps, tables))
-    sections = [Section("All maps", experiment.texts("stability")["maps"], (sheet,))]
-    for one, table in zip(maps, tables, strict=True):
-        title, question = one.data["title"], one.data["question"]
-        drawn = experiment.figure(f"map-{one.name}", title, "", figures.draw(one, table))
-        sections.append(Section(title, question, (drawn,), limits=one.limits))
-    return sections
+    A cell has the colour and the letter of its verdict, and the error. Of several runs in one place
+    the worst is shown.
+    """
+    tables = {one.name: table[table["map"] == one.name] for one in maps}
+    counts = [tables[one.name]["y"].nunique() for one in maps]
+    columns = min(len(maps), 2)
+    ratios = [max(counts[at : at + columns]) for at in range(0, len(maps), columns)]
+    cell = 0.42 if columns == 1 else 0.31
+    canvas = style.canvas(cell * sum(ratios) + 0.85 * len(ratios) + 0.55)
+    grid = canvas.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios).ravel()
+    for ax, one in zip(grid, maps, strict=False):
+        _panel(ax, one, tables[one.name], 9 if columns == 1 else 5.4)
+    for ax in grid[len(maps) :]:
+        ax.set_axis_off()
+    looks = {verdict: VERDICTS[verdict] for verdict in VERDICTS if verdict in set(table["verdict"])}
+    samples = [
+        Patch(fc=colour, ec="white", label=f"{letter}: {verdict}")
+        for verdict, (colour, _, letter) in looks.items()
+    ]
+    style.legends(canvas, samples, [])
+    return canvas
+
+
+def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
+    places = {}
+    for axis in ("x", "y"):
+        values = table[axis].drop_duplicates()  # texts as they come, numbers rising
+        if pd.to_numeric(values, errors="coerce").notna().all():
+            values = values.astype(float).sort_values()
+        places[axis] = {value: place for place, value in enumerate(values)}
+    rank = {verdict: place for place, verdict in enumerate(VERDICTS)}
+    worst_last = table.sort_values("verdict", key=lambda verdicts: verdicts.map(rank))
+    cells: Any = worst_last.drop_duplicates(["x", "y"], keep="last").itertuples(index=False)
+    for cell in cells:
+        x, y = (places[axis][getattr(cell, axis)] for axis in ("x", "y"))
+        colour, ink, letter = VERDICTS[cell.verdict]
+        ax.add_patch(Rectangle((x, y), 1, 1, fc=colour, ec="white", lw=1, gid=cell.verdict))
+        text = letter if math.isnan(cell.error) else f"{letter}\n{percent(cell.error)}"
+        look: Look = {"ha": "center", "va": "center", "fontsize": font, "color": ink}
+        ax.text(x + 0.5, y + 0.5, text, gid="cell", **look)
+    for line, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+        marks = [v if isinstance(v, str) else f"{v:g}" for v in places[name]]
+        line.set_ticks([place + 0.5 for place in range(len(marks))], marks)
+        line.set_label_text(one.data[name]["label"])
+    ax.set(xlim=(0, len(places["x"])), ylim=(0, len(places["y"])))
+    ax.set_title(one.data["title"], loc="left")
+    ax.tick_params(length=0)
+
+
+def percent(error: float) -> str:
+    """A signed error, to two digits at most."""
+    size = 100 * abs(error)
+    digits = 0 if size >= 9.95 else 1
+    text = f"{error:+.0f}×" if size >= 1000 else f"{100 * error:+.{digits}f} %"
+    return text.replace("-", "−")

@@ -25,7 +25,6 @@ from orchestrator.fidelity.levels import (
     changed,
     level,
     pair_of,
-    solved_model,
 )
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
@@ -80,17 +79,8 @@ class Decision:
         return self.levels is not None and not self.is_as_asked and method != "dem"
 
 
-@dataclass(frozen=True)
-class Bound:
-    """Levels that are not good enough for a scene: higher ones are chosen.
-
-    Attributes
-    ----------
-    flow, grains : Level or None
-        The highest of each that is not good enough.
-    because : str
-        The reason, for people.
-    """
+class Bound(NamedTuple):
+    """The highest levels that are not good enough for a scene, and why: higher ones are chosen."""
 
     flow: Level | None = None
     grains: Level | None = None
@@ -128,26 +118,26 @@ def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> De
     """
     if not tolerance:
         return as_asked(scene)
-    # the levels approximate DEM in a held, solved flow; over a level bed no flow is solved
-    rules, model = scene.protocol, scene.flow.model
+    # the levels approximate DEM in a held, solved flow
+    rules, model, bed = scene.protocol, scene.flow.model, scene.bed
     if rules.method != "dem":
         return as_asked(scene, f"the study asks for the method {rules.method}")
-    if model not in ("solve", solved_model(scene)):
+    if model not in ("solve", _best_model(scene)):
         return as_asked(scene, f"the study asks for the flow model {model}")
     if rules.update:
         why = "the study asks for a bed that changes, for which no error is known"
         return as_asked(scene, why)
     if rules.waiting_time < LEAST_HELD:
         return as_asked(scene, "the study asks for a ramp of the flow")
-    if not isinstance(scene.bed, PileBed):
-        if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
+    if not isinstance(bed, PileBed):
+        if bed.slope_deg > bed.entrainment_angle_deg:
             return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
         exact = changed(scene, {"protocol.method": "pivot"})
         why = "the closed form is exact for a single grain in a held flow"
         return Decision(scene, exact, None, UNKNOWN, why)
     if name := calibration.unmeasured(scene):
         return as_asked(scene, f"no error is known for {name}: as the study asks")
-    offered = (tuple(one for one in levels if one.takes(scene)) for levels in (FLOW, GRAINS))
+    offered = (tuple(level for level in part if level.takes(scene)) for part in (FLOW, GRAINS))
     pair, why = _cheapest(*offered, *calibration.scene_classes(scene), above, tolerance)
     why = f"{why}; {above.because}" if above.because else why
     return on_levels(scene, pair, why) if pair else as_asked(scene, why)
@@ -162,18 +152,14 @@ def by_default(scene: Scene, above: Bound = NO_BOUND) -> Decision:
     alike. Single grains, poured beds, classes without a measured spread, and all that sets a field
     about the answer are answered as asked.
     """
-    is_set = any(
-        field in getattr(scene, part).model_fields_set
-        for quantity in fields.FIELDS
-        if quantity.info.about == "answer"
-        for part, _, field in (quantity.name.partition("."),)
-    )
+    names = (q.name.partition(".") for q in fields.FIELDS if q.info.about == "answer")
+    is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in names)
     if is_set or scene.is_poured or not isinstance(scene.bed, PileBed):
         return as_asked(scene)
     if math.isnan(calibration.floor(calibration.model_class(scene))):
         return as_asked(scene)
     floor = calibration.lowest_floor()
-    chosen = decide(scene, floor, replace(above, flow=above.flow or THEORY))
+    chosen = decide(scene, floor, above._replace(flow=above.flow or THEORY))
     if chosen.is_as_asked or not chosen.levels:
         return chosen
     which = "cheapest" if chosen.known.total <= floor else NONE_WITHIN
@@ -197,6 +183,11 @@ def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
     return Decision(scene, pair.answer(scene), pair, calibration.known(pair, scene), why)
 
 
+def _best_model(scene: Scene) -> str:
+    """The flow model of the best levels: over a level bed no flow is solved."""
+    return "flat" if isinstance(scene.bed, PileBed) and scene.bed.is_level else "solve"
+
+
 @cache  # a study has thousands of scenes of a few classes
 def _cheapest(
     flow: tuple[Level, ...],
@@ -210,7 +201,7 @@ def _cheapest(
     offered = []
     for levels, bound in ((flow, above.flow), (grains, above.grains)):
         start = levels.index(bound) + 1 if bound in levels else 0
-        offered.append([one for one in levels[start:] if one.same_model])
+        offered.append([level for level in levels[start:] if level.same_model])
     if flow_classes == (calibration.LEVEL_BED,):
         offered[0] = [FLAT]
     known = {
@@ -218,10 +209,10 @@ def _cheapest(
         for pair in itertools.product(*offered)
     }
     pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
-    within = next((pair for pair in pairs if known[pair].total <= tolerance), None)
-    if within:
-        return within, "cheapest within the tolerance"
-    best = min((known[pair].total for pair in pairs), default=math.inf)
+    for pair in pairs:
+        if known[pair].total <= tolerance:
+            return pair, "cheapest within the tolerance"
+    best = min((error.total for error in known.values()), default=math.inf)
     if math.isinf(best):
         return None, "no error is known: as the study asks"
     # errors below the uncertainty of the reference cannot be ranked
@@ -229,35 +220,25 @@ def _cheapest(
     return enough, f"{NONE_WITHIN} within the tolerance"
 
 
-def check_group(scene: Scene) -> str:
+def _check_group(scene: Scene) -> tuple[float, str, str]:
     """The key that the piles of one check share."""
     assert isinstance(scene.bed, PileBed)
-    return f"{scene.bed.slope_deg:g} deg, {scene.bed.packing}, {scene.forces.law}"
+    return scene.bed.slope_deg, scene.bed.packing, scene.forces.law
 
 
 def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decision]:
     """The decisions on the piles by DEM that check answers without it.
 
-    Parameters
-    ----------
-    answers : mapping of str to Decision
-        By the id of the scene asked for.
-    tolerance : float
-        Relative error of tau_c.
-
-    Returns
-    -------
-    dict of str to Decision
-        By the same ids, of those whose answer is checked.
+    Both are by the id of the scene asked for; the tolerance is the relative error of tau_c.
     """
-    groups: dict[str, list[tuple[float, str, Decision]]] = {}
+    groups: dict[object, list[tuple[float, str, Decision]]] = {}
     for asked, answer in answers.items():
         if answer.is_unchecked:
             scene = answer.scene
-            dem = changed(scene, {"protocol.method": "dem", "flow.model": solved_model(scene)})
+            dem = changed(scene, {"protocol.method": "dem", "flow.model": _best_model(scene)})
             check = decide(dem, tolerance, CHECK)
             member = (Pile(check.scene).case.cost_s, asked, check)
-            groups.setdefault(check_group(scene), []).append(member)
+            groups.setdefault(_check_group(scene), []).append(member)
     cheapest = (min(members, key=lambda member: member[:2]) for members in groups.values())
     return {asked: check for _, asked, check in cheapest}
 
@@ -276,8 +257,7 @@ def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator
     They agree where the answer without DEM lies in the interval of DEM, widened by the tolerance,
     or where neither reaches the fraction.
     """
-    fractions = cheap.scene.protocol.fractions
-    answers = (pile.thresholds(cases, fractions) for pile in (cheap, check))
+    answers = (pile.thresholds(cases, cheap.scene.protocol.fractions) for pile in (cheap, check))
     for answer, dem in zip(*answers, strict=True):
         within = dem.tau_low * (1 - tolerance) <= answer.tau <= dem.tau_high * (1 + tolerance)
         neither = math.isnan(answer.tau) and math.isnan(dem.tau)
@@ -288,11 +268,8 @@ def ready(
     piles: Mapping[str, Pile], checking: Mapping[str, Pile], done: Container[str]
 ) -> dict[str, Pile]:
     """The checks whose runs are done, and those of the answers that they check."""
-    return {
-        asked: check
-        for asked, check in checking.items()
-        if check.is_run(done) and piles[asked].is_run(done)
-    }
+    both = {asked: (piles[asked], check) for asked, check in checking.items()}
+    return {key: pair[1] for key, pair in both.items() if all(pile.is_run(done) for pile in pair)}
 
 
 def overruled(
@@ -305,12 +282,12 @@ def overruled(
 ) -> dict[str, Bound]:
     """For each pile of a group whose check disagrees, the levels that are not good enough."""
     lost = {
-        check_group(piles[asked].scene)
+        _check_group(check.scene)
         for asked, check in ready(piles, checking, done).items()
         if not all(row.agree for row in compare(piles[asked], check, tolerance, cases))
     }
     return {
         asked: Bound(*answer.levels, f"DEM overruled {answer.levels.text}")
         for asked, answer in answers.items()
-        if answer.levels and answer.is_unchecked and check_group(answer.scene) in lost
+        if answer.levels and answer.is_unchecked and _check_group(answer.scene) in lost
     }

@@ -6,8 +6,9 @@ one for the flow and one for the grains. ``levels.toml`` lists them.
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,8 +22,6 @@ from orchestrator.study.study import make_scene
 
 Fields = Mapping[str, Any]
 """Values of a scene's fields, named as in a study file."""
-FULL = 1000
-"""More layers than any pile has."""
 STRIP_WIDTH = 5.0
 """Width of the bed of the level `strip`, d; more where the largest grains need it."""
 FINER = {
@@ -45,29 +44,27 @@ class Level:
     ----------
     name, meaning : str
         What tables call it, and what it is.
-    sets : mapping
-        The fields that it sets.
-    on_poured : mapping
-        Those that it sets to something else on a poured bed.
+    sets, on_poured : mapping
+        The fields that it sets, and those that it sets to something else on a poured bed.
     derived : str
         The field that follows from the scene: "octave", "threshold_speed", "paper_stiffness",
         "strip_width", or empty.
     same_model : bool
         Whether it has the model choices of the reference; others are measured and never chosen.
-    most_grains : int or None
+    most_grains : float
         The ladder measures an expensive level on piles of at most this many exposed grains.
-    not_on : tuple of str
+    not_on : sequence of str
         Packings that it cannot answer.
     """
 
     name: str
-    meaning: str = ""
+    meaning: str
     sets: Fields = field(default_factory=dict)
     on_poured: Fields = field(default_factory=dict)
     derived: str = ""
     same_model: bool = True
-    most_grains: int | None = None
-    not_on: tuple[str, ...] = ()
+    most_grains: float = math.inf
+    not_on: Sequence[str] = ()
 
     def takes(self, scene: Scene) -> bool:
         """Whether the level can answer a pile.
@@ -87,43 +84,35 @@ class Level:
         """The scene as this level answers it."""
         return changed(scene, self.fields(scene))
 
-    def describes(self, scene: Scene) -> bool:
-        """Whether the scene is on this level as it is."""
-        fields = self.fields(scene).items()
-        return self.takes(scene) and all(value_of(scene, name) == value for name, value in fields)
-
-    def bounds(self, scene: Scene) -> bool:
+    def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
         """Whether the scene is on this level, or has numbers that are finer and all else alike."""
         return self.takes(scene) and all(
             FINER[name] * (value_of(scene, name) - value) >= 0
-            if name in FINER
+            if or_finer and name in FINER
             else value_of(scene, name) == value
             for name, value in self.fields(scene).items()
         )
 
     def fields(self, scene: Scene) -> Fields:
         """The fields that it sets in a scene."""
-        fields = {**self.sets, **(self.on_poured if scene.is_poured else {})}
+        fields, bed = {**self.sets, **(self.on_poured if scene.is_poured else {})}, scene.bed
+        assert isinstance(bed, PileBed)
         if fields.get("flow.model") == "solve":
             fields["flow.roughness"] = None
-        return {**fields, **(_derived(self.derived, scene) if self.derived else {})}
-
-
-def _derived(name: str, scene: Scene) -> Fields:
-    """The fields of a level that follow from the scene."""
-    bed = scene.bed
-    assert isinstance(bed, PileBed)
-    if name == "octave":
-        octave = round(math.log2(bed.roughness / bed.height))
-        return {"flow.roughness": float(f"{bed.height * 2.0**octave:.6g}")}
-    if name == "threshold_speed":
-        ustar = float(closed_form(scene).friction_velocity)
-        speed = float(f"{ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness):.6g}")
-        return {"flow.speed": speed, "flow.first_cell_height": scene.first_cell_height}
-    if name == "paper_stiffness":
-        return {"grain.stiffness": paper_stiffness(scene)}
-    least = math.ceil(LEAST_WIDTH * extremes(scene.grain.sizes, scene.grain.diameter)[1])
-    return {"bed.width": max(STRIP_WIDTH, float(least)) if scene.is_poured else 0.0}
+        if self.derived == "octave":
+            octave = round(math.log2(bed.roughness / bed.height))
+            fields["flow.roughness"] = float(f"{bed.height * 2.0**octave:.6g}")
+        elif self.derived == "threshold_speed":
+            ustar = float(closed_form(scene).friction_velocity)
+            speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
+            fields["flow.speed"] = float(f"{speed:.6g}")
+            fields["flow.first_cell_height"] = scene.first_cell_height
+        elif self.derived == "paper_stiffness":
+            fields["grain.stiffness"] = paper_stiffness(scene)
+        elif self.derived == "strip_width":
+            least = math.ceil(LEAST_WIDTH * extremes(scene.grain.sizes, scene.grain.diameter)[1])
+            fields["bed.width"] = max(STRIP_WIDTH, float(least)) if scene.is_poured else 0.0
+        return fields
 
 
 class Pair(NamedTuple):
@@ -135,7 +124,7 @@ class Pair(NamedTuple):
     @property
     def text(self) -> str:
         """The names of both in one text."""
-        return " | ".join(level.name for level in self)
+        return f"{self.flow.name} | {self.grains.name}"
 
     def answer(self, scene: Scene) -> Scene:
         """The scene as both levels answer it."""
@@ -144,8 +133,7 @@ class Pair(NamedTuple):
 
 def value_of(scene: Scene, name: str) -> Any:
     """The value of a field, named as in a study file."""
-    part, _, field = name.partition(".")
-    return getattr(getattr(scene, part), field)
+    return attrgetter(name)(scene)
 
 
 def changed(scene: Scene, fields: Fields) -> Scene:
@@ -163,11 +151,6 @@ def changed(scene: Scene, fields: Fields) -> Scene:
     return make_scene(parts, "fields that are changed")
 
 
-def solved_model(scene: Scene) -> str:
-    """The flow model that the levels approximate: over a level bed no flow is solved."""
-    return "flat" if isinstance(scene.bed, PileBed) and scene.bed.is_level else "solve"
-
-
 def paper_stiffness(scene: Scene) -> float:
     """K d/W of the paper's K = 1e6 N/m."""
     return 1e6 * scene.grain.diameter / scene.weight
@@ -179,34 +162,25 @@ def packing(scene: Scene) -> str:
     return "strip" if scene.bed.width else scene.bed.packing
 
 
-def _levels(part: str) -> tuple[Level, ...]:
+def _load(part: str) -> tuple[Level, ...]:
     data = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-    rules: dict[str, Fields] = data["rules"]
 
-    def dem(layers: int, rules_name: str) -> Fields:
-        return {"protocol.method": "dem", "bed.mobile_layers": layers, **rules[rules_name]}
+    def dem(layers: int, rules: str) -> Fields:
+        return {"protocol.method": "dem", "bed.mobile_layers": layers, **data["rules"][rules]}
 
-    def made(row: dict[str, Any]) -> Level:
-        options = {
-            name: row[name] for name in ("derived", "same_model", "most_grains") if name in row
-        }
-        sets, meaning, poured = row.get("set", {}), row.get("meaning", ""), row.get("poured")
+    levels = []
+    for row in data[part]:
         if "rules" in row:
-            sets = dem(row["layers"], row["rules"])
-            count, steps = row["layers"], 100 * sets["protocol.load_increment"]
-            which = "every grain" if count == FULL else f"{count} mobile layer{'s' * (count > 1)}"
-            which += " mobile" * (count == FULL)
-            meaning = meaning or f"DEM, {which}, load steps {steps:g} % apart"
-        on_poured = dem(poured["layers"], poured["rules"]) if poured else {}
-        not_on = tuple(row.get("not_on", ()))
-        return Level(row["name"], meaning, sets, on_poured, not_on=not_on, **options)
-
-    return tuple(made(row) for row in data[part])
+            row["sets"] = dem(row.pop("layers"), row.pop("rules"))
+        if "on_poured" in row:
+            row["on_poured"] = dem(**row["on_poured"])
+        levels.append(Level(**row))
+    return tuple(levels)
 
 
 AS_ASKED = Level("as asked", "numbers of the study file")
 """Stands for a level where a scene is on none."""
-FLOW, GRAINS = _levels("flow"), _levels("grains")
+FLOW, GRAINS = _load("flow"), _load("grains")
 LEVELS = {"flow": FLOW, "grains": GRAINS}
 """All levels, by the part of a pile that they answer, from cheap to dear."""
 FLAT, PEELING = FLOW[0], GRAINS[1]
@@ -219,8 +193,8 @@ def level(part: str, name: str) -> Level:
 
 def pair_of(scene: Scene) -> Pair:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
-    held = ([one for one in levels if one.describes(scene)] for levels in LEVELS.values())
-    return Pair(*(levels[-1] if levels else AS_ASKED for levels in held))
+    on = ([level for level in levels if level.describes(scene)] for levels in LEVELS.values())
+    return Pair(*(levels[-1] if levels else AS_ASKED for levels in on))
 
 
 def meaning(names: Iterable[str]) -> str:

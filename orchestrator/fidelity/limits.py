@@ -1,7 +1,7 @@
 """Where the methods hold: what a study refuses, and what it is warned of.
 
-Each limit was read off a map of `orchestrator stability`, which runs scenes beyond it; the tables
-of the maps lie in ``calibration/maps.csv``.
+Each limit was read off a map of `orchestrator stability`, whose file says it in words; what the
+maps found lies in ``calibration/maps.csv``.
 """
 
 import warnings
@@ -34,53 +34,13 @@ WAITING_TIME = 3.0
 COARSE_STEP = 0.05
 CLOSE_PACKED_DEG = 59.0
 """Entrainment angle from which the grains of a row hold each other."""
-SAYS = {
-    "slope": (
-        "Forms and obstacles do not overlap; no counted place is beyond the limiting slope; a "
-        "poured bed is nowhere beyond its friction angle and 35 deg.",
-        "Beyond min(phi, 90 deg - beta) a bed rolls back without any flow: refused.",
-        "Piles of 10 to 35 deg: others are refused.",
-        "Beyond the entrainment angle a single grain may come to rest half-way: a warning.",
-        "The linear theories are of beds that rise by 35 deg at most.",
-        "The theory of a hill is of beds that fall to half of their height before and behind.",
-        "The flow over a flat bed is not solved.",
-    ),
-    "first-cell": (
-        "z_e, half the first cell, is at least z0/2: refused below; from z0 on it is sound.",
-    ),
-    "similarity": (
-        "In the first cell the eddy viscosity is above the molecular one: refused below.",
-    ),
-    "timestep-damping": (
-        "The largest safe time step falls with the damping: "
-        + ", ".join(f"{step:g} up to {damping:g}" for damping, step in TIMESTEPS)
-        + " sqrt(m/K); refused above.",
-        f"Without damping a bed never rests: refused below {LEAST_DAMPING:g}.",
-    ),
-    "entrainment-layers": (f"Piles have rows that touch: refused below {CLOSE_PACKED_DEG:g} deg.",),
-    "quiet-step": (
-        f"A pile's load step waits for at least {WAITING_TIME:g} sqrt(d/g'): a warning below.",
-        "A pile's load steps are at most 5 % apart: a warning above.",
-    ),
-    "forced": ("Every exposed grain carries a force: a warning otherwise.",),
-    "mesh-scheme-15": ("linearUpwind alone converges to the answer: a warning otherwise.",),
-}
-"""The limits in sentences, by the map that they were read off."""
 
 
 class Fault(NamedTuple):
     """A limit that a scene is beyond.
 
-    Attributes
-    ----------
-    map : str
-        The map that shows the limit.
-    field : str
-        The field of a study file to change.
-    what, remedy : str
-        What is wrong, and what would do.
-    refused : bool
-        Whether a study is refused; else it is warned.
+    The map that shows it, the field of a study file to change, what is wrong, what would do, and
+    whether a study is refused; else it is warned.
     """
 
     map: str
@@ -124,11 +84,8 @@ def faults(scene: Scene) -> Iterator[Fault]:
     """The limits that a scene is beyond."""
     bed = scene.bed
     if isinstance(bed, PileBed):
-        yield from _bed_line(scene, bed)
         yield from _pile(scene, bed)
-        yield from _theory(scene, bed)
-        if scene.flow.model == "solve":
-            yield from _solve(scene, bed)
+        yield from _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
     else:
         yield from _slope(scene)
         if bed.slope_deg > (angle := bed.entrainment_angle_deg):
@@ -151,65 +108,37 @@ def largest_timestep(damping: float) -> float:
 def _slope(scene: Scene) -> Iterator[Fault]:
     slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
     if slope > limit + 1e-9:
-        yield Fault(
-            "slope",
-            "bed.slope_deg",
-            f"{slope:g} deg is beyond min(friction angle, 90 deg - entrainment angle) ="
-            f" {limit:g} deg",
-            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle",
+        angles = "min(friction angle, 90 deg - entrainment angle)"
+        what = f"{slope:g} deg is beyond {angles} = {limit:g} deg"
+        remedy = (
+            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle"
         )
-
-
-def _bed_line(scene: Scene, bed: PileBed) -> Iterator[Fault]:
-    """A bed line without a packing, or slopes down which grains roll or slide without a flow."""
-    remedy = "smooth a profile, give forms room, or count another part of the bed"
-    try:
-        line = of_bed(bed)
-        length = line.x[-2] - line.x[1]
-        if bed.packing == "poured" and bed.obstacles:
-            yield Fault("slope", "bed", "no grains can be poured around obstacles", remedy)
-        elif length > MOST_GRAINS * scene.grain.diameter:
-            count = length / scene.grain.diameter
-            what = f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
-            yield Fault("slope", "bed", what, remedy)
-        elif not bed.is_wedge and bed.packing != "poured":
-            _ = Geometry(scene).packing
-    except UnfitError as error:
-        yield Fault("slope", "bed", str(error), remedy)
-    else:
-        if what := _too_steep(scene, bed, line):
-            yield Fault("slope", "bed", what, remedy)
-
-
-def _too_steep(scene: Scene, bed: PileBed, line: BedLine) -> str:
-    """The steepest place of a bed that is too steep; a poured one slumps also where none count."""
-    poured, limit, slopes = bed.packing == "poured", scene.limiting_slope_deg, abs(line.slopes_deg)
-    why = "beyond min(friction angle, 90 deg - entrainment angle)"
-    if poured:
-        limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
-        why = "beyond what poured grains hold, min(friction angle, 35 deg)"
-    elif bed.is_wedge:
-        return ""
-    else:
-        slopes = np.where(line.counted(bed.counts), slopes, 0.0)
-    for start, end in line.bare:
-        slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
-    at = int(np.argmax(slopes))
-    if slopes[at] <= limit + 1e-6:
-        return ""
-    where = f"{slopes[at]:.3g} deg at x = {line.x[at]:.4g} ... {line.x[at + 1]:.4g} m"
-    return f"{where} is {why} = {limit:g} deg"
+        yield Fault("slope", "bed.slope_deg", what, remedy)
 
 
 def _pile(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+    remedy = "smooth a profile, give forms room, or count another part of the bed"
+    try:
+        line = of_bed(bed)
+        length, what = line.x[-2] - line.x[1], ""
+        if bed.packing == "poured" and bed.obstacles:
+            what = "no grains can be poured around obstacles"
+        elif length > MOST_GRAINS * scene.grain.diameter:
+            count = length / scene.grain.diameter
+            what = f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
+        elif not bed.is_wedge and bed.packing != "poured":
+            _ = Geometry(scene).packing
+        what = what or _too_steep(scene, bed, line)
+    except UnfitError as error:
+        what = str(error)
+    if what:
+        yield Fault("slope", "bed", what, remedy)
     low, high = PILE_SLOPES_DEG
     if bed.is_wedge:
         yield from _slope(scene)
         if not low <= bed.slope_deg <= high:
-            remedy = (
-                f"choose {low:g} ... {high:g} deg, and no more than"
-                " min(friction angle, 90 deg - entrainment angle)"
-            )
+            limit = "min(friction angle, 90 deg - entrainment angle)"
+            remedy = f"choose {low:g} ... {high:g} deg, and no more than {limit}"
             yield Fault("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
     if bed.entrainment_angle_deg < CLOSE_PACKED_DEG:
         what = (
@@ -223,8 +152,27 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Fault]:
         yield Fault("forced", "forces.loaded_grains", what, "exposed", refused=False)
 
 
+def _too_steep(scene: Scene, bed: PileBed, line: BedLine) -> str:
+    """The steepest place of a bed that is too steep; a poured one slumps also where none count."""
+    if bed.packing == "poured":
+        limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
+        why, slopes = "what poured grains hold, min(friction angle, 35 deg)", abs(line.slopes_deg)
+    elif bed.is_wedge:
+        return ""
+    else:
+        limit, why = scene.limiting_slope_deg, "min(friction angle, 90 deg - entrainment angle)"
+        slopes = np.where(line.counted(bed.counts), abs(line.slopes_deg), 0.0)
+    for start, end in line.bare:
+        slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
+    at = int(np.argmax(slopes))
+    if slopes[at] <= limit + 1e-6:
+        return ""
+    where = f"{slopes[at]:.3g} deg at x = {line.x[at]:.4g} ... {line.x[at + 1]:.4g} m"
+    return f"{where} is beyond {why} = {limit:g} deg"
+
+
 def _theory(scene: Scene, bed: PileBed) -> Iterator[Fault]:
-    if scene.flow.model not in ("hill", "waves"):
+    if scene.flow.model == "flat":
         return
     line = of_bed(bed)
     seen = seen_by_the_flow(line)
@@ -244,12 +192,9 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Fault]:
         what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
         yield Fault("slope", "flow.model", what, 'choose "flat"')
     if z0 > cell:
-        what = (
-            f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m, the height of the first cell's "
-            "centre"
-        )
+        half = f"twice z_e = {cell / 2:g} m, the height of the first cell's centre"
         remedy = "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound"
-        yield Fault("first-cell", "bed.roughness", what, remedy)
+        yield Fault("first-cell", "bed.roughness", f"z0 = {z0:g} m is above {half}", remedy)
     ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
@@ -261,8 +206,8 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Fault]:
         yield Fault("similarity", "flow.viscosity", what, remedy)
     if (scheme := scene.flow.convection_scheme) != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
-        field = "flow.convection_scheme"
-        yield Fault("mesh-scheme-15", field, what, "linearUpwind", refused=False)
+        remedy = "linearUpwind"
+        yield Fault("mesh-scheme-15", "flow.convection_scheme", what, remedy, refused=False)
 
 
 def _dem(scene: Scene) -> Iterator[Fault]:

@@ -44,7 +44,7 @@ def scene() -> Scene:
 
 def _others(choice: str, scene: Scene) -> dict[str, Scene]:
     (one,) = (one for one in CHOICES if one.name == choice)
-    return {name.partition(": ")[2]: other for name, other in one.scenes(scene)}
+    return dict(one.scenes(scene))
 
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice.name)
@@ -111,8 +111,8 @@ def test_the_share_of_a_choice_is_the_range_of_its_alternatives() -> None:
 
 def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     asked = study.parse(SMALL, name="small", where="small")
-    finished = budget.run(asked, tmp_path / "out", workers=2)
-    assert not finished.failures
+    experiment = budget.experiment(asked, tmp_path / "out")
+    assert not experiment.run(tmp_path / "out", workers=2).failures
     shared = pd.read_csv(tmp_path / "out" / "tables" / "shares.csv")
     names = {one.name for one in CHOICES} - {OF_LATTICES}
     assert set(shared["choice"]) == names
@@ -125,7 +125,7 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     assert largest["averaging length"] < 0.05
     page = (tmp_path / "out" / "report.html").read_text()
     assert all(name in page for name in names)
-    assert budget.run(asked, tmp_path / "out", workers=2).started == 0
+    assert experiment.run(tmp_path / "out", workers=2).started == 0
 
 
 def test_a_flow_that_is_not_solved_has_no_choices_of_its_own() -> None:
@@ -142,4 +142,4 @@ def test_a_flow_that_is_not_solved_has_no_choices_of_its_own() -> None:
 def test_a_study_without_piles(tmp_path: Path) -> None:
     asked = study.parse("grain = { diameter = 1e-3 }", name="one", where="one")
     with pytest.raises(InputError, match="there is no pile"):
-        budget.run(asked, tmp_path / "out", workers=1)
+        budget.experiment(asked, tmp_path / "out")

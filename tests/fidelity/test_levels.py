@@ -50,7 +50,7 @@ def test_numbers_beside_the_levels_are_bounded_by_coarser_ones(
     fields: dict[str, object], finer: str, coarser: str, pile: MakePile
 ) -> None:
     scene = pile(fields)
-    bounds = {one.name for one in (*FLOW, *GRAINS) if one.bounds(scene)}
+    bounds = {one.name for one in (*FLOW, *GRAINS) if one.describes(scene, or_finer=True)}
     assert finer in bounds
     assert coarser not in bounds
     assert AS_ASKED in pair_of(scene)

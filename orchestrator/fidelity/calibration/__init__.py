@@ -27,9 +27,8 @@ VISCOUS, ROUGH = 3.0, 30.0
 LIFT_OFF = 0.95
 """Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
 piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
-LEVEL_BED = "level bed"
-"""The class for the flow of beds over which u* is u*_0 everywhere."""
-LIMITING = ", limiting slope"
+LEVEL_BED, LIMITING = "level bed", ", limiting slope"
+"""The class for the flow of beds over which u* is u*_0 everywhere; the end of a class's name."""
 BETWEEN_DEG = 5.0
 """Degrees below the limiting slope from which slopes were measured as below it."""
 DEFAULTS = {
@@ -45,19 +44,17 @@ DEFAULTS = {
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")
 SAME_CELL = 0.02
 """Relative difference from the default height of the first cell that changes no known error."""
+FROZEN = "frozen bed"
+"""The choice that the flow of the whole pile acts until the last grain has gone."""
+STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
+"""Choices whose values a study file states."""
 
 
 class Known(NamedTuple):
-    """Known error of a level, or of a pair of levels, on a scene.
+    """Known relative error of tau_c against the reference, of a level or of a pair of levels.
 
-    Attributes
-    ----------
-    error : float
-        Relative error of tau_c against the reference.
-    uncertainty : float
-        How far the reference itself moved when its numbers were changed.
-    cost_core_s : float
-        Mean core-seconds of a scene.
+    The uncertainty is how far the reference itself moved when its numbers were changed, the cost
+    the mean time of a scene on one core, s.
     """
 
     error: float
@@ -84,12 +81,6 @@ class Spread(NamedTuple):
     dominant: str
 
 
-FROZEN = "frozen bed"
-"""The choice that the flow of the whole pile acts until the last grain has gone."""
-STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
-"""Choices whose values a study file states."""
-
-
 def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     """The class under which the known error of a level is measured on a scene.
 
@@ -97,16 +88,14 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     the grains names their packing. Both name the form, and the limiting slope, on which a row
     waits for a touch; or that there are obstacles, unless these are left out.
     """
-    bed = scene.bed
+    bed, name = scene.bed, packing(scene)
     assert isinstance(bed, PileBed)
-    if part == "flow" and bed.is_level:
-        return LEVEL_BED
-    name = packing(scene)
     if part == "flow":
+        if bed.is_level:
+            return LEVEL_BED
         name = scene.forces.stress + ("" if scene.flow.top == "boundary layer" else ", channel")
     elif name == "disordered":
-        end = next(end for end in DISORDERS if bed.disorder <= end)
-        name = f"disordered up to {end:g} d"
+        name = f"disordered up to {next(end for end in DISORDERS if bed.disorder <= end):g} d"
     if bed.is_triangle:
         return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
     if bed.obstacles and obstacles:
@@ -144,19 +133,17 @@ def unmeasured(scene: Scene) -> str:
     """
     if float(closed_form(scene).lift) >= LIFT_OFF * scene.weight:
         return "lift that carries grains off before they roll"
-    solved = scene.flow.model == "solve"
+    solved, roughness = scene.flow.model == "solve", scene.flow.roughness
     for name, default in DEFAULTS.items():
         value = value_of(scene, name)
-        if name.startswith("flow.") and not solved:
-            continue
-        if value < default if name in AT_LEAST else value != default:
+        other = value < default if name in AT_LEAST else value != default
+        if other and (solved or not name.startswith("flow.")):
             return f"{name} = {value:.4g}" if isinstance(value, float) else f"{name} = {value}"
     if solved:
         assert isinstance(scene.bed, PileBed)
         default = default_first_cell_height(scene.bed.relief, scene.solve_roughness)
         if abs(scene.first_cell_height / default - 1) > SAME_CELL:
             return f"first cells of {scene.first_cell_height:.3g} m in place of {default:.3g} m"
-    roughness = scene.flow.roughness
     if roughness and abs(math.log2(roughness / scene.bed.roughness)) > 0.5 + 1e-6:
         return f"flow.roughness = {roughness:.3g} m"
     return ""
@@ -167,20 +154,18 @@ def known(pair: Pair, scene: Scene) -> Known:
 
     Errors and uncertainties of the two parts have a cause each and add up by their squares;
     docs/ladder.md says how often the sum holds. Numbers of a study file that are on no level have
-    the error of the most expensive level that is no finer than they are.
-
-    Returns
-    -------
-    Known
-        `UNKNOWN` where it was not measured.
+    the error of the most expensive level that is no finer than they are. `UNKNOWN` where it was not
+    measured.
     """
     if unmeasured(scene):
         return UNKNOWN
     levels = list(pair)
     for place, part in enumerate(LEVELS.values()):
         if levels[place] is AS_ASKED:
-            bounds = (one for one in reversed(part) if one.same_model and one.bounds(scene))
-            levels[place] = next(bounds, AS_ASKED)
+            coarser = (
+                x for x in reversed(part) if x.same_model and x.describes(scene, or_finer=True)
+            )
+            levels[place] = next(coarser, AS_ASKED)
     return known_of_classes(*levels, *scene_classes(scene))
 
 
@@ -222,10 +207,9 @@ def measured() -> dict[tuple[str, str, str], FloatArray]:
 
 def model_class(scene: Scene) -> str:
     """The class of scenes that share what the choices common to all levels do to a threshold."""
-    assert isinstance(scene.bed, PileBed)
-    reynolds = float(closed_form(scene).reynolds)
+    bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
+    assert isinstance(bed, PileBed)
     regime = "viscous" if reynolds < VISCOUS else "transitional" if reynolds < ROUGH else "rough"
-    bed = scene.bed
     shape = "" if bed.is_triangle else f", {'profile' if bed.profile else bed.shape}"
     return f"{bed.packing}, {regime}{shape}"
 
@@ -235,9 +219,8 @@ def spread(scene: Scene, fraction: float) -> Spread:
     shares = _shares(model_class(scene), fraction)
     if shares.empty:
         return Spread(math.nan, math.nan, "")
-    low, high = together(shares)
     widest = (shares["shields_low"] + shares["shields_high"]).to_numpy().argmax()
-    return Spread(low, high, str(shares["choice"].iloc[int(widest)]))
+    return Spread(*together(shares), str(shares["choice"].iloc[int(widest)]))
 
 
 def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
@@ -258,8 +241,8 @@ def frozen_bed(scene: Scene, fraction: float) -> float:
     if scene.protocol.update or scene.flow.model != "solve":
         return math.nan
     shares = _shares(model_class(scene), fraction)
-    row = shares[shares["choice"] == FROZEN]
-    return math.nan if row.empty else float(row[["shields_low", "shields_high"]].to_numpy().max())
+    ends = shares.loc[shares["choice"] == FROZEN, ["shields_low", "shields_high"]]
+    return math.nan if ends.empty else float(ends.to_numpy().max())
 
 
 @cache
@@ -271,6 +254,7 @@ def _shares(model: str, fraction: float) -> pd.DataFrame:
     return nearest
 
 
+@cache
 def floor(model: str) -> float:
     """Half the interval of the model's choices, of scenes of a class whose file's values are sure.
 
@@ -278,7 +262,7 @@ def floor(model: str) -> float:
     numerics is hidden by the uncertainty of the model.
     """
     rows = _budget()[(_budget()["model_class"] == model) & ~_budget()["choice"].isin(STATED)]
-    return min((sum(together(own)) / 2 for _, own in rows.groupby("fraction")), default=math.nan)
+    return min((sum(together(part)) / 2 for _, part in rows.groupby("fraction")), default=math.nan)
 
 
 @cache
