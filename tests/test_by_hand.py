@@ -10,7 +10,7 @@ from orchestrator.report.results import Results
 from orchestrator.runs.case import Case
 
 CHANGES = {
-    "pile": ("parameters.liggghts", "waiting_time equal 6.0", "waiting_time equal 7.0"),
+    "pile": ("parameters.liggghts", "rest_energy equal 1e-06", "rest_energy equal 0.0"),
     "flow": ("parameters", "freeStream       10.0;", "freeStream       11.0;"),
 }
 

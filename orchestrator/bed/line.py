@@ -32,14 +32,9 @@ PLACES = 10**6
 class BedLine:
     """A bed line of n corners, which go downstream.
 
-    Attributes
-    ----------
-    x, z : tuple of float
-        Corners: downstream of the foot of the first form, above the flat bed before it.
-    h : float
-        Height of the forms, in which domain, mesh and averaging are measured.
-    bare : tuple of (float, float)
-        Ranges of x of obstacles, which carry no grains.
+    `x` is downstream of the foot of the first form, `z` above the flat bed before it; `h`, the
+    height of the forms, is that in which domain, mesh and averaging are measured; `bare` has the
+    ranges of x of obstacles, which carry no grains.
     """
 
     x: tuple[float, ...]
@@ -237,11 +232,9 @@ def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:
     middle = np.array([obstacle.x, float(line.height(np.array(obstacle.x)))])
     outline = _outline(obstacle) + middle
     start, end = _foot(line, outline[0], -1), _foot(line, outline[-1], 1)
-    before, behind = (
-        line.corners[line.corners[:, 0] < start[0]],
-        line.corners[line.corners[:, 0] > end[0]],
-    )
-    whole = BedLine.through(np.vstack([before, start, outline, end, behind]), line.h)
+    x, corners = line.corners[:, 0], line.corners
+    parts = [corners[x < start[0]], start, outline, end, corners[x > end[0]]]
+    whole = BedLine.through(np.vstack(parts), line.h)
     return replace(whole, bare=(*line.bare, (float(start[0]), float(end[0]))))
 
 

@@ -5,7 +5,7 @@ resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are
 the scene, with the foot of the first form at the origin; each grain has a size of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,14 +57,9 @@ ROOM = 1 + 1e-9
 
 @dataclass(frozen=True)
 class Places:
-    """The centres of n grains, in one unit of length.
+    """The centres of n grains in one unit of length: along the flow, across it, up; shape (n, 3).
 
-    Attributes
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Along the flow, across it, up.
-    width : float
-        From one side of a strip to the other, beyond which it begins again; 0 in one plane.
+    A strip of some `width` begins again beyond its sides; the width is 0 in one plane.
     """
 
     xyz: FloatArray
@@ -78,13 +73,10 @@ class Places:
         return cls(np.column_stack([x, np.mod(y, width) if width else y, z]), width)
 
     def pairs(self, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
-        """Grains within a reach of one another, each pair in both orders, k pairs in all.
+        """Grains within a reach of one another, each pair in both orders.
 
-        Returns
-        -------
-        first, second : ndarray of int, shape (k,)
-        apart : ndarray, shape (k, 3)
-            Vector from the first to the second, the shorter way across the sides.
+        Returns the first and the second of each of k pairs, shape (k,), and the vector from the
+        first to the second, the shorter way across the sides, shape (k, 3).
         """
         tree = cKDTree(self.xyz, boxsize=np.array([0.0, self.width, 0.0]))
         pairs = tree.query_pairs(reach, output_type="ndarray")
@@ -115,17 +107,15 @@ class Packing:
     centres : ndarray, shape (n, 2)
         x and z of each centre.
     sizes : ndarray, shape (n,)
-        Diameter of each grain, d.
+        Diameter of each grain.
     mobile : ndarray of bool, shape (n,)
         May move; the others are fixed.
     windward, lee : ndarray of bool, shape (n,)
         Exposed and counted, by default on windward sides; exposed elsewhere.
     arc_length : ndarray, shape (n,)
         Position along the bed line; it means something for exposed grains.
-    across : ndarray, shape (n,), or 0
-        y of each centre; 0 in one plane.
-    width : float
-        Width of a strip with periodic sides; 0 in one plane.
+    across, width
+        y of each centre, and the width of a strip with periodic sides; both 0 in one plane.
     """
 
     centres: FloatArray
@@ -155,7 +145,7 @@ class Packing:
 
 @dataclass(frozen=True)
 class Lattice:
-    """How the grains of a bed that is not poured are laid.
+    """How the grains of a bed that is not poured are laid; lengths in diameters.
 
     Attributes
     ----------
@@ -168,7 +158,7 @@ class Lattice:
     mobile_layers : int
         Layers that may move.
     disorder : float
-        Largest gap in the row below the mobile ones of a disordered packing, diameters.
+        Largest gap in the row below the mobile ones of a disordered packing.
     seed : int
         Chooses one disordered packing of many; on a lattice 0 is itself, others are its replicas.
     """
@@ -190,20 +180,13 @@ class Lattice:
         """Whether its rows have random gaps."""
         return self.pattern == "disordered"
 
-    def packed(
-        self,
-        line: BedLine,
-        centres: FloatArray,
-        mobile: BoolArray,
-        windward: BoolArray,
-        lee: BoolArray,
-    ) -> Packing:
-        """The packing of some grains on a line; those of a replica a little aside."""
+    def packed(self, line: BedLine, centres: FloatArray, kinds: Iterable[BoolArray]) -> Packing:
+        """The mobile, windward and lee grains on a line; those of a replica a little aside."""
+        mobile, windward, lee = kinds
         aside = PERTURBATION if self.seed and not self.uneven else 0.0
         shift = np.random.default_rng(self.seed).uniform(-aside, aside, centres.shape)
         arc_length = line.nearest(centres)[1]
-        sizes = np.ones(len(centres))
-        return Packing(centres + shift, sizes, mobile, windward, lee, arc_length)
+        return Packing(centres + shift, np.ones(len(centres)), mobile, windward, lee, arc_length)
 
 
 def pile(line: BedLine, lattice: Lattice) -> Packing:
@@ -231,11 +214,8 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     needed = ~buried | _touching(body, mobile)
     apron = _apron(body[needed], surface)
     fixed = np.zeros(len(apron), bool)
-    return lattice.packed(
-        line,
-        np.vstack([body[needed], apron]),
-        *(np.append(chosen[needed], fixed) for chosen in (mobile, windward, lee)),
-    )
+    kinds = (np.append(chosen[needed], fixed) for chosen in (mobile, windward, lee))
+    return lattice.packed(line, np.vstack([body[needed], apron]), kinds)
 
 
 def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
@@ -260,12 +240,9 @@ def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
-    """Rows whose lowest has random gaps and offsets; the others rest in the pockets below them.
+    """Rows, shape (n, 2), whose lowest has random gaps and offsets; the others rest in its pockets.
 
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Along the rows and normal to them; the middle grain of the uppermost is at the origin.
+    Places are along the rows and normal to them; the uppermost row's middle is at the origin.
     """
     rng = np.random.default_rng(lattice.seed)
     size = lattice.disorder
@@ -313,22 +290,12 @@ def _apron(body: FloatArray, surface: float) -> FloatArray:
 
 
 def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice) -> Packing:
-    """Pack the grains of a bed of any shape.
+    """Pack the grains of a bed of any shape; lengths in diameters.
 
     The line is divided at its sharp corners. Each part has rows of its own, those that are counted
     first; where rows of two parts meet, grains of the later one that would overlap are left out,
-    and grains that do not rest on two are fixed.
-
-    Parameters
-    ----------
-    line : BedLine
-        Bed line of the flow, diameters.
-    ground : BedLine
-        The same without obstacles.
-    counts : {"windward", "all"} or (float, float)
-        Which exposed grains are counted, as `BedLine.counted` takes it.
-    lattice : Lattice
-        How the grains are laid.
+    and grains that do not rest on two are fixed. `ground` is the bed line without obstacles,
+    `counts` says which exposed grains are counted, as `BedLine.counted` takes it.
 
     Raises
     ------
@@ -354,7 +321,7 @@ def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice)
         raise UnfitError("bed.counted", "no grain is counted", "choose another part of the bed")
     needed = mobile | seen | _touching(centres, mobile)
     kinds = (mobile, counted, seen & ~counted)
-    return lattice.packed(line, centres[needed], *(kind[needed] for kind in kinds))
+    return lattice.packed(line, centres[needed], (kind[needed] for kind in kinds))
 
 
 def offset(line: BedLine, distance: float) -> BedLine:
@@ -372,11 +339,8 @@ def offset(line: BedLine, distance: float) -> BedLine:
     x, z = (line.corners + middle * (distance / np.cos(bends))[:, None]).T
     back = np.flatnonzero(np.diff(x) <= 0)
     if len(back):
-        raise UnfitError(
-            "bed",
-            f"it bends more sharply than a grain at {line.x[back[0]]:.4g} d from the first foot",
-            "smooth it, or choose smaller grains",
-        )
+        what = f"it bends more sharply than a grain at {line.x[back[0]]:.4g} d from the first foot"
+        raise UnfitError("bed", what, "smooth it, or choose smaller grains")
     return BedLine(tuple(x.tolist()), tuple(z.tolist()), line.h)
 
 
@@ -390,14 +354,12 @@ def _rows(top: BedLine, counted: BoolArray, lattice: Lattice) -> Iterator[FloatA
         yield _level_rows(top, lattice)
     for turn in (True, False) if lattice.pattern != "horizontal" else (False,):
         for first, last in (part for part, has in zip(parts, carries, strict=True) if has == turn):
-            points = _rows_along(top, first, last, lattice, counted=turn)
+            points = _rows_along(top, first, last, lattice, turn)
             straight = first == last and lattice.pattern == "aligned"
             yield points[_depth(top, points)[1] >= -(TIE if straight else STRAY)]
 
 
-def _rows_along(
-    top: BedLine, first: int, last: int, lattice: Lattice, *, counted: bool
-) -> FloatArray:
+def _rows_along(top: BedLine, first: int, last: int, lattice: Lattice, counted: bool) -> FloatArray:
     """Rows under some segments of a line, which end a little beyond them."""
     layers = lattice.mobile_layers + (lattice.pattern == "horizontal")
     rows = layers + 1 if counted else UNDER
@@ -461,9 +423,7 @@ def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
     x += (top.crest[0] - x[0]) % (2 * half)
     parts = []
     for row in range(int(np.ceil((highest - min(top.z)) / row_height)) + layers + 2):
-        places = np.column_stack(
-            [x + (row % 2) * half, np.full(len(x), highest - row * row_height)]
-        )
+        places = np.column_stack([x + row % 2 * half, np.full_like(x, highest - row * row_height)])
         over = top.height(places[:, 0]) - places[:, 1]
         parts.append(places[(over > -1) & (over < thick)])
     points = np.vstack(parts)
@@ -497,45 +457,29 @@ def _without_overlaps(groups: list[FloatArray]) -> FloatArray:
 def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> BoolArray:
     """Which equal grains have no other that is higher along their own normal, within d/2 of it.
 
-    Parameters
-    ----------
-    centres, tangents : ndarray, shape (n, 2)
-        Places of the grains, and the bed's direction under each.
-    slack : float
-        A slit between two grains that is narrower does not expose the one under it; on such a bed
-        a neighbour that stands out by less than `STRAY` hides none.
+    `tangents`, shape (n, 2), has the bed's direction under each. A slit between two grains that is
+    narrower than `slack` does not expose the one under it; on such a bed a neighbour that stands
+    out by less than `STRAY` hides none.
     """
     first, _, apart = Places.of(centres).pairs(1.6)
     x, z = apart[:, 0], apart[:, 2]
     tx, tz = tangents[first].T
     hidden = np.abs(x * tx + z * tz) <= 0.5 + slack + TIE
     hidden &= z * tx - x * tz > (STRAY if slack else TIE)
-    return _without(len(centres), first[hidden])
+    return np.asarray(np.bincount(first[hidden], minlength=len(centres)) == 0)
 
 
 def unshadowed(along: Places, height: FloatArray, radii: FloatArray) -> BoolArray:
     """Which grains of any sizes are exposed.
 
     A grain is exposed when the line through its centre, normal to the bed, meets no other grain
-    whose centre lies higher.
-
-    Parameters
-    ----------
-    along : Places
-        Place of each grain along the bed and across the flow; the third coordinate is 0.
-    height, radii : ndarray, shape (n,)
-        Height over the bed, and radius.
+    whose centre lies higher. `along` has the place of each along the bed and across the flow, its
+    third coordinate is 0; `height` is over the bed line.
     """
     first, second, apart = along.pairs(float(radii.max()) + TIE)
     hidden = np.linalg.norm(apart, axis=1) <= radii[second] + TIE
     hidden &= height[second] > height[first] + TIE
-    return _without(len(height), first[hidden])
-
-
-def _without(count: int, hidden: IntArray) -> BoolArray:
-    free = np.ones(count, bool)
-    free[hidden] = False
-    return free
+    return np.asarray(np.bincount(first[hidden], minlength=len(height)) == 0)
 
 
 def _rests(centres: FloatArray) -> BoolArray:

@@ -161,7 +161,7 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
         here_s = time.process_time() - started if pair.grains.name in METHODS else 0.0
         names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
         names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
-        speed, density = pile.face(runs.cases).speed, scene.fluid.density
+        speed, density = pile.speed(runs.cases), scene.fluid.density
         row: Row = {
             "scene_id": scene.id,
             "scene": label(scene),

@@ -35,6 +35,8 @@ UNUSED = {"fractions", "final_fraction"}
 """Fields of the protocol that mean nothing to one grain."""
 SCALED = {"diameter", "density", "sizes"}
 """Fields of the grain that change the forces of a cell alone; all others change its contacts."""
+REST = 2.5
+"""Mean time until the grains are at rest in a load step, sqrt(d/g')."""
 BLOCK = 512
 """Most cells of a deck."""
 
@@ -67,7 +69,7 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 7
+    recipe: ClassVar[int] = 8
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -85,7 +87,7 @@ class SingleGrainCase(GrainCase):
         """Expected time of one core, s."""
         rules = self.scenes[0].protocol
         load_steps = np.log(1.02 / deck.START) / np.log1p(rules.load_increment)
-        return deck.cost_s(load_steps, 3 * len(self.scenes), rules, self.grain)
+        return deck.cost_s(load_steps, 3 * len(self.scenes), REST, rules, self.grain)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""

@@ -15,7 +15,7 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel, model
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling
-from orchestrator.grains.loading import FEWER, PLACES, ForceTable, Loading
+from orchestrator.grains.peeling import FEWER, PLACES, ForceTable, Loading
 from orchestrator.study.closed_form import closed_form, forces, on_slopes
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene

@@ -30,7 +30,7 @@ from orchestrator.grains.threshold import PileThreshold, of_pile
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.scene import Scene
-from orchestrator.types import BoolArray, FloatArray, IntArray
+from orchestrator.types import BoolArray, FloatArray
 
 MARGIN = 3.0
 """From the outermost grains to the walls of the box, and from a face to the height at which a
@@ -38,6 +38,8 @@ grain in flight is gone, diameters."""
 EARLY = 0.01
 """Part of the grains of a poured bed that may go before the first load step: a few of many hundred
 hardly lie, and load steps from their flow on would take most of the time."""
+REST = 7.0
+"""Mean time until the grains of a lattice are at rest in a load step, sqrt(d/g')."""
 IN_SPACE = 5.0
 """Cost of a grain in space over that of one in a plane: of contacts, and of fixed grains around."""
 GRAINS = "grains.csv"
@@ -273,7 +275,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 11
+    recipe: ClassVar[int] = 12
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
 
     @cached_property
@@ -299,7 +301,7 @@ class PileCase(GrainCase):
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
         size = self._size * (IN_SPACE if width else 1)
         exposed = self._length * (width or 1) if self.geometry.pouring else np.nan
-        return deck.cost_s(load_steps, size, rules, grain, exposed)
+        return deck.cost_s(load_steps, size, REST, rules, grain, exposed)
 
     @property
     def ranks(self) -> int:
@@ -337,20 +339,19 @@ class PileCase(GrainCase):
         if rules.update:
             enough = packed.count - goal(geometry, self.flow)
         grains, (slope, ridge) = table(loads, worn), geometry.line.roof(MARGIN + 0.5)
-        raising = deck.raising(
-            rules, enough, smallest=grains.smallest, is_poured=self.scene.is_poured
-        )
+        mobile = grains.kind > deck.FIXED
+        smallest = float(grains.sizes[mobile].min())
         numbers = {
             "diameter": d,
-            "smallest": grains.smallest,
+            "smallest": smallest,
             "density": self.scene.grain.density,
             "gravity": self.scene.reduced_gravity,
             **deck.contact(self.scene.grain, rules),
-            **raising,
+            **deck.raising(rules, enough, smallest=smallest, is_poured=self.scene.is_poured),
             "slope": slope,
             "ceiling_x": ridge[0] * d,
             "ceiling_z": ridge[1] * d,
-            "behind": grains.last_mobile + deck.AWAY * d,
+            "behind": grains.position[mobile, 0].max() + deck.AWAY * d,
         }
         force = loads.loading.in_steps(rising.tolist())
         deck.write(directory, grains, numbers, rising, force, margin=MARGIN * d, ranks=self.ranks)
@@ -446,20 +447,6 @@ def table(loads: Loads, worn: Worn) -> GrainTable:
         density=grain.density,
         width=packed.width,
     )
-
-
-@dataclass(frozen=True)
-class Face:
-    """The counted grains of a pile, arrays of shape (N,).
-
-    `ids` are those in the deck, `arc_length` and `x` (m) are downstream of the foot of the first
-    form, `speed` is the signed local friction velocity over the undisturbed one.
-    """
-
-    ids: IntArray
-    arc_length: FloatArray
-    speed: FloatArray
-    x: FloatArray
 
 
 @dataclass(frozen=True)
@@ -598,17 +585,14 @@ class Pile(Geometry):
         """Its grains under the flow of the whole pile."""
         return self.method.loads(cases)
 
-    def face(self, cases: Path) -> Face:
-        """The counted grains, each with the stress on it; on a bed that changes, as it moved."""
-        d, chosen = self.scene.grain.diameter, self.packing.windward
+    def speed(self, cases: Path) -> FloatArray:
+        """Signed local friction velocity of the counted grains over the undisturbed one, (N,).
+
+        On a bed that changes it is that of the round in which a grain moved.
+        """
         changes = bool(self.scene.protocol.update)
         ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
-        return Face(
-            ids=np.flatnonzero(chosen) + 1,
-            arc_length=self.packing.arc_length[chosen] * d,
-            speed=ratio[chosen],
-            x=self.packing.centres[chosen, 0] * d,
-        )
+        return np.asarray(ratio[self.packing.windward])
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which counted grains move by themselves, sorted, m/s.
@@ -625,5 +609,5 @@ class Pile(Geometry):
 
     def thresholds(self, cases: Path, fractions: Iterable[float]) -> list[PileThreshold]:
         """Its thresholds at some n/N; `cases` is the directory of the finished runs."""
-        motion, speed = self.motion(cases), self.face(cases).speed
+        motion, speed = self.motion(cases), self.speed(cases)
         return [of_pile(motion, speed, n, self.scene.fluid.density) for n in fractions]

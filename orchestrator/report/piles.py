@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.grains.pile import Pile
@@ -27,8 +28,6 @@ SHOWN_UP_TO = 0.9
 """n/N up to which the axis of the stress holds every curve."""
 MARKERS = 30
 """Largest number of markers of a curve: peeling gives one for each grain."""
-WEAR = ("alpha_deg", "packing", "method")
-"""Columns that part the panels of beds that change."""
 LONGEST = 45.0
 """Longest part of a poured bed that is drawn, d: of a longer one its middle."""
 LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
@@ -37,14 +36,30 @@ HIDING = (
     ("Egiazaroff", measured.egiazaroff_hiding, "--"),
     ("one stress moves all sizes", lambda size: 1 / size, ":"),
 )
+Panels = list[tuple[Axes, pd.DataFrame]]
 
 
-def _pages(rows: pd.DataFrame, keys: list[str]) -> Iterator[tuple[str, str, list[pd.DataFrame]]]:
-    """As `style.pages`, the panels of the most piles first, in each figure by rising keys."""
+def _figures(
+    rows: pd.DataFrame, keys: list[str], height: float
+) -> Iterator[tuple[str, str, Canvas, Panels, pd.DataFrame]]:
+    """Figures of panels by keys, those of the most piles first, in each figure by rising keys.
+
+    Yields the endings of the figure's name and title, the figure, axes with their rows, all rows.
+    """
     panels = [part for _, part in split(rows, *keys)]
     order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
     for name, title, chosen in style.pages(order):
-        yield name, title, [panels[i] for i in sorted(chosen)]
+        parts = [panels[i] for i in sorted(chosen)]
+        figure, axes = style.grid(len(parts), height)
+        for ax, part in zip(axes, parts, strict=True):
+            ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+        yield name, title, figure, list(zip(axes, parts, strict=True)), pd.concat(parts)
+
+
+def _entries(column: str, colours: dict[float, str], rows: pd.DataFrame) -> list[Artist]:
+    """Legend of the colours that some rows have."""
+    used = set(rows[column])
+    return [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -59,15 +74,17 @@ def fractions(results: Results) -> Iterator[Figure]:
     for (alpha,), rows in split(scenes, "alpha_deg"):
         choices, rows, variants = parted(rows, *SHOWN)
         keys = ["z0_over_d", *choices]
-        for name, title, panels in _pages(rows, keys):
-            shown = pd.concat(panels)
-            figure, axes = style.grid(len(panels), 2.3)
-            for ax, part in zip(axes, panels, strict=True):
+        for name, title, figure, panels, shown in _figures(rows, keys, 2.3):
+            for ax, part in panels:
                 for _, pile in part.iterrows():
-                    _curve(ax, pile, curves[pile["scene_id"]], colours[float(pile["d_m"])])
-                ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-                if (place := ax.get_subplotspec()) is None or place.is_first_col():
-                    ax.set_ylabel("$n/N$")
+                    line, colour = curves[pile["scene_id"]], colours[float(pile["d_m"])]
+                    look: style.Look = {"marker": str(pile[SHAPE]), "ms": 3, "mew": 0.7, "lw": 0.8}
+                    look |= {"mfc": colour if pile["law_holds"] else "white", "color": colour}
+                    look |= {"markevery": -(-len(line) // MARKERS), "gid": str(pile["scene_id"])}
+                    ax.plot(line["shields"], line["fraction_moved"], **look)
+            axes = [ax for ax, _ in panels]
+            for ax in axes[::2]:
+                ax.set_ylabel("$n/N$")
             # the last grains of a pile may wait for a hundred times the stress of the others
             stress = pd.concat([curves[item] for item in shown["scene_id"]])
             early = stress[stress["fraction_moved"] <= SHOWN_UP_TO]["shields"]
@@ -76,34 +93,13 @@ def fractions(results: Results) -> Iterator[Figure]:
             for ax in axes:
                 style.plain_ticks(ax.xaxis)
             shields.label_lowest(axes, labels.TAU_AXIS)
-            used = set(shown["d_m"])
-            entries = [
-                style.entry(labels.plain("d_m", d), c) for d, c in colours.items() if d in used
-            ]
-            style.legends(figure, entries, [*shields.point_entries(shown, variants), *variants])
-            yield Figure(
-                f"fractions-alpha{alpha:g}{name}",
-                f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}{title}",
-                caption("fractions", about=shields.about(shown)),
-                case_names(shown),
-                figure,
-                fold=bool(name) or alpha != scenes["alpha_deg"].min(),
-            )
-
-
-def _curve(ax: Axes, pile: pd.Series, curve: pd.DataFrame, colour: str) -> None:
-    ax.plot(
-        curve["shields"],
-        curve["fraction_moved"],
-        color=colour,
-        lw=0.8,
-        ms=3,
-        marker=str(pile[SHAPE]),
-        markevery=-(-len(curve) // MARKERS),
-        mfc=colour if pile["law_holds"] else "white",
-        mew=0.7,
-        gid=str(pile["scene_id"]),
-    )
+            looks = [*shields.point_entries(shown, variants), *variants]
+            style.legends(figure, _entries("d_m", colours, shown), looks)
+            title = f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}{title}"
+            text = caption("fractions", about=shields.about(shown))
+            fold = bool(name) or alpha != scenes["alpha_deg"].min()
+            name = f"fractions-alpha{alpha:g}{name}"
+            yield Figure(name, title, text, case_names(shown), figure, fold=fold)
 
 
 def extended(results: Results) -> Iterator[Figure]:
@@ -114,36 +110,29 @@ def extended(results: Results) -> Iterator[Figure]:
     for (ratio,), rows in split(reached, "z0_over_d"):
         written = labels.ratio_of(float(str(ratio)), "d")
         choices, rows, variants = parted(rows, *SHOWN, "fraction")
-        keys = ["alpha_deg", *choices]
-        for name, title, panels in _pages(rows, keys):
-            shown = pd.concat(panels)
-            figure, axes = style.grid(len(panels), 2.6 if len(panels) > 1 else 3.4)
+        keys, height = ["alpha_deg", *choices], 2.6 if rows["alpha_deg"].nunique() > 1 else 3.4
+        for name, title, figure, panels, shown in _figures(rows, keys, height):
             dashes = theory.dashes(shown["force_law"])
-            for ax, part in zip(axes, panels, strict=True):
+            for ax, part in panels:
                 published = _thresholds(ax, results, part, colours, dashes)
-                ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
+            axes, parts = [ax for ax, _ in panels], [part for _, part in panels]
             # below the first grains lies the threshold of one, which they are compared with
-            shields.prepare(
-                axes, panels, (shown["reynolds"].min() / 5, shown["reynolds"].max() * 2)
-            )
-            shields.mark_drag_law(axes, panels)
-            entries = [style.entry(labels.plain("fraction", f), c) for f, c in colours.items()]
+            reach = shown["reynolds"].min() / 5, shown["reynolds"].max() * 2
+            shields.prepare(axes, parts, reach)
+            shields.mark_drag_law(axes, parts)
             looks = [
                 *shields.within(axes, shields.line_entries(shown, dashes)),
                 *shields.point_entries(shown, variants),
                 *variants,
                 *shields.within(axes, published),
             ]
-            style.legends(figure, entries, looks)
+            style.legends(figure, _entries("fraction", colours, reached), looks)
             lines = shields.references(shown, sloped=True)
-            yield Figure(
-                f"extended-shields-{written.replace('/', '').replace(' ', '')}{name}",
-                f"Thresholds of piles by slope, z₀ = {written}{title}",
-                caption("extended", about=shields.about(shown), lines=lines),
-                case_names(shown),
-                figure,
-                fold=bool(name) or ratio != reached["z0_over_d"].min(),
-            )
+            text = caption("extended", about=shields.about(shown), lines=lines)
+            title = f"Thresholds of piles by slope, z₀ = {written}{title}"
+            fold = bool(name) or ratio != reached["z0_over_d"].min()
+            name = f"extended-shields-{written.replace('/', '').replace(' ', '')}{name}"
+            yield Figure(name, title, text, case_names(shown), figure, fold=fold)
 
 
 def _thresholds(
@@ -178,29 +167,28 @@ def wear(results: Results) -> Iterator[Figure]:
     if rows.empty:
         return
     colours = style.palette("d_m", sorted(set(rows["d_m"])))
-    for name, title, panels in _pages(rows, list(WEAR)):
-        figure, axes = style.grid(len(panels), 2.1)
-        for ax, part in zip(axes, panels, strict=True):
+    grey: style.Look = {"color": "0.2"}
+    looks = [
+        Line2D([], [], ls="--", lw=0.9, label="flow of the whole pile", **grey),
+        Line2D([], [], lw=1.3, label="flow of the bed as it is", **grey),
+        Line2D([], [], ls="", marker="o", ms=4, label="first 5 % apart", **grey),
+    ]
+    keys = ["alpha_deg", "packing", "method"]
+    for name, title, figure, panels, shown in _figures(rows, keys, 2.1):
+        for ax, part in panels:
             for (d, _), group in split(part, "d_m", "scene_id"):
                 x, colour = group["fraction_moved"], colours[float(str(d))]
                 ax.plot(x, group["shields_frozen"], color=colour, ls="--", lw=0.9)
                 ax.plot(x, group["shields"], color=colour, lw=1.3)
                 end = group[x == group["holds_until"]]
                 ax.plot(end["fraction_moved"], end["shields"], "o", color=colour, ms=4)
-            ax.set_title(labels.panel(part.iloc[0], list(WEAR)), loc="left")
+        axes = [ax for ax, _ in panels]
         axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
         shields.label_lowest(axes, "$n/N$")
         for ax in axes[::2]:
             ax.set_ylabel("Shields number $θ$")
-        entries = [style.entry(labels.plain("d_m", d), colour) for d, colour in colours.items()]
-        looks = [
-            Line2D([], [], color="0.2", ls="--", lw=0.9, label="flow of the whole pile"),
-            Line2D([], [], color="0.2", lw=1.3, label="flow of the bed as it is"),
-            Line2D([], [], color="0.2", ls="", marker="o", ms=4, label="first 5 % apart"),
-        ]
-        style.legends(figure, entries, looks)
-        piles = (results.plan.piles[item] for item in pd.concat(panels)["scene_id"].unique())
-        cases = tuple(pile.runs[-1].name for pile in piles)
+        style.legends(figure, _entries("d_m", colours, rows), looks)
+        cases = tuple(results.plan.piles[i].runs[-1].name for i in shown["scene_id"].unique())
         heading = f"Frozen bed and bed that changes{title}"
         yield Figure(f"wear{name}", heading, caption("wear"), cases, figure)
 
@@ -228,8 +216,8 @@ def poured(results: Results) -> Iterator[Figure]:
 
 def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     """The middle of a bed, seen from the side, or a strip seen from above."""
-    packed, method = pile.packing, labels.value("method", grains["answered_method"].iloc[0])
-    x, z = packed.centres.T
+    packed, name = pile.packing, grains["answered_method"].iloc[0]
+    method, (x, z) = labels.value("method", name), packed.centres.T
     middle = (x[packed.windward].min() + x[packed.windward].max()) / 2
     left = max(x.min() - 1, middle - LONGEST / 2)
     right = min(x.max() + 1, left + LONGEST)
@@ -245,10 +233,10 @@ def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     # seen from above the upper grains cover the others
     order = np.argsort(z) if packed.width else np.arange(len(x))
     places = packed.places.xyz[:, :2] if packed.width else packed.centres
-    sizes = packed.sizes[order]
+    sizes, look = packed.sizes[order], {"facecolors": list(colours[order]), "edgecolors": EDGE}
     discs = EllipseCollection(
         sizes, sizes, np.zeros_like(x), units="xy", offsets=places[order],
-        offset_transform=ax.transData, facecolors=list(colours[order]), edgecolors=EDGE, lw=0.3,
+        offset_transform=ax.transData, lw=0.3, **look,
     )  # fmt: skip
     ax.add_collection(discs)
     up = "$y/d$" if packed.width else "$z/d$"
@@ -256,13 +244,9 @@ def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
     bar.set_label(r"$u^\star_0$ at which the grain goes, m/s; the same colours by every method")
     style.plain_ticks(bar.ax.xaxis)
-    return Figure(
-        f"poured-{grains['answered_method'].iloc[0]}",
-        f"Where grains go, by {method}, {labels.plain('d_m', pile.scene.grain.diameter)}",
-        caption("poured", width=packed.width, count=len(flows), method=method),
-        tuple(run.name for run in pile.runs),
-        figure,
-    )
+    title = f"Where grains go, by {method}, {labels.plain('d_m', pile.scene.grain.diameter)}"
+    text = caption("poured", width=packed.width, count=len(flows), method=method)
+    return Figure(f"poured-{name}", title, text, tuple(run.name for run in pile.runs), figure)
 
 
 def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
@@ -309,11 +293,9 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         for _, formula, dash in HIDING:
             ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1)
         ax.set(xscale="log", yscale="log", xlabel="$d_i/d_{50}$")
-    axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
-    for ax in axes:
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-    entries = [style.entry(labels.plain("fraction", f), c) for f, c in colours.items()]
+    axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
     looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in HIDING]
-    style.legends(figure, entries, looks)
+    style.legends(figure, _entries("fraction", colours, rows), looks)
     return Figure("hiding", "Hiding and exposure of sizes", caption("hiding"), (), figure)

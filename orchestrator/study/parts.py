@@ -170,7 +170,7 @@ class Protocol(Part):
     load_increment: float = _dem("load increment", 0.02, "Δu*/u*", ge=1e-4, le=0.2)
     """relative rise of u* from one load step to the next"""
     waiting_time: float = _dem("waiting time", 10.0, unit="√(d/g′)", ge=1, le=1e4)
-    """time without a passage of the displacement criterion that ends a load step"""
+    """time without a passage of the displacement criterion that ends a load step without rest"""
     displacement_criterion: float = _dem(
         "displacement criterion", 0.3, "", "d", scope="DEM and peeling", ge=1e-3, le=0.5
     )

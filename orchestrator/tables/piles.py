@@ -13,14 +13,14 @@ from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
-from orchestrator.grains.pile import Face, Pile
+from orchestrator.grains.pile import Pile
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
-from orchestrator.types import Row
+from orchestrator.types import FloatArray, Row
 
 Columns = dict[str, Any]
 """Columns of a table by name: arrays of one length, and values that all its rows have."""
@@ -33,14 +33,14 @@ class Answer:
     decision: Decision
     pile: Pile
     motion: Motion
-    face: Face
+    speed: FloatArray
     row_hold: float
 
     @classmethod
     def read(cls, decision: Decision, pile: Pile, cases: Path) -> "Answer":
         """Read the motion of a pile and the stress on it."""
         hold = pile.loads(cases).row_hold()
-        return cls(decision, pile, pile.motion(cases), pile.face(cases), hold)
+        return cls(decision, pile, pile.motion(cases), pile.speed(cases), hold)
 
     @property
     def scene_id(self) -> str:
@@ -50,13 +50,14 @@ class Answer:
 
 def grains(answer: Answer) -> Columns:
     """The counted grains of a pile: the stress on each, when and how it moved."""
-    motion, face, pile = answer.motion, answer.face, answer.pile
+    motion, pile, packing = answer.motion, answer.pile, answer.pile.packing
+    counted, d = packing.windward, pile.scene.grain.diameter
     columns = {
         "scene_id": answer.scene_id,
-        "grain_id": face.ids,
-        "s_m": face.arc_length,
-        "x_m": face.x,
-        "ustar_over_ustar0": face.speed,
+        "grain_id": np.flatnonzero(counted) + 1,
+        "s_m": packing.arc_length[counted] * d,
+        "x_m": packing.centres[counted, 0] * d,
+        "ustar_over_ustar0": answer.speed,
         "moved_in_load_step": motion.level,
         "fallen_in_load_step": motion.fallen,
         "carried_off": motion.carried.astype(int),
@@ -64,11 +65,10 @@ def grains(answer: Answer) -> Columns:
         "ustar0_m_s": threshold.of_grains(motion).value,
     }
     if pile.pouring:
-        packing, counted = pile.packing, pile.packing.windward
         columns["size_over_d"] = packing.sizes[counted]
         columns["pivot_deg"] = pile.pivot_angles_deg
         if packing.width:
-            columns["y_m"] = packing.places.xyz[counted, 1] * pile.scene.grain.diameter
+            columns["y_m"] = packing.places.xyz[counted, 1] * d
     return columns
 
 
@@ -80,7 +80,7 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
     for fraction in scene.protocol.fractions:
         found = {
             one.number: threshold.of_pile(
-                own, answer.face.speed[one.chosen], fraction, scene.fluid.density
+                own, answer.speed[one.chosen], fraction, scene.fluid.density
             )
             for one, own in listed
         }
@@ -115,7 +115,7 @@ def size_class_rows(answer: Answer) -> Iterator[Row]:
 def curve(answer: Answer) -> Columns:
     """The fraction of a pile that had moved, and the stress on it, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
-    tau = threshold.mean_tau(motion, answer.face.speed, scene.fluid.density)
+    tau = threshold.mean_tau(motion, answer.speed, scene.fluid.density)
     return {
         "scene_id": answer.scene_id,
         "load_step": np.arange(len(motion.flow)),
@@ -139,7 +139,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
     The interval holds load steps and count, and at least the known error as a factor both ways; it
     is empty where no error is known. The model's interval is of the choices that all levels share.
     """
-    pile, motion, speed, decision = answer.pile, answer.motion, answer.face.speed, answer.decision
+    pile, motion, speed, decision = answer.pile, answer.motion, answer.speed, answer.decision
     scene, asked, error = pile.scene, decision.asked, decision.error_estimate
     z0, top, depth = scene.bed.roughness, scene.flow.top, scene.flow.depth
     pivot, place = pile.pivot_thresholds(speed), point(scene)
@@ -226,12 +226,13 @@ def _reynolds(scene: Scene, tau: Any) -> Any:
 
 def forms(answer: Answer) -> Iterator[Row]:
     """Of a train, a row for each form and each fraction of the counted grains of that form."""
-    pile, face = answer.pile, answer.face
+    pile = answer.pile
     bed, line = pile.bed, pile.model.line
     if bed.forms == 1 or bed.profile:
         return
     period = bed.spacing or (line.x[-2] - line.x[1]) / bed.forms
-    form = np.clip(np.floor(face.x / period).astype(int), 0, bed.forms - 1)
+    x = pile.packing.centres[pile.packing.windward, 0] * pile.scene.grain.diameter
+    form = np.clip(np.floor(x / period).astype(int), 0, bed.forms - 1)
     ustar0 = np.nan_to_num(threshold.of_grains(answer.motion).value, nan=np.inf)
     for fraction in pile.scene.protocol.fractions:
         first = np.nan
@@ -242,7 +243,7 @@ def forms(answer: Answer) -> Iterator[Row]:
             first = reached if number == 0 else first
             # loose grains of the first form move in still fluid: nothing is a multiple of that
             ratio = reached / first if first > 0 else np.nan
-            speed = face.speed[form == number]
+            speed = answer.speed[form == number]
             yield {
                 "scene_id": answer.scene_id,
                 "form": number + 1,
@@ -268,7 +269,7 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Columns]:
         moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
         on_both = [
             [
-                threshold.of_pile(one.motion, one.face.speed, n / count, scene.fluid.density)
+                threshold.of_pile(one.motion, one.speed, n / count, scene.fluid.density)
                 for n in moved.tolist()
             ]
             for one in (answer, twin)

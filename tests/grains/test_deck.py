@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed import deck
-from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.case import templates
@@ -56,53 +56,28 @@ def test_the_table_of_forces_finds_the_flow_of_the_force_law(
     assert moment / weight == pytest.approx(goal, rel=1e-10)
 
 
-def _table(count: int = 3) -> deck.GrainTable:
+def test_files_hold_every_digit_and_all_grains_are_well_inside_the_box(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    return deck.GrainTable(
-        position=rng.normal(size=(count, 3)),
-        kind=np.array([deck.FIXED, deck.MOBILE, deck.COUNTED])[:count],
-        along=np.tile([1.0, 0.0], (count, 1)),
-        sizes=np.ones(count),
-        diameter=1e-3,
-        density=2500.0,
-    )
-
-
-def test_files_hold_every_digit(tmp_path: Path) -> None:
-    grains = _table()
-    load_steps = np.array([1 / 3, 0.5])
-    force = np.random.default_rng(2).normal(size=(2, 3, 2))
+    kind, along = np.array([deck.FIXED, deck.MOBILE, deck.COUNTED]), np.tile([1.0, 0.0], (3, 1))
+    grains = deck.GrainTable(rng.normal(size=(3, 3)), kind, along, np.ones(3), 1e-3, 2500.0)
+    load_steps, force = np.array([1 / 3, 0.5]), rng.normal(size=(2, 3, 2))
     parameters = {"diameter": np.float64(1e-3), "enough": 7}
     deck.write(tmp_path, grains, parameters, load_steps, force, margin=0.1)
     lines = (tmp_path / "grains.data").read_text().splitlines()
     rows = [line.split() for line in lines[lines.index("Atoms") + 2 :]]
     np.testing.assert_array_equal([[float(v) for v in row[4:]] for row in rows], grains.position)
     assert [int(row[1]) for row in rows] == grains.kind.tolist()
+    box = np.array([line.split()[:2] for line in lines if line.endswith("hi")], float)
+    np.testing.assert_allclose(box[:, 0], grains.position.min(axis=0) - 0.1)
+    np.testing.assert_allclose(box[:, 1], grains.position.max(axis=0) + 0.1)
     written = (tmp_path / "force.z.txt").read_text().split()
     # of the three grains the last alone may be pushed
     assert written == ["1", "3", repr(float(force[0, 2, 1])), "1", "3", repr(float(force[1, 2, 1]))]
-    given = (tmp_path / "parameters.liggghts").read_text()
-    assert [line.split()[:4] for line in given.splitlines()] == [
-        ["variable", "diameter", "equal", "0.001"],
-        ["variable", "enough", "equal", "7"],
-        ["variable", "width", "equal", "0.0"],
-        ["variable", "ranks", "equal", "1"],
-    ]
+    given = (tmp_path / "parameters.liggghts").read_text().splitlines()
+    values = ["diameter equal 0.001", "enough equal 7", "width equal 0.0", "ranks equal 1"]
+    assert [" ".join(line.split()[1:4]) for line in given] == values
     flows = (tmp_path / "load_steps.txt").read_text().splitlines()
     assert [float(line) for line in flows] == load_steps.tolist()
-
-
-def test_every_grain_is_well_inside_the_box(tmp_path: Path) -> None:
-    grains = _table()
-    deck.write(tmp_path, grains, {}, np.ones(1), np.zeros((1, 3, 2)), margin=0.1)
-    bounds = [
-        [float(v) for v in line.split()[:2]]
-        for line in (tmp_path / "grains.data").read_text().splitlines()
-        if line.endswith("hi")
-    ]
-    for axis, (low, high) in enumerate(bounds):
-        assert low == pytest.approx(grains.position[:, axis].min() - 0.1)
-        assert high == pytest.approx(grains.position[:, axis].max() + 0.1)
 
 
 def test_the_template_runs_as_it_lies_and_shares_no_directory_with_other_runs(

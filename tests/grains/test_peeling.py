@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from orchestrator.bed.packing import Places
 from orchestrator.grains import peeling
-from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.types import FloatArray
 
 CRITERION = 0.3

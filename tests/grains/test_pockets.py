@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from orchestrator.bed import deck
 from orchestrator.bed.packing import Places
 from orchestrator.grains import motion, peeling, threshold
-from orchestrator.grains.loading import ForceTable, Loading
+from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.runs.case import templates
 from orchestrator.study.parts import Grain, Protocol
 

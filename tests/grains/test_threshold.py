@@ -20,15 +20,6 @@ MOTION = Motion(FLOW, LEVEL, NONE, NOBODY, NONE)
 DENSITY = 1.2
 
 
-def test_fraction_counts_each_grain_once_from_its_hold_on() -> None:
-    np.testing.assert_allclose(MOTION.fraction, [0, 0.2, 0.5, 0.5, 0.9])
-
-
-def test_a_grain_that_fell_upstream_has_not_moved() -> None:
-    level, fallen = np.where(LEVEL == 4, 0, LEVEL), np.where(LEVEL == 4, 3, 0)
-    assert Motion(FLOW, level, fallen, NOBODY, NONE).fraction[-1] == pytest.approx(0.5)
-
-
 def test_a_threshold_says_what_share_of_its_grains_lift_carried_off() -> None:
     carried = np.arange(10) < 4  # all of the first load step, two of the three of the second
     motion = Motion(FLOW, LEVEL, NONE, carried, NONE)
@@ -45,6 +36,7 @@ def test_thresholds_of_grains_lie_between_two_holds() -> None:
 
 
 def test_curve_holds_the_mean_stress_of_what_has_moved() -> None:
+    np.testing.assert_allclose(MOTION.fraction, [0, 0.2, 0.5, 0.5, 0.9])
     found = threshold.mean_tau(MOTION, SPEED, DENSITY)
     mean = [math.nan, 4.0, (2 * 4 + 3 * 2.25) / 5, (2 * 4 + 3 * 2.25) / 5, (8 + 6.75 + 4) / 9]
     np.testing.assert_allclose(found, DENSITY * FLOW**2 * mean)
@@ -74,13 +66,6 @@ def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_thei
     assert (curve[1:] > 0).all()
     some = threshold.of_pile(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), 0.5, DENSITY)
     assert some.against_the_flow == 0.4
-
-
-def test_a_fraction_that_was_not_reached_is_empty() -> None:
-    found = threshold.of_pile(MOTION, SPEED, 0.95, DENSITY)
-    assert found.fraction == 0.95
-    assert math.isnan(found.tau)
-    assert math.isnan(found.ustar0)
 
 
 @settings(deadline=None)

@@ -148,7 +148,7 @@ def test_until_the_first_update_nothing_differs(worn: dict[str, Done], method: s
     first = int(np.argmax(ours.fraction >= 0.25))
     np.testing.assert_array_equal(ours.flow[: first + 1], theirs.flow[: first + 1])
     np.testing.assert_array_equal(ours.moved[: first + 1], theirs.moved[: first + 1])
-    speeds = [one.pile.face(one.cases).speed for one in (changing, frozen)]
+    speeds = [one.pile.speed(one.cases) for one in (changing, frozen)]
     early, later = ours.moved_by(first), ~ours.moved_by(first)
     np.testing.assert_array_equal(speeds[0][early], speeds[1][early])
     assert np.all(speeds[0][later] != speeds[1][later])

@@ -203,12 +203,15 @@ def test_loose_grains_keep_an_interval_from_zero() -> None:
 
 def test_nothing_is_a_multiple_of_a_threshold_of_zero() -> None:
     # the grains of the first of two forms lie loose: they move in still fluid
-    scene = SimpleNamespace(protocol=SimpleNamespace(fractions=(0.5, 1.0)))
+    rules, grain = SimpleNamespace(fractions=(0.5, 1.0)), SimpleNamespace(diameter=1.0)
+    scene = SimpleNamespace(protocol=rules, grain=grain)
+    x = np.array([[0.2, 0.0], [0.5, 0.0], [1.2, 0.0], [1.5, 0.0]])
+    packing = SimpleNamespace(centres=x, windward=np.ones(4, bool))
     bed, model = SimpleNamespace(forms=2, profile=None, spacing=1.0), SimpleNamespace(line=None)
     answer: Any = SimpleNamespace(
         scene_id="a",
-        pile=SimpleNamespace(scene=scene, bed=bed, model=model),
-        face=SimpleNamespace(x=np.array([0.2, 0.5, 1.2, 1.5]), speed=np.ones(4)),
+        pile=SimpleNamespace(scene=scene, bed=bed, model=model, packing=packing),
+        speed=np.ones(4),
         motion=SimpleNamespace(
             level=np.array([1, 1, 2, 0]), low=np.array([0.0, 0.0, 0.1]), flow=np.array([0, 0, 0.4])
         ),
