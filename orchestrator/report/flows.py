@@ -14,7 +14,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import LogLocator, MaxNLocator
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
@@ -63,37 +62,21 @@ BEDS = 4
 """Largest number of beds in the map of thresholds."""
 Window = tuple[float, float, float, float]
 """Left, right, bottom, top."""
-Kind = tuple[float, float, str]
 
 
-def chosen(results: Results) -> list[Pile]:
-    """Piles whose flows stand for all: of each kind the least z0, and the largest if far larger."""
-    kinds: dict[Kind, list[Pile]] = {}
-    for pile in results.flows.values():
-        kinds.setdefault(_kind(results, pile), []).append(pile)
-    piles = []
-    for _, alike in sorted(kinds.items(), key=lambda item: item[0]):
-        alike.sort(key=lambda pile: pile.bed.roughness)
-        piles.append(alike[0])
-        if alike[-1].bed.roughness > NOTABLE_RATIO * alike[0].bed.roughness:
-            piles.append(alike[-1])
-    return piles
+def _kinds(results: Results) -> list[list[Pile]]:
+    """Piles with flows, of each slope, height and value of the fields that vary, by rising z0."""
+    kinds: dict[tuple[float, float, str], list[Pile]] = {}
+    for pile in sorted(results.flows.values(), key=lambda pile: pile.bed.roughness):
+        varied = " ".join(str(results.asked(pile)[column]) for column in _varied(results))
+        kinds.setdefault((pile.bed.slope_deg, pile.bed.height, varied), []).append(pile)
+    return [alike for _, alike in sorted(kinds.items(), key=lambda item: item[0])]
 
 
 def drawn(results: Results) -> list[Pile]:
     """A pile for each kind of flow whose files are kept."""
-    kinds: dict[Kind, Pile] = {}
-    for pile in chosen(results):
-        if is_whole(pile.flow, results.cases):
-            kinds.setdefault(_kind(results, pile), pile)
-    return list(kinds.values())
-
-
-def _kind(results: Results, pile: Pile) -> Kind:
-    """The key of the flow over a pile but for its z0: slope, height, and the fields that vary."""
-    row = results.asked(pile)
-    varied = " ".join(str(row[column]) for column in _varied(results))
-    return pile.bed.slope_deg, pile.bed.height, varied
+    whole = ([p for p in kind if is_whole(p.flow, results.cases)] for kind in _kinds(results))
+    return [kind[0] for kind in whole if kind]
 
 
 def _varied(results: Results) -> list[str]:
@@ -135,7 +118,10 @@ def corners(line: BedLine) -> dict[str, int]:
 
 def stress(results: Results) -> Iterator[Figure]:
     """The friction velocity along the bed, a panel for each slope at its least and largest z0."""
-    piles = chosen(results)
+    piles = []
+    for least, *others in _kinds(results):
+        rougher = [p for p in others[-1:] if p.bed.roughness > NOTABLE_RATIO * least.bed.roughness]
+        piles += [least, *rougher]
     if not piles:
         return
     columns = min(len(piles), 2)
@@ -149,16 +135,9 @@ def stress(results: Results) -> Iterator[Figure]:
         entries.append(Line2D([], [], label="as the grains feel it (averaged)", **GRAINS))
     style.legends(figure, [], [*entries, Patch(label="reversed flow", **REVERSED)])
     names = tuple(pile.flow.name for pile in piles)
-    mean, crest = eq10_over_wall(results, names)
-    lengths = dict.fromkeys(
-        labels.value("averaging_length", pile.scene.forces.averaging_length) for pile in piles
-    )
-    text = caption(
-        "stress",
-        mean=f"{mean:+.0%}",
-        crest=f"{crest:+.0%}",
-        averaged=f"max(d, {', '.join(lengths)})",
-    )
+    mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
+    lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
+    text = caption("stress", mean=mean, crest=crest, averaged=f"max(d, {', '.join(lengths)})")
     yield Figure("wall-stress", "Friction velocity over the pile", text, names, figure, fold=True)
 
 
@@ -183,15 +162,12 @@ def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
         behind_gap = np.flatnonzero(step > GAP * np.median(step[1:])) if len(step) > 1 else step[:0]
         place, felt = (np.insert(values, behind_gap, np.nan) for values in (place, felt))
         top.plot(place / h, felt, gid="grains", zorder=1.5, **GRAINS)
-    below.fill_between(x / h, z / h, z.min() / h - 0.3, color=style.BED, lw=0)
-    below.plot(x / h, z / h, color="0.3", lw=0.8, gid="bed")
+    _draw_bed(below, pile)
     below.text(0.015, 0.6, "flow →", transform=below.transAxes, fontsize=6.5, color="0.35")
     below.set(xlabel=_x_label(pile), ylabel="$z/h$", ylim=(z.min() / h - 0.3, z.max() / h + 0.4))
-    below.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     for name, at in corners(line).items():
         for ax in (top, below):
-            look = {"color": "0.6", "lw": 0.6, "ls": (0, (4, 2))}
-            ax.axvline(line.x[at] / h, zorder=0, gid=name, **look)
+            ax.axvline(line.x[at] / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
         style.upright_note(top, line.x[at] / h - 0.1, name, at="top")
     top.set(xlim=(-4, line.x[-2] / h + 10), ylabel=r"$u^\star/u^\star_0$")
     top.set_title(_title(results, pile), loc="left")
@@ -225,19 +201,8 @@ def _cells(case: Path) -> Any:
 def velocity(case: Path, window: Window, shape: tuple[int, int]) -> FloatArray:
     """The velocity of a finished case on a grid of points.
 
-    Parameters
-    ----------
-    case : Path
-        Its directory.
-    window : tuple of float
-        Left, right, bottom and top of the grid, m.
-    shape : tuple of int
-        Rows and columns.
-
-    Returns
-    -------
-    ndarray, shape (rows, columns, 3)
-        m/s, rows upwards; NaN outside the mesh.
+    The grid has a shape of rows, upwards, and columns in a window (m); the result has the shape
+    (rows, columns, 3), m/s, and is NaN outside the mesh.
     """
     import pyvista  # half a second, which only a study with piles waits for
 
@@ -258,10 +223,10 @@ def over_u_e(
     pile: Pile, cases: Path, window: Window, unit: float, columns: int = 800
 ) -> FloatArray:
     """The velocity over a pile in a window, over U_e; the window is in units of `unit`, m."""
-    left, right, bottom, top = window
-    rows = round(columns * (top - bottom) / (right - left))
-    metres = left * unit, right * unit, bottom * unit, top * unit
-    return velocity(cases / pile.flow.name, metres, (rows, columns)) / pile.scene.flow.speed
+    left, right, bottom, top = (end * unit for end in window)
+    shape = round(columns * (top - bottom) / (right - left)), columns
+    field = velocity(cases / pile.flow.name, (left, right, bottom, top), shape)
+    return field / pile.scene.flow.speed
 
 
 def flow(results: Results) -> Iterator[Figure]:
@@ -285,24 +250,16 @@ def flow(results: Results) -> Iterator[Figure]:
         axes[-1].set_xlabel(_x_label(shown[-1]))
         bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
         bar.set_label(SPEED)
-        values = {
-            column: ", ".join(
-                dict.fromkeys(
-                    labels.value(column, fields.COLUMNS[column].used(pile.scene)) for pile in shown
-                )
+        models, speeds = (
+            ", ".join(
+                {labels.value(column, fields.COLUMNS[column].used(p.scene)): 0 for p in shown}
             )
             for column in ("turbulence_model", "solve_u_e_m_s")
-        }
-        text = caption(
-            "flow",
-            models=values["turbulence_model"],
-            speeds=values["solve_u_e_m_s"],
-            lid=not any(pile.scene.flow.depth for pile in shown),
         )
-        names = tuple(pile.flow.name for pile in shown)
-        yield Figure(
-            f"flow{name}", f"Flow over the pile{title}", text, names, figure, fold=bool(name)
-        )
+        lid = not any(pile.scene.flow.depth for pile in shown)
+        text = caption("flow", models=models, speeds=speeds, lid=lid)
+        names, title = tuple(pile.flow.name for pile in shown), f"Flow over the pile{title}"
+        yield Figure(f"flow{name}", title, text, names, figure, fold=bool(name))
 
 
 def _draw_bed(ax: Axes, pile: Pile) -> None:
@@ -338,10 +295,8 @@ def mesh(results: Results) -> Iterator[Figure]:
         edges = read_edges(results.cases / pile.flow.name) / pile.bed.height
         line, h = pile.model.line, pile.bed.height
         (x, z), (left, right, bottom, top) = line.crest / h, CREST
-        windows = [
-            (-2.0, line.x[-2] / h + 2.0, 0.0, 2.5),
-            (x + left, x + right, z + bottom, z + top),
-        ]
+        windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5)]
+        windows += [(x + left, x + right, z + bottom, z + top)]
         shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
         figure = style.canvas(6.4 * sum(shapes) + 0.8)
         axes = list(figure.subplots(2, 1, height_ratios=shapes))
@@ -359,12 +314,9 @@ def mesh(results: Results) -> Iterator[Figure]:
         axes[0].set_title(_title(results, pile), loc="left")
         axes[1].set_title("the crest", loc="left")
         axes[1].set_xlabel(_x_label(pile))
-        text = caption(
-            "mesh",
-            cells=pile.flow.settings.cells_per_face,
-            first=f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}",
-            lid=not pile.scene.flow.depth,
-        )
+        first = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}"
+        cells, lid = pile.flow.settings.cells_per_face, not pile.scene.flow.depth
+        text = caption("mesh", cells=cells, first=first, lid=lid)
         yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), figure, fold=True)
 
 
@@ -412,14 +364,12 @@ def _where_bed(part: SubFigure, results: Results, pile: Pile, grains: pd.DataFra
     top.set(ylabel=r"$u^\star/u^\star_0$", xlim=window)
     top.set_title(f"{shape(pile.bed)}, {_title(results, pile)}", loc="left")
 
-    x, z = np.array(line.x) / h, np.array(line.z) / h
-    low, high = z.min() - 0.2, z.max() + 2.5
+    low, high = min(line.z) / h - 0.2, max(line.z) / h + 2.5
     if pile.model.cases and is_whole(pile.flow, results.cases):
-        extent = (*window, float(z.min()), high)
+        extent = (*window, low + 0.2, high)
         speed = np.linalg.norm(over_u_e(pile, results.cases, extent, h, 500), axis=-1)
         bed.imshow(speed, origin="lower", extent=extent, vmin=0, vmax=1.1, aspect="auto")
-    bed.fill_between(x, z, low, color=style.BED, lw=0)
-    bed.plot(x, z, color="0.2", lw=0.8, gid="bed")
+    _draw_bed(bed, pile)
     bed.set(ylim=(low, high), ylabel="$z/h$")
 
     place, flow_ = grains["x_m"].to_numpy(float) / h, grains["ustar0_m_s"].to_numpy(float)
@@ -430,16 +380,14 @@ def _where_bed(part: SubFigure, results: Results, pile: Pile, grains: pd.DataFra
     dots.set_gid("thresholds")
     for at in place[~goes]:
         map_.axvline(at, color="0.75", lw=0.3, zorder=0)
-    if (there := goes & (flow_ > 0)).any():
-        first = int(np.argmin(np.where(there, flow_, np.inf)))
-        map_.plot(place[first], flow_[first], "v", ms=7, mfc="none", mec="#d55e00", gid="first")
-        text = f"first, at {flow_[first]:.3g} m/s"
-        map_.annotate(text, (place[first], flow_[first]), (0, 9), textcoords="offset points")
+    first = np.argsort(np.where(flow_ > 0, flow_, np.inf))[:1]
+    for at, value in zip(place[first], flow_[first], strict=True):
+        map_.plot(at, value, "v", ms=7, mfc="none", mec="#d55e00", gid="first")
+        text = f"first, at {value:.3g} m/s"
+        map_.annotate(text, (at, value), (0, 9), textcoords="offset points")
     map_.margins(y=0.15)
     map_.set_yscale("log")
-    map_.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    map_.yaxis.set_major_formatter("{x:g}")
-    map_.yaxis.set_minor_formatter("")
+    style.plain_ticks(map_.yaxis)
     map_.set(xlabel=_x_label(pile), ylabel=r"goes at $u^\star_0$, m/s")
 
 

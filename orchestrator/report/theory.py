@@ -1,7 +1,6 @@
 """Lines to compare thresholds with: the closed form of one grain, and published curves.
 
-In (Re*, tau) the closed form of a law is a curve that neither density, viscosity nor gravity
-changes: these only say which part of the curve the grains of a study are on.
+Density, viscosity and gravity say which part of a law's curve in (Re*, tau) the grains are on.
 """
 
 from collections.abc import Iterable
@@ -45,9 +44,9 @@ POINTS = 240
 WIDER = 10.0
 """Factor on Re* by which lines go on beyond a study's grains: axes cut them."""
 GRAIN = [
-    "d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s",
-    "rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2",
-]  # fmt: skip
+    *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
+    *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2"),
+]
 """Columns of all that the closed form depends on, in the order of `closed_form.SingleGrain`."""
 WHOLE = np.geomspace(1e-4, 1e6, 2001)
 """Re* of any grain."""
@@ -97,16 +96,9 @@ class Bed:
 
 @dataclass(frozen=True)
 class Branch:
-    """One law's line in the Shields diagram; arrays of one shape, Re* rising.
+    """One law's line in the Shields diagram: Re* (rising) and tau at the threshold.
 
-    Attributes
-    ----------
-    law : str
-        Its name.
-    reynolds, shields : ndarray
-        Re* and tau at the threshold.
-    valid, continued : ndarray of bool
-        Where the law holds; where it does not, but the study has grains.
+    ``valid`` is where the law holds, ``continued`` where it does not but the study has grains.
     """
 
     law: str
@@ -128,9 +120,8 @@ def branches(scenes: pd.DataFrame) -> list[Branch]:
             here = group[group["force_law"] == law]
             first, last = span(here) if len(here) else (np.inf, 0.0)
             valid = law_holds(law, reynolds, bed)
-            near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01)
-            tau = shields(law, reynolds, bed)
-            lines.append(Branch(law, reynolds, tau, valid, near & ~valid))
+            near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01) & ~valid
+            lines.append(Branch(law, reynolds, shields(law, reynolds, bed), valid, near))
     return lines
 
 
@@ -142,14 +133,7 @@ def bed_of(scenes: pd.DataFrame) -> Bed:
 
 def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
     """Tau of one grain on a bed whose threshold is at some Re*."""
-    return shields_at(
-        LAWS[law],
-        reynolds,
-        slope_deg=bed.slope_deg,
-        entrainment_angle_deg=bed.entrainment_angle_deg,
-        roughness_ratio=bed.roughness_ratio,
-        lift_coefficient=bed.lift_coefficient,
-    )
+    return shields_at(LAWS[law], reynolds, **vars(bed))
 
 
 def law_holds(law: str, reynolds: FloatArray, bed: Bed) -> BoolArray:
@@ -165,8 +149,8 @@ def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
     groups = split(scenes[[*GRAIN, "force_law"]], "force_law")
-    every = [item.reynolds for (law,), group in groups for item in thresholds(group, str(law))]
-    reynolds = np.array(every, float)
+    every = (thresholds(group, str(law)) for (law,), group in groups)
+    reynolds = np.array([item.reynolds for items in every for item in items], float)
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min()), float(reynolds.max())
 
@@ -184,18 +168,11 @@ def drag_law_limit(z0_over_d: float, law: str = "high") -> float:
 
 def water_band(reynolds: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest of the published curves for water at some Re*, NaN below two curves."""
-    lines = [curve.points(2000) for curve in curves.WATER]
-    table = np.array(
-        [
-            np.exp(np.interp(np.log(reynolds), np.log(x), np.log(y), left=np.nan, right=np.nan))
-            for x, y in lines
-        ]
-    )
-    there = np.isfinite(table)
-    enough = there.sum(axis=0) >= LEAST_CURVES
-    low = np.where(enough, np.where(there, table, np.inf).min(axis=0), np.nan)
-    high = np.where(enough, np.where(there, table, -np.inf).max(axis=0), np.nan)
-    return low, high
+    lines = (np.log(curve.points(2000)) for curve in curves.WATER)
+    at, outside = np.log(reynolds), {"left": np.nan, "right": np.nan}
+    table = np.exp([np.interp(at, x, y, **outside) for x, y in lines])
+    table[:, np.isfinite(table).sum(axis=0) < LEAST_CURVES] = np.nan
+    return np.fmin.reduce(table), np.fmax.reduce(table)
 
 
 def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
@@ -203,13 +180,11 @@ def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
     return scenes["rho_sol_kg_m3"] >= GAS_RATIO * scenes["rho_f_kg_m3"]
 
 
-def air_lines(
-    scenes: pd.DataFrame, slope_deg: float = 0.0
-) -> dict[str, tuple[FloatArray, FloatArray]]:
+def air_lines(scenes: pd.DataFrame, slope: float = 0.0) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Re* and theta_c of the curves for air, by name, for the grains and the gas of some scenes.
 
-    The slope's factor is on u*. Of several gases the one of the least viscosity is taken; without
-    a gas there are no lines.
+    The factor of the slope (degrees) is on u*. Of several gases the one of the least viscosity is
+    taken; without a gas there are no lines.
     """
     scenes = scenes[in_gas(scenes)]
     if scenes.empty:
@@ -218,7 +193,7 @@ def air_lines(
     air = Air(item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"])
     ends = min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max())
     d = np.geomspace(*ends, POINTS)
-    factor = curves.slope_factor_on_ustar(np.asarray(slope_deg), item["phi_deg"])
+    factor = curves.slope_factor_on_ustar(np.asarray(slope), item["phi_deg"])
     lines = {name: air.shields_diagram(d, factor * _ustar(name, air, *ends)) for name in curves.AIR}
     x, y = lines["Bagnold 1941"]
     lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]
