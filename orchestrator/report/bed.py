@@ -41,18 +41,14 @@ class Steps:
 
     Attributes
     ----------
-    pile : Pile
-        The pile.
     grains : ndarray of int, shape (n,)
         The drawn grains, as the packing numbers them.
     places : ndarray, shape (K + 1, n, 2)
         x and z, first as packed; NaN of a grain that has left the box.
     level : ndarray of int, shape (n,)
         Stop by which a grain has moved; 0 if it never does, or is not counted.
-    flow : ndarray, shape (K + 1,)
-        Undisturbed friction velocity, m/s.
-    totals : ndarray of int, shape (K + 1,)
-        How many of the counted grains, drawn or not, have moved.
+    flow, totals : ndarray, shape (K + 1,)
+        Undisturbed friction velocity, m/s; how many counted grains, drawn or not, have moved.
     lines : tuple of (int, BedLine)
         The bed lines, each with the first stop under its flow; one, on a frozen bed.
     """
@@ -89,9 +85,15 @@ def read(pile: Pile, cases: Path) -> Steps:
     counted = np.zeros(len(x), np.int64)
     counted[packing.windward] = moved.level
     if isinstance(pile.method, piles.Dem):
-        after = [_by_dem(pile, cases / run.name) for run in pile.method.runs]
-        every = np.concatenate([packing.centres[None], *after])
-        places, stops = every[:, grains], np.arange(len(every))
+        every = [packing.centres[None]]
+        for run in pile.method.runs:
+            steps, rows = read_dump(cases / run.name / motion.BED, motion.BED_COLUMNS)
+            fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
+            every.append(np.tile(fixed, (len(steps), 1, 1)))
+            ends, d = np.searchsorted(steps, rows["step"]), pile.scene.grain.diameter
+            every[-1][ends, rows["id"] - 1] = rows[["x", "z"]] / d
+        places = np.concatenate(every)[:, grains]
+        stops = np.arange(len(places))
     else:
         share = int(np.argmax(moved.moved >= FRACTION * moved.count - 1e-9))
         spaced = np.linspace(0, len(moved.flow) - 1, min(STOPS, len(moved.flow)))
@@ -107,19 +109,6 @@ def read(pile: Pile, cases: Path) -> Steps:
         gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
         places = np.where(gone[..., None], np.nan, places)
     return Steps(pile, grains, places, level, moved.flow[stops], moved.moved[stops], tuple(lines))
-
-
-def _by_dem(pile: Pile, directory: Path) -> FloatArray:
-    """The places of all grains at the end of each load step of a run, from its dump, d."""
-    packing = pile.packing
-    samples = pd.read_csv(directory / motion.SAMPLES)
-    ends = samples.groupby("load_step")["step"].last().to_numpy(np.int64)
-    _, rows = read_dump(directory / motion.BED, motion.BED_COLUMNS)
-    places = np.full((len(ends), len(packing.centres), 2), np.nan)
-    places[:] = np.where(packing.mobile[:, None], np.nan, packing.centres)
-    d = pile.scene.grain.diameter
-    places[np.searchsorted(ends, rows["step"]), rows["id"] - 1] = rows[["x", "z"]] / d
-    return places
 
 
 def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
@@ -140,10 +129,11 @@ def draw(results: Results) -> Iterator[Figure]:
     for number, (row, pile) in enumerate(chosen(results)):
         steps = read(pile, results.cases)
         shown = steps.first(FRACTION)
+        share = steps.moved(shown) / pile.packing.count
+        told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
         yield Figure(
             f"bed-alpha{pile.bed.slope_deg:g}",
-            f"The bed when {steps.moved(shown) / pile.packing.count:.0%} of its grains have moved, "
-            + ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling])),
+            f"The bed when {share:.0%} of its grains have moved, {told}",
             words(results, pile),
             tuple(item.name for item in reversed(pile.runs)),
             None,
@@ -155,27 +145,19 @@ def draw(results: Results) -> Iterator[Figure]:
 
 def words(results: Results, pile: Pile) -> str:
     """The caption: how the pile was answered, and what of it is shown."""
-    columns = ["z0_over_d", "packing", "force_law"]
+    columns, rules = ["z0_over_d", "packing", "force_law"], pile.scene.protocol
     columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
     used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
-    part, (_, right, *_) = "", window(pile)
-    if _is_level(pile):
-        part = f"Shown: {LONG:g} d of the bed." if right < pile.line.x[-2] else ""
-    elif not _is_short(pile):
-        form = " of the first form" if pile.bed.forms > 1 else ""
-        part = f"Shown: the upper end of the windward face{form}."
     return caption(
         "bed",
         width=pile.bed.width,
         by_dem=pile.by_dem,
-        criterion=labels.value(
-            "displacement_criterion", pile.scene.protocol.displacement_criterion
-        ),
-        method=pile.scene.protocol.method,
+        criterion=labels.value("displacement_criterion", rules.displacement_criterion),
+        method=rules.method,
         flow=bool(pile.model.cases),
-        update=pile.scene.protocol.update,
+        update=rules.update,
         properties=", ".join(labels.plain(c, v) for c, v in used.items() if v is not None),
-        part=part,
+        part=_view(pile)[1],
     )
 
 
@@ -222,23 +204,21 @@ def _path(line: BedLine, left: float, right: float) -> str:
 
 def window(pile: Pile) -> flows.Window:
     """Left, right, bottom and top of the picture, d: the whole pile, or the end of a long face."""
-    (x, z), toe = pile.line.crest, float(pile.line.toe[0])
-    if _is_level(pile):
-        left = pile.line.x[1] - 2
-        return left, min(pile.line.x[-2] + 2, left + LONG), -4.0, 6.0
-    if _is_short(pile):
-        return -0.06 * toe, 1.06 * toe, -2.0, float(z) + max(0.5 * z, 6.0)
-    return float(x) - 0.7 * LONG, float(x) + 0.3 * LONG, float(z) - 0.2 * LONG, float(z) + 12.0
+    return _view(pile)[0]
 
 
-def _is_level(pile: Pile) -> bool:
-    """A level bed has no crest."""
-    return float(pile.line.crest[1]) <= 0
-
-
-def _is_short(pile: Pile) -> bool:
-    """Whether single grains are seen in a picture of all forms."""
-    return float(pile.line.crest[0]) <= LONG and float(pile.line.toe[0]) <= WHOLE * LONG
+def _view(pile: Pile) -> tuple[flows.Window, str]:
+    """The window of the picture, and which part of the bed it shows, if not all."""
+    (x, z), toe = pile.line.crest.tolist(), float(pile.line.toe[0])
+    if z <= 0:  # a level bed has no crest
+        left, right = pile.line.x[1] - 2, pile.line.x[-2] + 2
+        part = f"Shown: {LONG:g} d of the bed." if left + LONG < pile.line.x[-2] else ""
+        return (left, min(right, left + LONG), -4.0, 6.0), part
+    if x <= LONG and toe <= WHOLE * LONG:
+        return (-0.06 * toe, 1.06 * toe, -2.0, z + max(0.5 * z, 6.0)), ""
+    form = " of the first form" if pile.bed.forms > 1 else ""
+    part = f"Shown: the upper end of the windward face{form}."
+    return (x - 0.7 * LONG, x + 0.3 * LONG, z - 0.2 * LONG, z + 12.0), part
 
 
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
@@ -256,21 +236,18 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
         return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
 
+    colours = _flow(pile, cases, (left, right, bottom, top)) if pile.model.cases else ""
+    edge, path = f"{-bottom:.2f}", _path(pile.line, left, right)
     return fill(
         "bed.svg.j2",
+        **{"left": left, "right": right, "top": top, "bottom": bottom, "bar": length},
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
-        left=left,
-        right=right,
-        top=top,
-        bottom=bottom,
-        ground=f"M{left:.2f} {-bottom:.2f} {_path(pile.line, left, right)} "
-        f"L{right:.2f} {-bottom:.2f}Z",
+        ground=f"M{left:.2f} {edge} {path} L{right:.2f} {edge}Z",
         line=[path for stop, path in _paths(steps) if stop <= shown][-1],
         wears=len(steps.lines) > 1,
-        flow=_flow(pile, cases, (left, right, bottom, top)) if pile.model.cases else "",
+        flow=colours,
         fixed=circles(centres, ~mobile),
         mobile=zip(circles(here, mobile), look[mobile], base[mobile], strict=True),
-        bar=length,
         size=f"{(right - left) / 75:.3g}",
         d=labels.millimetres(pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",

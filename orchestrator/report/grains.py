@@ -16,7 +16,6 @@ from orchestrator.report.shields import SHAPE, parted
 from orchestrator.report.style import Figure, Sample
 from orchestrator.study import fields
 
-CROSS = "beyond the paper"
 SHOWN = ("alpha_deg", "beta_deg", "d_m", "nu_m2_s", "force_law")
 """Columns that the axes, colours and markers of these figures tell apart, or lump on purpose."""
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
@@ -79,9 +78,6 @@ def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figur
             looks += shields.line_entries(every, dashes)
         if len(shown):
             looks += shields.point_entries(shown, variants)
-            if by != "force_law" and _beyond(shown).any():
-                label = "crossed: diameter beyond the paper’s"
-                looks.append(Line2D([], [], ls="", marker="x", color="0.2", ms=4, label=label))
         style.legends(figure, _colour_entries(every, by, colours), [*looks, *variants])
         yield _named(every, shown, by, name, figure)
 
@@ -134,18 +130,9 @@ def _panel(
         if group.empty:
             continue
         shields.draw_points(ax, group, colour, DEM)
-        crossed = group[_beyond(group)] if by != "force_law" else group[:0]
-        for filled, cross in ((True, "white"), (False, "0.4")):
-            x, y = crossed.loc[valid(crossed) == filled, list(DEM[:2])].to_numpy(float).T
-            ax.plot(x, y, "x", color=cross, ms=2.6, mew=0.8, zorder=4, gid=CROSS)
     if by == "alpha_deg":
         return published
     return [*shields.draw_water(ax), *(shields.draw_air(ax, scenes) if by == "beta_deg" else [])]
-
-
-def _beyond(points: pd.DataFrame) -> "pd.Series[bool]":
-    """Which points are of diameters that the paper does not have."""
-    return ~points["d_m"].between(*theory.SWEEP_M)
 
 
 def _colour_entries(rows: pd.DataFrame, by: str, colours: dict[float, str]) -> list[Artist]:

@@ -63,7 +63,7 @@ def test_grains_of_any_bed_do_not_overlap_and_mobile_ones_rest(name: str, patter
     _check(_covered(name, pattern))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(slope=slopes, height=heights, pattern=patterns, seed=st.integers(0, 10**6))
 def test_grains_of_a_pile_do_not_overlap_and_mobile_ones_rest(
     slope: float, height: float, pattern: Pattern, seed: int
@@ -129,22 +129,6 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
     np.testing.assert_array_equal(most, more)
 
 
-def test_level_rows_are_a_stair() -> None:
-    bed = _pile(20.0, 12.0, "horizontal")
-    steps = np.unique(np.round(bed.centres[bed.windward, 1], 6))
-    np.testing.assert_allclose(np.diff(steps), np.sin(np.radians(60)), atol=1e-6)
-
-
-@settings(max_examples=20, deadline=None)
-@given(slope=slopes, seed=st.integers(0, 10**6))
-def test_disorder_hardly_changes_how_many_are_exposed(slope: float, seed: int) -> None:
-    bed = _pile(slope, 15.0, "disordered", seed=seed)
-    assert bed.count == pytest.approx(_pile(slope, 15.0).count, abs=3)
-    again, other = (_pile(slope, 15.0, "disordered", seed=seed + n) for n in (0, 1))
-    np.testing.assert_array_equal(bed.centres, again.centres)
-    assert not np.array_equal(bed.centres, other.centres)
-
-
 @pytest.mark.parametrize("name", ["curved dune", "cosine", "gaussian", "flat", "train"])
 def test_exposed_grains_follow_the_bed_one_by_one(name: str) -> None:
     found, line = _covered(name), of_bed(bed(**BEDS[name])).scaled(1 / D)
@@ -164,16 +148,14 @@ def test_which_part_is_counted() -> None:
     x = part.centres[part.windward, 0] * D
     assert 0.02 <= x.min() <= x.max() <= 0.04
     assert _covered("apart").count == pytest.approx(3 * windward.count, abs=3)
-    with pytest.raises(UnfitError, match=r"bed.counted: no grain is counted"):
-        _covered("step down", counted="windward")
-
-
-def test_no_grain_moves_at_an_obstacle() -> None:
+    # no grain moves at an obstacle
     found = _covered("block on it")
     ((start, end),) = of_bed(bed(**BEDS["block on it"])).scaled(1 / D).bare
     x = found.centres[found.mobile, 0]
     assert not ((x > start - 1) & (x < end + 1)).any()
-    assert found.count < _covered("triangle").count
+    assert found.count < windward.count
+    with pytest.raises(UnfitError, match=r"bed.counted: no grain is counted"):
+        _covered("step down", counted="windward")
 
 
 def test_a_bed_that_bends_more_sharply_than_a_grain_is_refused() -> None:
@@ -197,10 +179,9 @@ def test_equal_grains_are_exposed_alike_by_both_rules() -> None:
 
 
 def test_a_grain_under_the_flank_of_a_larger_one_is_not_exposed() -> None:
-    along, height = np.array([0.0, 0.7, 2.0]), np.array([1.0, 0.5, 0.5])
-    radii = np.array([1.0, 0.3, 0.5])
+    along, height, radii = np.array([[0.0, 0.7, 2.0], [1.0, 0.5, 0.5], [1.0, 0.3, 0.5]])
     assert _unshadowed(along, height, radii).tolist() == [True, False, True]
-    assert _unshadowed(along, height, radii / 2).tolist() == [True, True, True]
+    assert _unshadowed(along, height, radii / 2).all()
 
 
 def test_a_grain_across_the_sides_covers_and_touches() -> None:

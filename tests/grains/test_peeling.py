@@ -121,22 +121,3 @@ def test_a_fixed_neighbour_in_front_has_to_be_climbed() -> None:
     drag = np.array([1.0, 0, 0, 0])
     assert math.isinf(_flows(centres, drag)[0])
     assert _flows(centres, drag, lift=0.25)[0] == pytest.approx(2.0)
-
-
-def test_a_gap_in_front_makes_the_climb_a_little_easier() -> None:
-    beta = math.radians(60)
-    rest = [[-0.5, -math.sin(beta)], [0.5, -math.sin(beta)]]
-    near, far = (np.array([[0, 0], [1 + gap, 0], *rest]) for gap in (0.01, 0.05))
-    drag = np.array([1.0, 0, 0, 0])
-    flows = [_flows(bed, drag, lift=0.25)[0] for bed in (near, far)]
-    assert 2.0 > flows[0] > flows[1]
-
-
-@settings(deadline=None)
-@given(scale=st.floats(0.1, 10))
-def test_flows_scale_with_the_root_of_the_force(scale: float) -> None:
-    centres, count = _row(4, 60, 20)
-    drag = np.append(np.array([1.0, 0.8, 1.3, 1.1]), np.zeros(count + 1))
-    once = _flows(centres, drag, slope_deg=20, lift=0.2)
-    scaled = _flows(centres, drag * scale**2, slope_deg=20, lift=0.2)
-    np.testing.assert_allclose(scaled[:count] * scale, once[:count], rtol=1e-9)

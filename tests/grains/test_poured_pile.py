@@ -60,22 +60,19 @@ class Done(NamedTuple):
     asked: Study
     plan: Plan
     cases: Path
+    tables: dict[str, pd.DataFrame]
 
     def pile(self, method: str) -> Pile:
         """The pile by a method."""
         piles = self.plan.piles.values()
         return next(one for one in piles if one.scene.protocol.method == method)
 
-    @property
-    def tables(self) -> dict[str, pd.DataFrame]:
-        """Its tables."""
-        return dict(tables.make(self.asked, self.plan, self.cases, list(self.plan.cases)))
-
 
 def _done(cases: Path, fields: str, methods: list[str]) -> Done:
     text = STUDY.format(fields=fields, methods=methods)
     asked = study.parse(text, name="poured", where="test")
-    return Done(asked, small_study.in_turn(asked, cases), cases)
+    planned = small_study.in_turn(asked, cases)
+    return Done(asked, planned, cases, dict(tables.make(asked, planned, cases, [*planned.cases])))
 
 
 @pytest.fixture(scope="module")

@@ -20,14 +20,6 @@ MOTION = Motion(FLOW, LEVEL, NONE, NOBODY, NONE)
 DENSITY = 1.2
 
 
-def test_a_threshold_says_what_share_of_its_grains_lift_carried_off() -> None:
-    carried = np.arange(10) < 4  # all of the first load step, two of the three of the second
-    motion = Motion(FLOW, LEVEL, NONE, carried, NONE)
-    np.testing.assert_array_equal(motion.carried_off, [0, 2, 4, 4, 4])
-    shares = [threshold.of_pile(motion, SPEED, n, DENSITY).carried_off for n in (0.1, 0.4, 0.95)]
-    np.testing.assert_allclose(shares, [1.0, 0.8, np.nan])
-
-
 def test_thresholds_of_grains_lie_between_two_holds() -> None:
     found = threshold.of_grains(MOTION)
     np.testing.assert_allclose(found.low[[0, 2, 5]], [0.9, 1.0, 1.2])
@@ -43,6 +35,10 @@ def test_curve_holds_the_mean_stress_of_what_has_moved() -> None:
 
 
 def test_threshold_of_a_pile_at_a_fraction() -> None:
+    # all of the first load step were carried off, and two of the three of the second
+    carried = Motion(FLOW, LEVEL, NONE, np.arange(10) < 4, NONE)
+    shares = [threshold.of_pile(carried, SPEED, n, DENSITY).carried_off for n in (0.1, 0.4, 0.95)]
+    np.testing.assert_allclose(shares, [1.0, 0.8, np.nan])
     # 40 % is first reached in the second hold, by five of ten
     found = threshold.of_pile(MOTION, SPEED, 0.4, DENSITY)
     assert found.ustar0 == pytest.approx(math.sqrt(1.1))
