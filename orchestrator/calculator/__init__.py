@@ -1,1 +1,56 @@
-"""The command `threshold`: closed-form thresholds of single grains, for one or for ranges."""
+"""The command `threshold`: closed-form thresholds of single grains, for one or for ranges.
+
+Here are its parameters and results, by every name that they have.
+"""
+
+from typing import NamedTuple
+
+from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
+
+
+class Parameter(NamedTuple):
+    """A number that the closed form depends on."""
+
+    field: str  # of a study file; the depth has none
+    column: str  # of the table, with the unit
+    label: str  # symbol and unit, for people
+    default: float | str | None = None
+    note: str = ""  # for the help
+
+
+MOST_POINTS = 100_000
+GAS_BELOW = 100.0
+"""Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
+PARAMETERS = {
+    "diameter": Parameter("grain.diameter", "d_m", "d, m"),
+    "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", 2500.0),
+    "fluid_density": Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", 1.0, "water: 1000"),
+    "viscosity": Parameter(
+        "fluid.viscosity", "nu_m2_s", "nu, m2/s", 1e-5, "kinematic; water: 1e-6"
+    ),
+    "slope_deg": Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", 0.0, "the flow goes up it"),
+    "entrainment_angle_deg": Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", 60.0),
+    "roughness": Parameter(
+        "bed.roughness", "z0_m", "z0, m", "d/30", 'or a part of the diameter as "d/10"'
+    ),
+    "lift_coefficient": Parameter(
+        "forces.lift_coefficient", "alpha_s", "alpha_s", LIFT_COEFFICIENT
+    ),
+    "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", GRAVITY),
+    "depth": Parameter("depth", "depth_m", "depth, m", None, "of a liquid, for its mean velocity"),
+}
+"""By keyword, which is also the name in JSON. The paper's values are the defaults."""
+GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
+"""Parameters whose ranges are spaced geometrically."""
+QUANTITIES = {
+    "ustar_m_s": ("friction_velocity", "u*, m/s"),
+    "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),
+    "wind_10m_m_s": ("wind_speed_10_m", "wind at 10 m, m/s"),
+    "mean_velocity_m_s": ("mean_velocity", "mean velocity, m/s"),
+    "stress_pa": ("stress", "stress, Pa"),
+    "shields": ("shields", "Shields"),
+    "reynolds": ("reynolds", "Re*"),
+    "drag_n": ("drag", "drag, N"),
+    "lift_n": ("lift", "lift, N"),
+}
+"""Columns of a threshold, each with its name in JSON and its symbol and unit for people."""

@@ -10,7 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator.parameters import GAS_BELOW, MOST_POINTS, PARAMETERS, QUANTITIES
+from orchestrator.calculator import (
+    GAS_BELOW,
+    GEOMETRIC,
+    MOST_POINTS,
+    PARAMETERS,
+    QUANTITIES,
+)
 from orchestrator.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +25,7 @@ if TYPE_CHECKING:
 Value = float | str
 """A number, or a part of the diameter such as ``d/30``."""
 OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
-FORM = "write FIRST:LAST:COUNT, such as 1e-4:2e-3:20"
+FORM = "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; a z0 may be d/30"
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
     "several ranges give every combination. Values of diameter, viscosity, roughness and depth "
@@ -36,18 +42,16 @@ UNITS = (
     ("gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
 )
 """Ranges in which a number is likelier in another unit, the question, and the factor to SI."""
-COHESIVE_BELOW = {"gas": 1e-4, "liquid": 6e-5}
-"""Diameter below which cohesion is no longer small against the weight, m."""
-USUAL_PA_S = {"gas": (3e-6, 1e-4), "liquid": (1e-4, 0.1)}
-"""Usual dynamic viscosities, Pa s."""
+COHESIVE_BELOW = (6e-5, 1e-4)
+"""Diameter below which cohesion is no longer small against the weight, in liquids and gases, m."""
+USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))
+"""Usual dynamic viscosities of liquids and gases, Pa s."""
 RULE = {
     "low": "Eq. 2 (low), since Re* is below 3",
     "high": "Eq. 4 (high), since Re* is not below 30",
     "transition": "both Eq. 2 (low) and Eq. 4 (high), since neither holds",
 }
 """Laws that the paper's rule picks in each regime."""
-GIVE_DEPTH = "for the mean velocity of the liquid give its depth, --depth in m"
-LAMINAR = "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
 def add(commands: Any) -> None:
@@ -57,20 +61,11 @@ def add(commands: Any) -> None:
     )
     for name, each in PARAMETERS.items():
         default = f"{each.default:g}" if isinstance(each.default, float) else each.default
-        command.add_argument(
-            OPTIONS[name],
-            dest=name,
-            default=default,
-            required=name == "diameter",
-            metavar="X",
-            help="; ".join(filter(None, (each.label, each.note, default and f"default {default}"))),
-        )
-    command.add_argument(
-        "--law",
-        default="bridged",
-        metavar="NAME",
-        help="force law of the answer; default %(default)s; paper: Eq. 2 or 4 where each holds",
-    )
+        text = "; ".join(filter(None, (each.label, each.note, default and f"default {default}")))
+        settings = {"default": default, "required": name == "diameter", "metavar": "X"}
+        command.add_argument(OPTIONS[name], dest=name, help=text, **settings)
+    text = "force law of the answer; default %(default)s; paper: Eq. 2 or 4 where each holds"
+    command.add_argument("--law", default="bridged", metavar="NAME", help=text)
     form = command.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="an object for each law by its name")
     form.add_argument("--csv", action="store_true", help="a row for each point and law")
@@ -85,10 +80,9 @@ def _run(options: argparse.Namespace) -> int:
     table.check_law(options.law, "--law")
     texts = {name: getattr(options, name) for name in PARAMETERS}
     axes = {name: values(name, text) for name, text in texts.items() if text is not None}
-    count = math.prod(map(len, axes.values()))
-    if count > MOST_POINTS:
+    if (count := math.prod(map(len, axes.values()))) > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
-        raise InputError(what, where="threshold", remedy="lower a COUNT")
+        raise InputError(what, "threshold", "lower a COUNT")
     asked = questions(axes)
     points = pd.DataFrame(itertools.product(*axes.values()), columns=list(axes))
     try:
@@ -110,64 +104,33 @@ def _run(options: argparse.Namespace) -> int:
 def values(name: str, text: str) -> list[Value]:
     """The values that a text gives to a parameter.
 
-    Parameters
-    ----------
-    name : str
-        The parameter. A roughness may be a part of the diameter.
-    text : str
-        A number, or a range ``FIRST:LAST:COUNT``, both ends included.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
+    The text is a number, or a range ``FIRST:LAST:COUNT``, both ends included; of a roughness both
+    may be parts of the diameter. An `InputError` refuses all else.
     """
     import numpy as np
 
-    option, ends = OPTIONS[name], text.split(":")
-    parts = [re.fullmatch(r"\s*d\s*/\s*(\d+(?:\.\d+)?)\s*", end) for end in ends[:2]]
-    of_diameter = name == "roughness" and all(part and float(part[1]) > 0 for part in parts)
+    ends, of_diameter = text.split(":"), name == "roughness" and "/" in text
+    if of_diameter and len(ends) == 1:
+        return [text]
+    try:
+        numbers = [1 / float(end.split("d/")[1]) if of_diameter else float(end) for end in ends[:2]]
+        count = float(ends[2]) if len(ends) == 3 else 0.0
+    except (ValueError, IndexError, ZeroDivisionError):
+        raise InputError(f"{text!r} is neither a number nor a range", OPTIONS[name], FORM) from None
     if len(ends) == 1:
-        return [text if of_diameter else _number(text, name, option)]
-    if len(ends) != 3:
-        raise InputError(f"{text!r} is not a range", where=option, remedy=FORM)
-    if of_diameter:
-        first, last = (1 / float(part[1]) for part in parts if part)
-    else:
-        first, last = (_number(end, name, option) for end in ends[:2])
-    count = _number(ends[2], name, option)
-    wrong = {
-        f"{text!r} does not end at finite numbers": not np.isfinite([first, last]).all(),
-        f"{text!r} does not rise from its first to its last value": not first < last,
-        f"{ends[2]!r} is not a count of values from 2 up": not count.is_integer() or count < 2,
-        f"{ends[2]} values are more than {MOST_POINTS}": count > MOST_POINTS,
-    }
-    if what := next((what for what, holds in wrong.items() if holds), ""):
-        raise InputError(what, where=option, remedy=FORM)
-    space = np.geomspace if PARAMETERS[name].geometric and first > 0 else np.linspace
+        return [*numbers]
+    first, last = numbers
+    if not (first < last < math.inf and 2 <= count <= MOST_POINTS and count % 1 == 0):
+        what = f"{text!r} is not a range of 2 to {MOST_POINTS} values that rise"
+        raise InputError(what, OPTIONS[name], FORM)
+    space = np.geomspace if name in GEOMETRIC and first > 0 else np.linspace
     with np.errstate(all="ignore"):  # the scene refuses values of a range wider than all floats
         spaced = space(first, last, int(count)).tolist()
     return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else spaced
 
 
-def _number(text: str, name: str, option: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        remedy = "write a number in SI units, such as 2e-4; or a range FIRST:LAST:COUNT"
-        if name == "roughness":
-            remedy = 'write metres, or a part of the diameter as "d/30"; or a range of either'
-        raise InputError(f"{text!r} is not a number", where=option, remedy=remedy) from None
-
-
 def questions(axes: Mapping[str, Sequence[Value]]) -> dict[str, str]:
-    """Questions on parameters that look like another unit, or lie beyond the model, by name.
-
-    Parameters
-    ----------
-    axes : mapping
-        The values of each parameter; the largest number among them is looked at.
-    """
+    """Questions on parameters whose largest value, or smallest diameter, looks wrong, by name."""
     numbers = {
         name: [value for value in axis if not isinstance(value, str) and math.isfinite(value)]
         for name, axis in axes.items()
@@ -178,41 +141,24 @@ def questions(axes: Mapping[str, Sequence[Value]]) -> dict[str, str]:
         for name, low, high, question, factor in UNITS
         if low <= top[name] < high
     }
-    smallest, rho = min(numbers["diameter"], default=0.0), top["fluid_density"]
-    kind = "gas" if rho < GAS_BELOW else "liquid"
-    if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[kind]:
+    smallest, rho, nu = (
+        min(numbers["diameter"], default=0.0),
+        top["fluid_density"],
+        top["viscosity"],
+    )
+    if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[rho < GAS_BELOW]:
         asked["diameter"] = (
             f"{smallest:g} m: cohesion, which the force laws leave out, holds grains this small;"
             " they need a stronger flow"
         )
-    if fluid := _fluid(rho, top["viscosity"]):
-        asked["viscosity"] = fluid
+    low, high = USUAL_PA_S[rho < GAS_BELOW]
+    of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
+    if rho > 0 and nu > 0 and (of_air or not low <= rho * nu <= high):
+        asked["viscosity"] = (
+            f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3: air has"
+            " --fluid-density 1.2 and --viscosity 1.5e-05, water 1000 and 1e-06; is it right?"
+        )
     return asked
-
-
-def _fluid(rho: float, nu: float) -> str:
-    """A fluid is told by its dynamic viscosity."""
-
-    def is_usual(rho: float, nu: float) -> bool:
-        low, high = USUAL_PA_S["gas" if rho < GAS_BELOW else "liquid"]
-        return low <= rho * nu <= high
-
-    if not (rho > 0 and nu > 0):
-        return ""
-    if is_usual(rho, nu):
-        of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
-        return f"{nu:g} m2/s is air's: did you mean water, --viscosity 1e-06?" if of_air else ""
-    units = {" Pa s": 1 / rho, " mm2/s": 1e-6, "e-5 m2/s": 1e-5, " cm2/s": 1e-4}
-    meant = [
-        f"{nu:g}{unit}, --viscosity {nu * factor:.4g}"
-        for unit, factor in units.items()
-        if is_usual(rho, nu * factor)
-    ]
-    if is_usual(rho * 1000, nu):
-        meant.insert(0, f"{rho:g} g/cm3, --fluid-density {rho * 1000:g}")
-    kind = "gas" if rho < GAS_BELOW else "liquid"
-    unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for a {kind} of {rho:g} kg/m3"
-    return f"{unusual}: did you mean {' or '.join(meant)}?" if meant else f"{unusual}: is it right?"
 
 
 def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
@@ -223,7 +169,7 @@ def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
     where = f"{place}: {options.get(field, field)}" if place else field
     about = [text for name, text in asked.items() if not place or where.endswith(OPTIONS[name])]
     advice = about if about and not place else [named(error.remedy), *about]
-    return InputError(named(error.what), where=where, remedy="; ".join(filter(None, advice)))
+    return InputError(named(error.what), where, "; ".join(filter(None, advice)))
 
 
 def as_json(table: "pd.DataFrame") -> str:
@@ -247,16 +193,11 @@ def as_json(table: "pd.DataFrame") -> str:
         }
         for point in (rows[start : start + laws] for start in range(0, len(rows), laws))
     ]
-    if len(records) == 1:
-        return json.dumps(records[0], indent=2, allow_nan=False)
-    lines = ",\n".join(json.dumps(record, allow_nan=False) for record in records)
-    return f"[\n{lines}\n]"
+    return json.dumps(records if len(records) > 1 else records[0], indent=2, allow_nan=False)
 
 
 def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
-    import pandas as pd
-
     chosen, rest = table[table["answer"]], table[~table["answer"]]
     name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
     shown = {c: label for c, (_, label) in QUANTITIES.items() if table[c].notna().any()}
@@ -268,30 +209,29 @@ def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterat
     else:
         yield f"{name}: a grain of {table['d_m'].iloc[0] * 1000:.4g} mm starts to move at"
         columns = [["", *shown.values()]]
-        columns += [[law, *map(_text, row[list(shown)])] for law, row in _by_law(chosen)]
+        columns += [[row["law"], *map(_text, row[[*shown]])] for _, row in chosen.iterrows()]
         yield from (f"  {line}" for line in _aligned(columns)[len(chosen) == 1 :])
-        for law, row in _by_law(chosen):
-            if row["why_not"]:
-                yield f"  outside the range of {law}: {row['why_not']}"
+        for law, why in zip(chosen["law"], chosen["why_not"], strict=True):
+            if why:
+                yield f"  outside the range of {law}: {why}"
         if not chosen["valid"].any():
             yield f"  laws that hold here: {', '.join(rest.loc[rest['valid'], 'law'])}"
         yield ""
-        first, rows = {"law": "force law"}, pd.concat([chosen, rest])
+        first, rows = (
+            {"law": "force law"},
+            table.sort_values("answer", ascending=False, kind="stable"),
+        )
         shown.pop("wind_1m_m_s", None)
     first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
     holds = ["holds", *(f"no: {why}" if why else "yes" for why in rows["why_not"])]
     yield from _aligned([*([label, *map(_text, rows[c])] for c, label in first.items()), holds])
     if not varied:
         yield f"\npaper's rule: {RULE[table['regime'].iloc[0]]}"
-    liquid = (table["rho_f_kg_m3"] >= GAS_BELOW) & table["mean_velocity_m_s"].isna()
-    if (liquid & table["depth_m"].isna()).any():
-        yield GIVE_DEPTH
-    if (liquid & table["depth_m"].notna() & table["valid"]).any():
-        yield LAMINAR
-
-
-def _by_law(table: "pd.DataFrame") -> Iterator[tuple[str, Any]]:
-    return ((str(row["law"]), row) for _, row in table.iterrows())
+    liquid = table[(table["rho_f_kg_m3"] >= GAS_BELOW) & table["mean_velocity_m_s"].isna()]
+    if liquid["depth_m"].isna().any():
+        yield "for the mean velocity of the liquid give its depth, --depth in m"
+    if (liquid["depth_m"].notna() & liquid["valid"]).any():
+        yield "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
 def _text(value: Value) -> str:

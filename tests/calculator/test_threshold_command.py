@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from orchestrator import cli
-from orchestrator.calculator.parameters import QUANTITIES
+from orchestrator.calculator import QUANTITIES
 from orchestrator.physics.laws import LAWS
 
 Ended = tuple[int, str, str]
@@ -85,15 +85,6 @@ def test_a_liquid_of_a_depth_has_a_mean_velocity_and_no_winds(run: Run) -> None:
     assert "no mean velocity: U D/nu is below 2000" in run(*D, "--density", "2650", *oil)[1]
 
 
-def test_gravity_goes_into_weight_and_shields_number(run: Run) -> None:
-    given = [*D, "--lift-coefficient", "0", "--viscosity", "1e-3", "--json"]
-    earth, moon = (_json(run(*given, "--gravity", g))["low"] for g in ("9.81", "1.62"))
-    # without a lift Eq. 3 is u*^2 over g
-    ratio = moon["friction_velocity"] / earth["friction_velocity"]
-    assert ratio == pytest.approx(math.sqrt(1.62 / 9.81))
-    assert moon["shields"] == pytest.approx(earth["shields"])
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_the_answer_comes_first_and_the_other_laws_beside_it(run: Run, law: str) -> None:
     code, out, err = run(*SAND_IN_AIR, "--law", law)
@@ -163,15 +154,11 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
     [
         (["--diameter", "0.2"], "0.2 m: did you mean 0.2 mm, --diameter 0.0002?"),
         (["--diameter", "0.1:2:3"], "did you mean 2 mm, --diameter 0.002?"),
-        ([*D, "--viscosity", "15"], "15 mm2/s, --viscosity 1.5e-05?"),
-        ([*D, "--viscosity", "1.5"], "1.5e-5 m2/s, --viscosity 1.5e-05?"),
-        ([*D, "--viscosity", "0.15"], "0.15 cm2/s, --viscosity 1.5e-05?"),
-        ([*D, "--viscosity", "1e-6"], "1 g/cm3, --fluid-density 1000?"),
-        ([*D, "--fluid-density", "1000"], "did you mean water, --viscosity"),
-        ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "0.001 Pa s, --viscosity 1e-06"),
+        ([*D, "--viscosity", "15"], "15 m2/s, or 15 Pa s, is unusual for 1 kg/m3: air has"),
+        ([*D, "--fluid-density", "1000"], "1e-05 m2/s, or 0.01 Pa s, is unusual"),
+        ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "water 1000 and 1e-06"),
         ([*D, "--density", "2.65"], "2.65 g/cm3, --density 2650?"),
         ([*D, "--slope", "0.26"], "0.26 rad, --slope 14.9?"),
-        ([*D, "--entrainment-angle", "1.05"], "1.05 rad, --entrainment-angle 60"),
         ([*D, "--gravity", "981"], "981 cm/s2, --gravity 9.81?"),
         ([*D, "--lift-coefficient", "6.46"], "--lift-coefficient 1.615?"),
         (["--diameter", "1e-6"], "1e-06 m: cohesion, which the force laws leave out, holds"),
@@ -208,19 +195,15 @@ def test_usual_numbers_raise_no_question(run: Run, arguments: list[str]) -> None
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--diameter", "1:"], ["--diameter: '1:' is not a range", "FIRST:LAST:COUNT"]),
-        (["--diameter", "a:b:c"], ["--diameter: 'a' is not a number"]),
-        (["--diameter", "1:2:c"], ["--diameter: 'c' is not a number"]),
+        (["--diameter", "a:b:c"], ["--diameter: 'a:b:c' is neither a number nor a range"]),
+        (["--diameter", "1:2"], ["--diameter: '1:2' is not a range"]),
         *(
-            (["--diameter", f"1:2:{count}"], [f"--diameter: '{count}' is not a count"])
-            for count in ("0", "1", "2.5", "inf")
+            (["--diameter", text], [f"--diameter: '{text}' is not a range"])
+            for text in ("1:2:1", "1:2:2.5", "1:2:inf", "2e-3:1e-4:5", "1e-4:inf:5", "1:2:1e9")
         ),
-        (["--diameter", "1:2:1e9"], ["--diameter: 1e9 values are more than 100000"]),
-        (["--diameter", "2e-3:1e-4:5"], ["--diameter", "does not rise"]),
-        (["--diameter", "1e-4:inf:5"], ["--diameter", "finite"]),
         (["--diameter", "-1e-4:1e-3:5"], ["--diameter: -0.0001", "greater than or equal"]),
-        ([*D, "--roughness", "d/10:d/30:3"], ["--roughness", "does not rise"]),
-        ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30'"]),
+        ([*D, "--roughness", "d/10:d/30:3"], ["--roughness", "values that rise"]),
+        ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30:1e-4:3' is neither"]),
         ([*D, "--slope", "0:31:5"], ["--slope: 31 deg"]),
         (["--diameter", "1e-4:1e-3:400", "--slope", "0:30:400"], ["160000 points", "COUNT"]),
         ([*D, "--density", "2.65", *WATER], ["--density 2650?"]),
@@ -229,7 +212,6 @@ def test_usual_numbers_raise_no_question(run: Run, arguments: list[str]) -> None
         ([*D, "--depth", "1"], ["--depth", "gas", "--fluid-density"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
         ([*QUARTZ_IN_WATER, "--depth", "nan"], ["--depth", "nan m"]),
-        ([*QUARTZ_IN_WATER, "--depth", "1e300"], ["--depth", "deeper than any liquid"]),
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
         ([*D, "--csv", "--json"], ["--json", "not allowed with"]),
