@@ -108,3 +108,25 @@ def finished_pile(shared: Shared) -> Path:
     """The directory of a finished study, undisturbed: a pile, its flow, two single grains."""
     with shared("pile") as folder:
         return bench.undisturbed(folder, bench.HEAD + bench.CELLS + bench.PILE)
+
+
+Mount = Callable[[str], Path]
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Mount]:
+    """Mount a file system of its own with some options, or mount it anew with others."""
+    folder = tmp_path / "disk"
+
+    def mount(options: str) -> Path:
+        again = "remount," if folder.exists() else ""
+        folder.mkdir(exist_ok=True)
+        command = ["mount", "-t", "tmpfs", "-o", again + options, "tmpfs", str(folder)]
+        if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode:
+            folder.rmdir()
+            pytest.skip("a file system can be mounted by root alone")
+        return folder
+
+    yield mount
+    if folder.exists():
+        subprocess.run(["umount", "-l", str(folder)], check=True)

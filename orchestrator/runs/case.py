@@ -5,11 +5,11 @@ import os
 import re
 import stat
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from hashlib import sha256
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.errors import OrchestratorError, SolverError
@@ -151,11 +151,8 @@ def prepare(case: Case, cases: Path) -> Path:
 
     def is_ours(name: str) -> bool:
         if isinstance(inputs, dict) and name in inputs and not _fits(name, case.made):
-            with contextlib.suppress(OSError):
-                return bool(inputs[name] == files.digest_file(old / name))
-            return False
-        path = PurePosixPath(name)
-        final = path.with_name(re.sub(r"^\.(.+)\.tmp$", r"\1", path.name)).as_posix()
+            return bool(inputs[name] == files.digest_file(old / name))
+        final = re.sub(r"(^|/)\.([^/]+)\.tmp$", r"\1\2", name)
         return final in names or _fits(final, patterns)
 
     directory = Folder(cases.parent).clear(f"{cases.name}/{case.name}", is_ours)
@@ -277,9 +274,9 @@ def prune(case: Case, cases: Path) -> None:
             write_json(directory / DONE, {**state, "bytes": size_without_marker})
 
 
-def size(directory: Path, state: Mapping[str, Any]) -> int:
-    """Bytes on disk of the case in a directory, whose marker has its size at its end."""
-    size = state.get("bytes")
+def size(directory: Path, state: Any) -> int:
+    """Bytes on disk of the case in a directory; its marker, if it is one, has those at its end."""
+    size = state.get("bytes") if isinstance(state, dict) else None
     return size + files.size_of(directory / DONE) if type(size) is int else files.size_of(directory)
 
 
@@ -289,7 +286,7 @@ def names_in(cases: Path) -> list[str]:
 
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
-    """The programs, with versions, that some of the cases in a directory were made with."""
+    """The programs, with versions, that some of the cases were made with."""
     identities = (read_json(cases / name / IDENTITY) for name in sorted(names))
     given = (each.get("programs", {}) for each in identities if isinstance(each, dict))
     return {program: version for versions in given for program, version in versions.items()}

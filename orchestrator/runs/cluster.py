@@ -46,15 +46,9 @@ class Queue:
 def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     """Jobs of a queue, for as long as the block runs; a job that is lost is asked for again.
 
-    The parameters are those of `engine.local`. All machines see the directory of the cases. There
-    are as many jobs as it takes to run so many solvers at a time.
-
-    Raises
-    ------
-    InputError
-        If a setting is missing or wrong.
-    OrchestratorError
-        If the queue does not take the jobs.
+    The parameters are those of `engine.local`. There are as many jobs as it takes to run so many
+    solvers at a time. Wrong settings are an InputError, and jobs that the queue does not take an
+    OrchestratorError.
     """
     try:
         libraries: list[Any] = [*map(import_module, ("dask", "dask_jobqueue", "distributed"))]

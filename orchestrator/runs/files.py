@@ -45,7 +45,7 @@ def digest_file(path: Path) -> str:
 
 
 def digest_files(paths: Iterable[Path], *, root: Path) -> dict[str, str]:
-    """Digest of each file, keyed by its path relative to `root`."""
+    """SHA-256 of each file, by its path relative to `root`."""
     return {path.relative_to(root).as_posix(): digest_file(path) for path in sorted(paths)}
 
 
@@ -73,10 +73,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def write_durably(path: Path, content: str | bytes) -> None:
-    """Replace a file as one step: a reader, or a crash, sees the old or the new content whole.
-
-    An empty directory in its place is removed. An OSError names the file.
-    """
+    """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
     temporary = path.with_name(f".{path.name}.tmp")
     try:
         temporary.unlink(missing_ok=True)
@@ -110,9 +107,8 @@ class Folder:
     """A directory that this program writes: the one way for files to get into it and out of it.
 
     Only files that this program wrote are replaced or removed. Anything else that stands in their
-    place is moved to `KEPT` with a warning, and no link is followed. Names are relative to `root`,
-    which may itself be reached through a link. All methods raise InputError where a link stands in
-    the way, naming it.
+    place is moved to `KEPT` with a warning. Names are relative to `root`. A link in the way raises
+    InputError; `root` itself may be one.
     """
 
     def __init__(self, root: Path) -> None:
@@ -163,8 +159,7 @@ class Folder:
         """Put all files anew within the block, except for `but`; files not put again are removed.
 
         Where places are named, only files of these names and in these sub-directories count. A
-        file that has changed since it was put stays. If the block ends with an exception, nothing
-        is removed.
+        file that has changed since stays, and so do all where the block ends with an exception.
         """
         before = self._listed()
         yield
@@ -199,10 +194,7 @@ class Folder:
         return data
 
     def _place(self, name: str, *, is_ours: bool = False) -> Path:
-        """The path of a name, with its directory made and anything of others moved away.
-
-        A file of that name stays if it is this program's: it was put, or `is_ours`.
-        """
+        """The path of a name, with its directory made; what is not this program's is moved away."""
         path = self.path(name)
         for folder in reversed(path.relative_to(self.root).parents[:-1]):
             if os.path.lexists(self.root / folder) and not (self.root / folder).is_dir():

@@ -30,8 +30,8 @@ class Display:
             TextColumn("{task.percentage:.0f}% of the work, {task.fields[left]}"),
             console=self._console,
         )
-        left = self._time_left()
-        self._task = self._bar.add_task("", total=1.0, ended=0, count=forecast.count, left=left)
+        self._task = self._bar.add_task("", total=1.0, ended=0, count=forecast.count, left="")
+        self._show()
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
@@ -39,19 +39,20 @@ class Display:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if sys.stderr.isatty():
+        if self._bar.live.is_started:
             self._bar.stop()
 
     def __call__(self, outcome: Outcome) -> None:
         """Take note of a case that has ended."""
         self._ended += 1
         self._forecast.ended(outcome)
-        self._console.print(
-            f"[{self._ended}/{self._forecast.count}] {'failed' if outcome.error else 'done'}  "
-            f"{outcome.case.name}  {self._forecast.done:.0%} of the work, {self._time_left()}",
-            *([f"\n  {outcome.error}"] if outcome.error else []),
+        place, word = (
+            f"[{self._ended}/{self._forecast.count}]",
+            "failed" if outcome.error else "done",
         )
-        self._show()
+        self._console.print(f"{place} {word}  {outcome.case.name}  {self._show()}")
+        if outcome.error:
+            self._console.print(f"  {outcome.error}")
 
     def watch(self, running: Collection[Case]) -> None:
         """Look how far the running cases are, once a second, for the bar of a terminal."""
@@ -60,12 +61,11 @@ class Display:
             self._forecast.going((case, case.share(self._cases / case.name)) for case in running)
             self._show()
 
-    def _show(self) -> None:
-        done, left = self._forecast.done, self._time_left()
+    def _show(self) -> str:
+        """Show on the bar how far the study is; the same in words."""
+        done, left = self._forecast.done, f"about {human(self._forecast.left_s())} left"
         self._bar.update(self._task, completed=done, ended=self._ended, left=left)
-
-    def _time_left(self) -> str:
-        return f"about {human(self._forecast.left_s())} left"
+        return f"{done:.0%} of the work, {left}"
 
 
 class Forecast:

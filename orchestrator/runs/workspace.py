@@ -23,7 +23,7 @@ LOCK = ".lock"
 WAIT_S = 1.0
 """Time to wait for a lock that a dying process may still hold, s."""
 NAMED = 5
-"""Number of cases that are listed by name where an earlier study file asked for them."""
+"""Cases of an earlier study file that are listed by name."""
 
 
 class Kind(NamedTuple):
@@ -174,37 +174,31 @@ class Workspace(Folder):
     def check_cases_of_tables(self, done: Container[str]) -> None:
         """Refuse (OrchestratorError) to replace tables whose cases are not all done."""
         table = self.root / "timings" / "timings.csv"
-        if not table.is_file():
-            return
-        with table.open(encoding="utf-8", errors="replace", newline="") as stream:
-            names = [row.get("case", "") for row in csv.DictReader(stream)]
+        text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
+        names = [row.get("case", "") for row in csv.DictReader(text.splitlines())]
         if lost := [name for name in names if name not in done]:
-            raise OrchestratorError(
-                f"{len(lost)} of the {len(names)} cases that the tables were made of are not here "
-                f"as this version makes them, {lost[0]} for one: the tables stay as they are",
-                str(self.root),
-                "`orchestrator study` runs them again; to draw the others, first move tables and "
-                "timings elsewhere",
-            )
+            share = f"{len(lost)} of the {len(names)} cases that the tables were made of"
+            missing = f"{share} are not here as this version makes them, {lost[0]} for one"
+            remedy = "`orchestrator study` runs them again; to draw the others, move tables away"
+            what = f"{missing}: the tables stay as they are"
+            raise OrchestratorError(what, str(self.root), remedy)
 
 
 def status(directory: Path) -> tuple[str, bool]:
     """How far a study came, for people, and whether a case has failed; from its directory alone."""
     space = Workspace(directory.absolute())
     about, is_running = space.description(), space.is_held()
-    there = {name: read_json(space.cases / name / DONE) for name in names_in(space.cases)}
-    asked = {name: there[name] for name in about["cases"] if name in there}
-    causes = {name: failure(space.cases / name) for name in asked if not asked[name]}
+    asked = [name for name in about["cases"] if (space.cases / name).is_dir()]
+    states = {name: read_json(space.cases / name / DONE) for name in asked}
+    causes = {name: failure(space.cases / name) for name in asked if not states[name]}
     failed = [f"  failed: {name}: {cause}" for name, cause in causes.items() if cause is not None]
     begun = [name for name, cause in causes.items() if cause is None]
-    word = "running" if is_running else "unfinished"
+    word, (sizes, *left) = "running" if is_running else "unfinished", _sizes(space)
     lines = [
         f"study {about['name']}: {len(asked) - len(causes)} done, {len(begun)} {word}, "
         f"{len(about['cases']) - len(asked)} not begun, {len(failed)} failed",
         *(f"  {word}: {name}" for name in begun),
-        *failed,
-        f"size: {_sizes(space)}",
-        *_left_lines(space),
+        *(*failed, f"size: {sizes}", *left),
     ]
     if space.drawn.is_file() and space.page.is_file():
         lines.append(f"page: {space.page}")
@@ -215,67 +209,46 @@ def status(directory: Path) -> tuple[str, bool]:
 
 
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
-    """Drop the bulky files of finished cases, but for those that a page shows.
+    """Drop the bulky files of the finished cases, but for those that the page shows, by name.
 
     The inputs, and all that tables and page are made of, stay: ``./Allrun`` in a case makes the
-    dropped files anew, and compares them with the digests of the first run.
-
-    Parameters
-    ----------
-    space : Workspace
-        Workspace of the study; held.
-    done : mapping of str to Case
-        The finished cases by name.
-    shown : container of str
-        Names of those that the page's pictures are drawn from.
-
-    Returns
-    -------
-    str
-        Summary for people, with the sizes before and after.
+    dropped files anew, and compares them with the digests of the first run. The workspace is held
+    by the caller, who gets a summary for people.
     """
-    before, pruned = _sizes(space), [case for name, case in done.items() if name not in shown]
+    before, *_ = _sizes(space)
+    pruned = [case for name, case in done.items() if name not in shown]
     for case in pruned:
         case_states.prune(case, space.cases)
+    after, *left = _sizes(space)
     whole = ", ".join(name for name in done if name in shown)
-    lines = (
+    lines = [
         f"before: {before}",
-        f"after:  {_sizes(space)}",
+        f"after:  {after}",
         f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew",
-        *([f"whole, for the pictures of the page: {whole}"] if whole else []),
-        *_left_lines(space),
-    )
-    return "\n".join(lines)
+    ]
+    return "\n".join([*lines, f"whole, for the pictures of the page: {whole or 'none'}", *left])
 
 
-def _bytes_of(space: Workspace, name: str) -> int:
-    state = read_json(space.cases / name / DONE)
-    return size(space.cases / name, state if isinstance(state, dict) else {})
+def _sizes(space: Workspace) -> list[str]:
+    """Bytes on disk, for people: by kind of case and of the rest, the largest first.
 
-
-def _left_lines(space: Workspace) -> list[str]:
-    """The cases that an earlier study file asked for, for people, with their size."""
-    left = space.left(space.description()["cases"])
-    if not left:
-        return []
-    total = _human(sum(_bytes_of(space, name) for name in left))
-    named = ", ".join(left[:NAMED]) + (", ..." if len(left) > NAMED else "")
-    what = f"{len(left)} cases of an earlier study file, {total}: {named}"
-    return [f"not asked for: {what}; they stay until you remove them"]
-
-
-def _sizes(space: Workspace) -> str:
-    """Bytes on disk for people: the total, then cases by kind and the rest, the largest first.
-
-    The size of a finished case is that at its end, or after it was pruned.
+    The size of a finished case is that at its end, or after it was pruned. A second line has the
+    cases that an earlier study file asked for, if any.
     """
-    sizes: Counter[str] = Counter()
-    for name in names_in(space.cases):
-        sizes[f"{name.partition('-')[0]} cases"] += _bytes_of(space, name)
+    states = {name: read_json(space.cases / name / DONE) for name in names_in(space.cases)}
+    cases = {name: size(space.cases / name, state) for name, state in states.items()}
+    kinds: Counter[str] = Counter()
+    for name, count in cases.items():
+        kinds[f"{name.partition('-')[0]} cases"] += count
     beside = (path for path in space.root.iterdir() if path != space.cases)
-    sizes["tables, figures and page"] = sum(map(size_of, beside))
-    named = ", ".join(f"{_human(size)} {name}" for name, size in sizes.most_common() if size)
-    return f"{_human(sizes.total())} ({named})"
+    kinds["tables, figures and page"] = sum(map(size_of, beside))
+    named = ", ".join(f"{_human(count)} {kind}" for kind, count in kinds.most_common() if count)
+    lines = [f"{_human(kinds.total())} ({named})"]
+    if left := space.left(space.description()["cases"]):
+        total, names = _human(sum(cases[name] for name in left)), ", ".join(left[:NAMED])
+        what = f"{len(left)} cases of an earlier study file, {total}, such as {names}"
+        lines.append(f"not asked for: {what}; they stay until you remove them")
+    return lines
 
 
 def _human(size: float) -> str:

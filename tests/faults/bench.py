@@ -12,6 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 HEAD = """
 time_limit = 300
 [protocol]
@@ -41,26 +42,11 @@ Driver = subprocess.Popen[str]
 
 @dataclass(frozen=True)
 class Bench:
-    """A directory with one study file, and the tables of its undisturbed run.
-
-    Attributes
-    ----------
-    folder : Path
-        Where the file `small.toml` is, and where the study goes, in `out`.
-    undisturbed : Path
-        The directory of the undisturbed run.
-    drivers : list of subprocess.Popen
-        All that were started.
-    """
+    """A directory with one study file, and the directory of its undisturbed run."""
 
     folder: Path
     undisturbed: Path
     drivers: list[Driver] = field(default_factory=list)
-
-    @property
-    def environment(self) -> dict[str, str]:
-        """In which this package is found."""
-        return {**os.environ, "PYTHONPATH": str(ROOT)}
 
     @property
     def source(self) -> Path:
@@ -78,7 +64,7 @@ class Bench:
         driver = subprocess.Popen(
             [*under, *ORCHESTRATOR, "study", "small.toml", "--out", str(self.out)],
             cwd=self.folder,
-            env={**self.environment, "PATH": os.pathsep.join(paths)},
+            env={**ENVIRONMENT, "PATH": os.pathsep.join(paths)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -74,37 +74,27 @@ def _heals(bench: Bench, command: Command) -> None:
     assert "no solver was started" in command("study", bench)[1]
 
 
-def _is_done(bench: Bench) -> bool:
-    (run,) = plan.make(study.load(str(bench.source))).cells
-    return case.done_state(run, bench.out / "cases") is not None
-
-
 @pytest.mark.parametrize("how", HARMS)
-def test_harmed_files_of_the_study(finished: Bench, how: str, command: Command) -> None:
-    (finished.out / ".lock").write_text("process 1 on elsewhere\n")
-    for name in OF_A_STUDY:
-        HARMS[how](finished.out / name)
-    _heals(finished, command)
-
-
-@pytest.mark.parametrize("how", HARMS)
-def test_harmed_files_of_a_case(finished: Bench, how: str, command: Command) -> None:
-    """Each is noticed by itself, and all of them are healed together."""
+def test_harmed_files_are_noticed_and_healed(finished: Bench, how: str, command: Command) -> None:
     (directory,) = case_of(finished.out, "cells")
-    paths = [directory / name for name in OF_CELLS]
-    for path in paths:
+    (run,) = plan.make(study.load(str(finished.source))).cells
+    (finished.out / ".lock").write_text("process 1 on elsewhere\n")
+    for path in (directory / name for name in OF_CELLS):
         whole = path.read_bytes()
         HARMS[how](path)
         # a large file that no table needs may be missing, as after `prune`
-        assert _is_done(finished) == (how == "removed" and path.suffix == ".dump"), path.name
+        is_pruned = how == "removed" and path.suffix == ".dump"
+        assert bool(case.done_state(run, directory.parent)) == is_pruned, path.name
         if path.is_dir():
             path.rmdir()
         path.write_bytes(whole)
-        assert _is_done(finished)
-    for path in paths:
-        HARMS[how](path)
+        assert case.done_state(run, directory.parent)
     case.fail(directory, SolverError("for this test"))
-    HARMS[how](directory / case.FAILED)
+    for path in (
+        *(finished.out / name for name in OF_A_STUDY),
+        *(directory / name for name in (*OF_CELLS, case.FAILED)),
+    ):
+        HARMS[how](path)
     _heals(finished, command)
 
 
@@ -226,22 +216,6 @@ def test_other_things_in_our_places_are_kept(finished: Bench, command: Command, 
     assert not (finished.out / f"{KEPT}-2").exists()
 
 
-def test_second_names_of_our_files_keep_their_content(
-    finished: Bench, outside: Path, command: Command
-) -> None:
-    """A copy by hard links, as some programs for backups make it."""
-    (finished.out / ".lock").unlink()
-    shutil.copytree(finished.out, outside / "backup", copy_function=os.link)
-    before = _contents(outside)
-    for word in ("study", "report", "prune", "study"):
-        assert command(word, finished)[0] == 0
-        assert _contents(outside) == before
-        for path in finished.out.glob("cases/*/done.json"):
-            if word == "prune":
-                path.unlink()
-    assert not (finished.out / KEPT).exists()
-
-
 @pytest.mark.parametrize("place", ["figures/*.svg", "timings/*.csv"])
 @pytest.mark.parametrize("content", [None, b"my own words"])
 def test_lost_drawings_are_drawn_again(
@@ -259,26 +233,6 @@ def test_lost_drawings_are_drawn_again(
     state = (finished.out / "report.json").stat().st_mtime_ns
     assert "no solver was started" in command("study", finished)[1]
     assert (finished.out / "report.json").stat().st_mtime_ns == state
-
-
-def test_a_directory_of_another_thing_is_refused(
-    finished: Bench, capsys: pytest.CaptureFixture[str]
-) -> None:
-    other = finished.folder / "other.toml"
-    shutil.copy(finished.source, other)
-    before = _contents(finished.out)
-    for words, kind in (
-        (["study", str(other), "--out"], "the study other"),
-        (["stability", "--out"], "the experiment stability"),
-        (["benchmark", "export", "--level", "1"], "the benchmark pack "),
-    ):
-        if words[0] == "benchmark":
-            assert cli.main(["benchmark", "export", str(finished.out), "--level", "1"]) == 2
-        else:
-            assert cli.main([*words, str(finished.out)]) == 2
-        message = f"{finished.out}: the directory holds the study small, not {kind}"
-        assert message in capsys.readouterr().err
-        assert _contents(finished.out) == before
 
 
 def test_cases_of_an_earlier_file_are_named_and_kept(finished: Bench, command: Command) -> None:

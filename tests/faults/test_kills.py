@@ -13,6 +13,7 @@ import pytest
 
 from orchestrator.runs import process
 from tests.faults.bench import (
+    ENVIRONMENT,
     ORCHESTRATOR,
     Bench,
     Driver,
@@ -134,7 +135,7 @@ def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
     driver = subprocess.Popen(
         ["setsid", "--ctty", *under, *ORCHESTRATOR, "study", "small.toml", "--out", "out"],
         cwd=pile.folder,
-        env=pile.environment,
+        env=ENVIRONMENT,
         stdin=slave,
         stdout=slave,
         stderr=slave,

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import Mount
 from tests.faults.bench import (
+    ENVIRONMENT,
     ORCHESTRATOR,
     Bench,
     case_of,
@@ -18,7 +20,6 @@ from tests.faults.bench import (
     wait_for,
     wrapper,
 )
-from tests.faults.conftest import Mount
 
 
 @pytest.mark.parametrize("size", ["16k", "300k", "900k"])
@@ -141,7 +142,7 @@ def test_a_study_ends_well_whatever_its_streams(cells: Bench, redirection: str) 
     shell = subprocess.run(
         ["bash", "-o", "pipefail", "-c", driver],
         cwd=cells.folder,
-        env=cells.environment | {"PYTHONIOENCODING": "ascii:strict"},
+        env=ENVIRONMENT | {"PYTHONIOENCODING": "ascii:strict"},
         capture_output=True,
         text=True,
     )
@@ -156,4 +157,4 @@ def test_a_failed_case_is_told_by_the_exit_code_alone(cells: Bench) -> None:
     liggghts.chmod(0o755)
     driver = f"PATH=$PWD:$PATH '{ORCHESTRATOR[0]}' -m orchestrator study small.toml --out out"
     command = ["bash", "-c", f"{driver} >/dev/full 2>&-"]
-    assert subprocess.run(command, cwd=cells.folder, env=cells.environment).returncode == 3
+    assert subprocess.run(command, cwd=cells.folder, env=ENVIRONMENT).returncode == 3

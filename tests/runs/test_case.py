@@ -1,4 +1,4 @@
-"""Case directories: identity, and state that is never trusted half-written."""
+"""Case directories and directories of results: identity, files of this program and of others."""
 
 import json
 import os
@@ -9,8 +9,12 @@ from typing import Any, ClassVar
 
 import pytest
 
-from orchestrator.runs import case
+from orchestrator.errors import InputError
+from orchestrator.runs import case, workspace
 from orchestrator.runs.case import Case, templates
+from orchestrator.runs.files import KEPT, RECORD, Folder
+
+MINE = pytest.mark.filterwarnings("ignore:.*not what this program wrote")
 
 
 @dataclass(frozen=True)
@@ -23,14 +27,11 @@ class Tiny(Case):
     recipe: ClassVar[int] = 1
     results: ClassVar[tuple[str, ...]] = ("result.txt",)
     made: ClassVar[tuple[str, ...]] = ("input.txt",)
+    cost_s: ClassVar[float] = 1.0
 
     @property
     def parameters(self) -> dict[str, Any]:
         return {"size": self.size}
-
-    @property
-    def cost_s(self) -> float:
-        return 1.0
 
     def write(self, directory: Path, cases: Path) -> None:
         (directory / "input.txt").write_text(str(self.size))
@@ -42,49 +43,157 @@ class Tiny(Case):
         return {"none": "0"}
 
 
-@pytest.fixture
-def finished(tmp_path: Path) -> tuple[Tiny, Path]:
+def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(tmp_path: Path) -> None:
     tiny = Tiny(1.0)
+    assert tiny.id == Tiny(1.0).id != Tiny(2.0).id
     directory = case.prepare(tiny, tmp_path)
-    (directory / "result.txt").write_text("42\n")
-    case.finish(tiny, directory, solver_s=1.0, cpu_s=1.0, wall_s=1.5)
-    return tiny, tmp_path
-
-
-def test_the_id_is_that_of_parameters_and_template() -> None:
-    assert Tiny(1.0).id == Tiny(1.0).id != Tiny(2.0).id
-    assert Tiny(1.0).name == f"tiny-{Tiny(1.0).id[:12]}"
-
-
-def test_a_prepared_case_is_a_copy_of_its_template_with_inputs(tmp_path: Path) -> None:
-    directory = case.prepare(Tiny(1.0), tmp_path)
+    assert directory.name == tiny.name == f"tiny-{tiny.id[:12]}"
     for path in (templates() / "liggghts/checks").iterdir():
         assert (directory / path.name).read_bytes() == path.read_bytes()
     identity = json.loads((directory / case.IDENTITY).read_text())
     assert identity["parameters"] == {"size": 1.0}
     assert "input.txt" in identity["inputs_sha256"]
-    assert not case.done_state(Tiny(1.0), tmp_path)
-
-
-def test_a_finished_case_is_done_and_its_checksums_hold(finished: tuple[Tiny, Path]) -> None:
-    tiny, cases = finished
-    assert case.done_state(tiny, cases)
-    subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=cases / tiny.name, check=True)
-
-
-def test_a_file_is_read_again_only_if_its_time_or_size_has_changed(
-    finished: tuple[Tiny, Path],
-) -> None:
-    tiny, cases = finished
-    result = cases / tiny.name / "result.txt"
-    before = result.stat()
-    os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns + 1, before.st_mtime_ns + 1))
-    result.write_text("24\n")
-    assert not case.done_state(tiny, cases)
-    os.utime(result, ns=(before.st_mtime_ns, before.st_mtime_ns))
-    assert case.done_state(tiny, cases)
-    # as old as the marker: it may have been changed after it in the same tick of the clock
-    os.utime(cases / tiny.name / case.DONE, ns=(before.st_mtime_ns, before.st_mtime_ns))
-    assert not case.done_state(tiny, cases)
+    assert not case.done_state(tiny, tmp_path)
+    result, marker = directory / "result.txt", directory / case.DONE
     result.write_text("42\n")
-    assert case.done_state(tiny, cases)
+    case.finish(tiny, directory, solver_s=1.0, cpu_s=1.0, wall_s=1.5)
+    assert case.done_state(tiny, tmp_path)
+    subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=directory, check=True)
+    # it is read again only if its time or size has changed
+    then = result.stat().st_mtime_ns
+    os.utime(marker, ns=(then + 1, then + 1))
+    result.write_text("24\n")
+    assert not case.done_state(tiny, tmp_path)
+    os.utime(result, ns=(then, then))
+    assert case.done_state(tiny, tmp_path)
+    # as old as the marker: it may have been changed after it in the same tick of the clock
+    os.utime(marker, ns=(then, then))
+    assert not case.done_state(tiny, tmp_path)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    (tmp_path / "out").mkdir()
+    return Folder(tmp_path / "out")
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    path = tmp_path / "outside"
+    path.mkdir()
+    (path / "a.csv").write_text("precious")
+    return path
+
+
+def test_only_files_that_were_put_are_replaced_or_removed(folder: Folder) -> None:
+    for name in ("tables/a.csv", "tables/b.csv", "tables/c.csv", "figures/a.png"):
+        folder.put(name, "one")
+    (folder.root / "tables" / "c.csv").write_text("changed")
+    (folder.root / "tables" / "mine.csv").write_text("mine")
+    with folder.renewed("tables"):
+        folder.put("tables/a.csv", "two")
+    tables = {path.name: path.read_text() for path in (folder.root / "tables").iterdir()}
+    assert tables == {"a.csv": "two", "c.csv": "changed", "mine.csv": "mine"}
+    assert set(folder.written()) == {"tables/a.csv", "figures/a.png"}
+    with pytest.raises(ValueError, match="for this test"), folder.renewed():
+        raise ValueError("for this test")
+    assert folder.is_whole()
+    assert not (folder.root / KEPT).exists()
+
+
+@pytest.mark.parametrize("name", ["a.csv", "tables/a.csv"])
+def test_what_others_wrote_is_kept_aside_and_named(folder: Folder, name: str) -> None:
+    for count, place in enumerate((KEPT, f"{KEPT}-2")):
+        path = folder.root / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"mine {count}")
+        with pytest.warns(UserWarning, match=name):
+            folder.put(name, "ours")
+        assert path.read_text() == "ours"
+        assert (folder.root / place / name).read_text() == f"mine {count}"
+
+
+@MINE
+def test_directories_in_the_place_of_files_and_the_reverse_are_kept(folder: Folder) -> None:
+    for name in ("full", "empty"):
+        (folder.root / name).mkdir()
+    (folder.root / "full" / "notes.txt").write_text("mine")
+    (folder.root / "tables").write_text("a file where a directory goes")
+    for name in ("full", "empty", "tables/a.csv"):
+        folder.put(name, "ours")
+        assert (folder.root / name).read_text() == "ours"
+    kept = folder.root / KEPT
+    assert {path.name for path in kept.iterdir()} == {"full", "tables"}
+    assert (kept / "full" / "notes.txt").read_text() == "mine"
+    # where that file is now, no directory can be
+    (folder.root / "tables" / "a.csv").write_text("mine")
+    folder.put("tables/a.csv", "ours")
+    assert (folder.root / f"{KEPT}-2" / "tables" / "a.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("link", ["tables", "tables/a.csv", KEPT, RECORD])
+def test_no_link_is_followed(folder: Folder, outside: Path, link: str) -> None:
+    path = folder.root / link
+    (folder.root / "tables").mkdir()
+    if path.is_dir():
+        path.rmdir()
+    path.symlink_to(outside if path.suffix not in (".csv", ".sha256") else outside / "a.csv")
+    if link == KEPT:
+        (folder.root / "tables" / "a.csv").write_text("mine")
+    with pytest.raises(InputError, match="link") as caught:
+        folder.put("tables/a.csv", "ours")
+    assert str(path) in str(caught.value)
+    assert path.is_symlink()
+    assert {one.name: one.read_text() for one in outside.iterdir()} == {"a.csv": "precious"}
+
+
+@pytest.mark.parametrize("name", ["../a.csv", "/a.csv", "tables/../../a.csv", "..", "."])
+def test_no_name_leads_out(folder: Folder, name: str) -> None:
+    for write in (lambda: folder.put(name, "ours"), lambda: folder.clear(name, lambda _: True)):
+        with pytest.raises(InputError, match="out of the directory"):
+            write()
+
+
+@MINE
+def test_a_cleared_directory_leaves_what_is_not_ours(folder: Folder, outside: Path) -> None:
+    scene = folder.root / "scene"
+    (scene / "deep").mkdir(parents=True)
+    for name, text in (("answer.csv", "ours"), ("deep/log.txt", "ours"), ("deep/notes.txt", "")):
+        (scene / name).write_text(text)
+    (scene / "link").symlink_to(outside)
+    assert folder.clear("scene", {"answer.csv", "deep/log.txt"}.__contains__) == scene
+    assert not scene.exists()
+    kept = folder.root / KEPT / "scene"
+    left = {str(path.relative_to(kept)) for path in kept.rglob("*")}
+    assert left == {"deep", "deep/notes.txt", "link"}
+    assert (outside / "a.csv").read_text() == "precious"
+
+
+@pytest.mark.parametrize("harm", [b"", b"\x00\xff{]" * 50, b"0" * 64])
+@MINE
+def test_without_its_record_nothing_is_lost(folder: Folder, harm: bytes) -> None:
+    folder.put("tables/a.csv", "one")
+    (folder.root / RECORD).write_bytes(harm)
+    folder.put("tables/a.csv", "two")
+    assert (folder.root / KEPT / "tables" / "a.csv").read_text() == "one"
+    assert folder.is_whole()
+
+
+def test_a_directory_belongs_to_one_thing(tmp_path: Path, outside: Path) -> None:
+    root, kinds = tmp_path / "out", workspace.KINDS
+    for _ in range(2):
+        with workspace.claimed(root, workspace.RESULTS, "mine") as folder:
+            folder.put("comparison.csv", "one")
+    for kind, name in ((kinds[0], "mine"), (workspace.RESULTS, "yours"), (kinds[-1], "mine")):
+        holds = pytest.raises(InputError, match=r"holds the benchmark of the solver mine, not")
+        with holds, workspace.claimed(root, kind, name):
+            pass
+    assert folder.is_whole()
+    for kind in kinds:
+        new = tmp_path / kind.word
+        new.mkdir()
+        (new / kind.marker).write_text('{"title": "something else"}')
+        for place, named in ((outside, r"a\.csv"), (new, kind.marker)):
+            with pytest.raises(InputError, match=named), workspace.claimed(place, kind, "mine"):
+                pass
+    assert [path.name for path in outside.iterdir()] == ["a.csv"]

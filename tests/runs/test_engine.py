@@ -53,31 +53,27 @@ class Step(Case):
         return {}
 
 
-def _order(places: int, *cases: Case) -> list[str]:
-    """Names of cases in the order in which a pool without solvers starts them."""
-    started: list[str] = []
+def _order(places: int, *cases: Case) -> list[Case]:
+    """Cases in the order in which a pool without solvers starts them."""
+    started: list[Case] = []
 
-    def task(one: Case) -> float:
-        started.append(one.name)
-        return one.cost_s
+    def task(step: Case) -> float:
+        started.append(step)
+        return step.cost_s
 
     with ThreadPoolExecutor(1) as threads:
-        todo = {one.name: one for one in cases}
+        todo = {step.name: step for step in cases}
         assert not engine.run(todo, Pool(threads, task, places), lambda _: None)
     return started
 
 
-def test_the_start_of_the_most_expensive_chain_comes_first() -> None:
+def test_the_most_expensive_chain_comes_first_and_a_case_after_its_needs() -> None:
     shared = Step(1.0)
     dear, cheap, single = Step(50.0, (shared,)), Step(2.0, (shared,)), Step(30.0)
-    expected = [one.name for one in (shared, dear, single, cheap)]
-    assert _order(1, cheap, single, dear, shared) == expected
-
-
-def test_a_case_waits_for_all_that_it_needs_and_for_nothing_that_is_done() -> None:
+    assert _order(1, cheap, single, dear, shared) == [shared, dear, single, cheap]
     first, second, done = Step(1.0), Step(2.0), Step(3.0)
     both = Step(4.0, (first, second, done))
-    assert _order(3, both, first, second)[-1] == both.name
+    assert _order(3, both, first, second)[-1] == both
 
 
 def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) -> None:
@@ -98,25 +94,17 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
 
 def test_the_time_left_follows_the_pace_of_the_cases_so_far() -> None:
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
-    forecast = Forecast([first, second, third], workers=2)
-    assert forecast.left_s() == pytest.approx(430 / 2)
+    forecast = Forecast([first, second, third], workers=2, after_s=20.0)
+    assert forecast.left_s() == pytest.approx(430 / 2 + 20)
     forecast.ended(Outcome(first, 5.0))
-    assert forecast.left_s() == pytest.approx(0.5 * 420 / 2)
+    assert forecast.left_s() == pytest.approx(0.5 * 420 / 2 + 20)
+    forecast.going([(third, 0.5)])
+    assert forecast.left_s() == pytest.approx(0.5 * 220 / 2 + 20)
+    assert forecast.done == pytest.approx(1 - 130 / 235)
     forecast.ended(Outcome(third, error=SolverError("died")))
-    assert forecast.left_s() == pytest.approx(0.5 * 20 / 2)
-
-
-def test_progress_goes_on_within_a_case_and_until_the_figures_are_drawn() -> None:
-    first, second = Step(10.0), Step(30.0)
-    forecast = Forecast([first, second], workers=1, after_s=10.0)
-    shares = [forecast.done]
-    forecast.going([(first, 0.5)])
-    shares.append(forecast.done)
-    forecast.ended(Outcome(first, 10.0))
-    shares.append(forecast.done)
-    forecast.ended(Outcome(second, 30.0))
-    shares.append(forecast.done)
-    assert shares == pytest.approx([0.0, 0.1, 0.2, 0.8])
+    assert forecast.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
+    forecast.ended(Outcome(second, 10.0))
+    assert forecast.done == pytest.approx(1 - 20 / 235)
 
 
 @settings(max_examples=30, deadline=None)
@@ -147,16 +135,15 @@ def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
         with cores.held(wanted):
             served.append(name)
 
+    threads = [threading.Thread(target=solve, args=args) for args in (("large", 2), ("small", 1))]
     with cores.held(1):
-        large = threading.Thread(target=solve, args=("large", 2))
-        large.start()
+        threads[0].start()
         while not cores._queue.locked():
             pass
-        small = threading.Thread(target=solve, args=("small", 1))
-        small.start()
+        threads[1].start()
         # one core is free, but the large one asked first
-        small.join(timeout=0.2)
+        threads[1].join(timeout=0.2)
         assert served == []
-    large.join()
-    small.join()
+    for thread in threads:
+        thread.join()
     assert served == ["large", "small"]

@@ -14,6 +14,7 @@ from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import process
 from orchestrator.runs.process import Ended
 from orchestrator.solvers import doctor, liggghts, openfoam
+from tests.conftest import Mount
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,19 +36,13 @@ def _has_ended(pid: int) -> bool:
     return False
 
 
-def test_output_is_logged_and_the_exit_code_reported(tmp_path: Path) -> None:
-    ended = _sh(tmp_path, "echo out; echo err >&2; exit 3")
-    assert (ended.returncode, ended.over) == (3, "")
-    assert (tmp_path / "log").read_text() == "out\nerr\n"
-
-
-def test_the_environment_is_this_one_with_what_is_added_and_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_output_exit_code_and_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FIRST", "1")
     monkeypatch.setenv("SECOND", "2")
-    _sh(tmp_path, "echo $FIRST $SECOND $THIRD $PWD", env={"SECOND": None, "THIRD": "3"})
-    assert (tmp_path / "log").read_text() == f"1 3 {tmp_path}\n"
+    script = "echo $FIRST $SECOND $THIRD $PWD; echo err >&2; exit 3"
+    ended = _sh(tmp_path, script, env={"SECOND": None, "THIRD": "3"})
+    assert (ended.returncode, ended.over) == (3, "")
+    assert (tmp_path / "log").read_text() == f"1 3 {tmp_path}\nerr\n"
 
 
 FAMILY = "sleep 60 & echo $! >child; trap '' TERM; wait; wait"
@@ -75,19 +70,11 @@ def test_a_file_may_not_grow_beyond_its_limit(tmp_path: Path) -> None:
 
 
 def test_a_program_that_goes_on_while_the_disk_is_full_is_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    disk: Mount, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(process, "DISK_S", 0.2)
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=1M", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode:
-        pytest.skip("a file system can be mounted by root alone")
-    try:
-        script = "head -c 10000000 /dev/zero >file; while :; do sleep 0.1; done"
-        assert _sh(folder, script).over == "disk"
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
+    script = "head -c 10000000 /dev/zero >file; while :; do sleep 0.1; done"
+    assert _sh(disk("size=1M"), script).over == "disk"
 
 
 def test_a_stop_ends_the_program(tmp_path: Path) -> None:
@@ -155,13 +142,13 @@ def name(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
+def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
     """Put a program of a name in front of the real one."""
 
-    def put(script: str, mode: int = 0o755) -> Path:
+    def put(script: str) -> Path:
         path = tmp_path / name
         path.write_text(f"#!/bin/sh\n{script}\n")
-        path.chmod(mode)
+        path.chmod(0o755)
         monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
         return path
 
@@ -170,7 +157,7 @@ def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[
 
 @pytest.mark.parametrize("script", ANSWERS)
 def test_a_version_is_read_whatever_else_is_printed(
-    put: Callable[..., Path], name: str, script: str
+    put: Callable[[str], Path], name: str, script: str
 ) -> None:
     put(script.format(stated=STATED[name]))
     assert VERSIONS[name]() in STATED[name]
@@ -178,7 +165,7 @@ def test_a_version_is_read_whatever_else_is_printed(
 
 @pytest.mark.parametrize("script", REFUSALS)
 def test_a_program_without_a_version_is_refused_with_its_words(
-    put: Callable[..., Path], name: str, script: str
+    put: Callable[[str], Path], name: str, script: str
 ) -> None:
     path = put(script)
     with pytest.raises(SolverError, match=REFUSALS[script]) as caught:
@@ -187,7 +174,7 @@ def test_a_program_without_a_version_is_refused_with_its_words(
 
 
 def test_a_program_that_does_not_answer_is_killed(
-    put: Callable[..., Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    put: Callable[[str], Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(process, "QUERY_S", 0.5)
     put(f"cd {tmp_path}; {FAMILY}")
@@ -206,7 +193,7 @@ def test_the_environment_of_another_openfoam_is_named(
     assert VERSIONS["simpleFoam"]() in openfoam.TRIED
 
 
-def test_the_doctor_names_a_solver_that_is_broken(put: Callable[..., Path], name: str) -> None:
+def test_the_doctor_names_a_solver_that_is_broken(put: Callable[[str], Path], name: str) -> None:
     put("exit 1")
     openfoam.version.cache_clear()
     liggghts.version.cache_clear()
