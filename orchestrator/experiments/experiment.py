@@ -21,7 +21,7 @@ from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace, claimed
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import TIME_LIMIT_S, Study
-from orchestrator.tables import text
+from orchestrator.tables import csv
 
 Tables = Mapping[str, pd.DataFrame]
 
@@ -102,7 +102,7 @@ class Experiment:
                 raise OrchestratorError(what, where=str(out), remedy=remedy)
             with settings.own(), folder.renewed(but=MARKERS):
                 for key, table in tables.items():
-                    folder.put(f"tables/{key}.csv", text.csv(table))
+                    folder.put(f"tables/{key}.csv", csv(table))
                 solvers = case.programs(space.cases, planned.cases)
                 sections = self.sections(tables, runs)
                 document.write(self.title, sections, folder, space.page.name, solvers)

@@ -5,86 +5,141 @@ wherever and whenever it runs. The times of the runs are in `timings`.
 """
 
 from collections.abc import Container, Iterable, Mapping
-from pathlib import Path
+from fnmatch import fnmatchcase
+from io import BytesIO
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from orchestrator.errors import OrchestratorError
 from orchestrator.plan import Plan
+from orchestrator.runs.files import Folder
+from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import piles, scenes
-from orchestrator.tables.text import COLUMNS, csv, read, write
 from orchestrator.tables.usable import with_scatter, with_usable
+from orchestrator.types import Row
 
 Tables = dict[str, pd.DataFrame]
 
-__all__ = ["COLUMNS", "Tables", "csv", "make", "read", "timings", "write"]
+COLUMNS: dict[str, str] = {
+    **pd.read_csv(Path(__file__).with_name("columns.csv"), index_col="column")["meaning"],
+    **{column: one.phrase for column, one in fields.COLUMNS.items()},
+    **{column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()},
+}
+"""Every column of every table, with its meaning; units are in the names."""
+BEGINS = ("=", "+", "-", "@", "\t", "\n")
+"""Spreadsheets run a cell that begins with one of these as a formula."""
+NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
+"""Columns of texts that may look like numbers, or be empty."""
 
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {
-        flow.name: pile
-        for pile in plan.piles.values()
-        for flow in pile.model.cases
-        if flow.name in done
-    }
+    flows = {flow.name: pile for pile in plan.piles.values() for flow in pile.model.cases}
+    flows = {name: pile for name, pile in flows.items() if name in done}
     answers = [
         piles.Answer.read(plan.decisions[scene_id], pile, cases)
         for scene_id, pile in plan.piles.items()
         if pile.is_run(done)
     ]
-    cells = [cell for cell in plan.cells if cell.name in done]
     asked = pd.DataFrame(scenes.rows(study, plan))
+    cells = [cell for cell in plan.cells if cell.name in done]
     grains = pd.DataFrame(scenes.single_grains(plan, cells, cases))
     thresholds = pd.DataFrame(row for answer in answers for row in piles.threshold_rows(answer))
+    thresholds = with_scatter(thresholds, asked)
+    checks = piles.check_rows(plan, study.tolerance, cases, done) if study.tolerance else ()
     made = {
         "scenes": asked,
-        "single_grain": with_usable(grains, asked, study),
+        "single_grain": with_usable(grains, asked, study.tolerance),
         "wall_stress": _stacked(scenes.wall_stress(pile, cases) for pile in flows.values()),
         "flow": pd.DataFrame(scenes.flow(pile, cases) for pile in flows.values()),
         "pile_grain": _stacked(map(piles.grains, answers)),
         "pile_curve": _stacked(map(piles.curve, answers)),
-        "pile_threshold": with_usable(with_scatter(thresholds, asked), asked, study),
+        "pile_threshold": with_usable(thresholds, asked, study.tolerance),
         "size_class": pd.DataFrame(row for one in answers for row in piles.size_class_rows(one)),
         "bed_change": _stacked(piles.bed_changes(answers)),
         "form": pd.DataFrame(row for one in answers for row in piles.forms(one)),
-        "check": pd.DataFrame(piles.check_rows(study, plan, cases, done)),
+        "check": pd.DataFrame(checks),
     }
     return {name: table for name, table in made.items() if not table.empty}
 
 
-def _stacked(parts: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+def _stacked(parts: Iterable[Row]) -> pd.DataFrame:
     """The columns of many parts one below the other; not a number where a part lacks a column.
 
     Numbers and texts are repeated along the arrays of their part. Ten times as fast as a
     concatenation of tables.
     """
     arrays = [dict(zip(part, np.broadcast_arrays(*part.values()), strict=True)) for part in parts]
-    names = dict.fromkeys(name for part in arrays for name in part)
-    return pd.DataFrame(
-        {
-            name: np.concatenate(
-                [
-                    part.get(name, np.full(next(iter(part.values())).shape, np.nan))
-                    for part in arrays
-                ]
-            )
-            for name in names
-        }
-    )
+    empty = [np.full(next(iter(part.values())).shape, np.nan) for part in arrays]
+    columns = {}
+    for name in dict.fromkeys(name for part in arrays for name in part):
+        values = [part.get(name, nan) for part, nan in zip(arrays, empty, strict=True)]
+        columns[name] = np.concatenate(values)
+    return pd.DataFrame(columns)
 
 
 def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Wall times of the finished cases, from their states by name."""
-    return pd.DataFrame(
-        {
-            "case": name,
-            "kind": plan.cases[name].kind,
-            "solver_s": state["solver_s"],
-            "cpu_s": state["cpu_s"],
-            "outside_s": state["wall_s"] - state["solver_s"],
-        }
-        for name, state in states.items()
-    )
+    rows = [
+        (name, plan.cases[name].kind, it["solver_s"], it["cpu_s"], it["wall_s"] - it["solver_s"])
+        for name, it in states.items()
+    ]
+    return pd.DataFrame(rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"])
+
+
+def csv(table: pd.DataFrame, digits: str | None = None) -> str:
+    """A table as CSV, its numbers in a format such as ``%.9g``.
+
+    A text that would begin a formula gets an apostrophe before it.
+    """
+    texts = table.select_dtypes(exclude=["number", "bool"])
+    harmless = {str(name): texts[name].map(_harmless) for name in texts}
+    return table.assign(**harmless).to_csv(index=False, float_format=digits)
+
+
+def _harmless(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    # pandas writes \r without quotes, and a reader takes it for the end of the row
+    text = value.replace("\r\n", "\n").replace("\r", "\n")
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}" if text.startswith(BEGINS) else text
+    return text
+
+
+def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
+    """Put each table into a sub-directory of a folder, and the meanings of the columns."""
+    for name, table in tables.items():
+        folder.put(f"{place}/{name}.csv", csv(table))
+    used = sorted({str(column) for table in tables.values() for column in table})
+    meanings = pd.DataFrame({"column": used, "meaning": [COLUMNS[column] for column in used]})
+    folder.put(f"{place}/columns.csv", csv(meanings))
+
+
+def read(folder: Folder, place: str) -> Tables:
+    """Read the tables that `write` wrote, and no others.
+
+    Raises
+    ------
+    OrchestratorError
+        If there are none, or one has changed since.
+    """
+    files = [name for name in folder.written() if fnmatchcase(name, f"{place}/*.csv")]
+    names = {PurePath(file).stem: file for file in files}
+    names.pop("columns", None)
+    if not names:
+        where, remedy = str(folder.root / place), "run the study first"
+        raise OrchestratorError("there are no tables", where=where, remedy=remedy)
+    texts, tables = dict.fromkeys(NAMES, "str"), {}
+    for name, file in names.items():
+        data = BytesIO(folder.read(file))
+        table = pd.read_csv(data, dtype=texts, keep_default_na=False, na_values=[""])
+        has_reasons = "why_not" in table
+        tables[name] = table.assign(why_not=table["why_not"].fillna("")) if has_reasons else table
+    return tables

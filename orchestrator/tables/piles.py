@@ -14,16 +14,13 @@ from orchestrator.fidelity.levels import changed
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
-from orchestrator.types import FloatArray, Row
-
-Columns = dict[str, Any]
-"""Columns of a table by name: arrays of one length, and values that all its rows have."""
+from orchestrator.types import BoolArray, FloatArray, Row
 
 
 @dataclass(frozen=True)
@@ -47,9 +44,24 @@ class Answer:
         """Id of the scene that was asked for."""
         return self.decision.asked.id
 
+    def at(self, fraction: float, chosen: BoolArray | slice = slice(None)) -> PileThreshold:
+        """The threshold of the pile, or of some of its counted grains, at a fraction."""
+        motion = self.motion if isinstance(chosen, slice) else self.motion.of(chosen)
+        density = self.pile.scene.fluid.density
+        return threshold.of_pile(motion, self.speed[chosen], fraction, density)
 
-def grains(answer: Answer) -> Columns:
-    """The counted grains of a pile: the stress on each, when and how it moved."""
+
+def shields(scene: Scene, tau: Any) -> Any:
+    """The Shields number of a stress, Pa."""
+    return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
+
+
+def _reynolds(scene: Scene, tau: Any) -> Any:
+    return np.sqrt(tau / scene.fluid.density) * scene.grain.diameter / scene.fluid.viscosity
+
+
+def grains(answer: Answer) -> Row:
+    """Columns of the counted grains of a pile: the stress on each, when and how it moved."""
     motion, pile, packing = answer.motion, answer.pile, answer.pile.packing
     counted, d = packing.windward, pile.scene.grain.diameter
     columns = {
@@ -72,48 +84,8 @@ def grains(answer: Answer) -> Columns:
     return columns
 
 
-def size_class_rows(answer: Answer) -> Iterator[Row]:
-    """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
-    pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
-    sizes = threshold.classes(pile.packing.sizes[pile.packing.windward]) if pile.pouring else ()
-    listed = [(one, motion.of(one.chosen)) for one in sizes]
-    for fraction in scene.protocol.fractions:
-        found = {
-            one.number: threshold.of_pile(
-                own, answer.speed[one.chosen], fraction, scene.fluid.density
-            )
-            for one, own in listed
-        }
-        middle = next(
-            (shields(scene, found[0].tau) / one.size for one, _ in listed if one.number == 0),
-            np.nan,
-        )
-        whole = threshold.first_level(motion, fraction)
-        for one, _ in listed:
-            row = found[one.number]
-            value, low, high = (
-                shields(scene, tau) / one.size for tau in (row.tau, row.tau_low, row.tau_high)
-            )
-            moved = motion.moved_by(whole or 0)[one.chosen]
-            yield {
-                "scene_id": answer.scene_id,
-                "fraction": fraction,
-                "size_over_d": one.size,
-                "count": int(one.chosen.sum()),
-                "class_moved": moved.mean() if whole else np.nan,
-                "ustar0_m_s": row.ustar0,
-                "shields_own": value,
-                "shields_own_low": low,
-                "shields_own_high": high,
-                # the grains of the middle class may lie loose: no ratio to a threshold of zero
-                "hiding": value / middle if middle > 0 else np.nan,
-                "hiding_wilcock_crowe": float(wilcock_crowe_hiding(one.size) / one.size),
-                "hiding_egiazaroff": float(egiazaroff_hiding(one.size)),
-            }
-
-
-def curve(answer: Answer) -> Columns:
-    """The fraction of a pile that had moved, and the stress on it, at each load step."""
+def curve(answer: Answer) -> Row:
+    """Columns of the fraction of a pile that had moved, and the stress, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
     tau = threshold.mean_tau(motion, answer.speed, scene.fluid.density)
     return {
@@ -139,14 +111,13 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
     The interval holds load steps and count, and at least the known error as a factor both ways; it
     is empty where no error is known. The model's interval is of the choices that all levels share.
     """
-    pile, motion, speed, decision = answer.pile, answer.motion, answer.speed, answer.decision
-    scene, asked, error = pile.scene, decision.asked, decision.error_estimate
-    z0, top, depth = scene.bed.roughness, scene.flow.top, scene.flow.depth
-    pivot, place = pile.pivot_thresholds(speed), point(scene)
+    pile, motion, asked = answer.pile, answer.motion, answer.decision.asked
+    scene, error = pile.scene, answer.decision.error_estimate
+    z0, depth, place = scene.bed.roughness, scene.flow.depth, point(scene)
+    pivot = pile.pivot_thresholds(answer.speed)
     for fraction in scene.protocol.fractions:
-        found = threshold.of_pile(motion, speed, fraction, scene.fluid.density)
-        factor = np.nan if error is None else 1 + error
-        value, model = shields(scene, found.tau), calibration.spread(asked, fraction)
+        found, model = answer.at(fraction), calibration.spread(asked, fraction)
+        value, factor = shields(scene, found.tau), np.nan if error is None else 1 + error
         row = {
             "scene_id": answer.scene_id,
             **place,
@@ -168,17 +139,17 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
         if depth is None:
             row["u_1m_m_s"] = float(log_law_speed(found.ustar0, 1.0, z0))
         else:
-            closed = top == "closed channel"
+            closed = scene.flow.top == "closed channel"
             mean = float(depth_mean_speed(found.ustar0, depth, z0, closed=closed))
             row |= {"mean_speed_m_s": mean, "discharge_m2_s": mean * depth}
         yield row | {
-            "pivot_ustar0_m_s": pivot[int(np.ceil(fraction * motion.count - 1e-9)) - 1],
+            "pivot_ustar0_m_s": pivot[ceil(fraction * motion.count - 1e-9) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],
             "share_carried_off": found.carried_off,
             "share_against_flow": found.against_the_flow,
             "row_hold": answer.row_hold,
-            **_levels(decision),
+            **_levels(answer.decision),
             "error_estimate": error,
             "case": pile.runs[-1].name if pile.runs else None,
         }
@@ -186,64 +157,60 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
 
 def _levels(answer: Decision) -> Row:
     assert answer.levels
-    flow, grains = answer.levels
-    return {"flow_level": flow.name, "grain_level": grains.name}
+    return {"flow_level": answer.levels.flow.name, "grain_level": answer.levels.grains.name}
 
 
-def check_rows(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
-    """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
-    if not study.tolerance:
+def size_class_rows(answer: Answer) -> Iterator[Row]:
+    """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
+    pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
+    if not pile.pouring:
         return
-    for asked, pile in decision.ready(plan.piles, plan.checks, done).items():
-        cheap = plan.piles[asked]
-        scene = cheap.scene
-        for one in decision.compare(cheap, pile, study.tolerance, cases):
-            yield {
-                "scene_id": asked,
-                **point(scene),
-                "packing": pile.bed.packing,
-                "fraction": one.cheap.fraction,
-                **_levels(plan.decisions[asked]),
-                "shields": shields(scene, one.cheap.tau),
-                "shields_dem": shields(scene, one.dem.tau),
-                "shields_dem_low": shields(scene, one.dem.tau_low),
-                "shields_dem_high": shields(scene, one.dem.tau_high),
-                "difference": one.cheap.tau / one.dem.tau - 1,
-                "agree": one.agree,
-                "case": pile.case.name,
+    classes = list(threshold.classes(pile.packing.sizes[pile.packing.windward]))
+    for fraction in scene.protocol.fractions:
+        rows = {}
+        for number, size, chosen in classes:
+            found = answer.at(fraction, chosen)
+            level = threshold.first_level(motion, fraction)
+            taus = np.array([found.tau, found.tau_low, found.tau_high])
+            value, low, high = shields(scene, taus) / size
+            rows[number] = {
+                "scene_id": answer.scene_id,
+                "fraction": fraction,
+                "size_over_d": size,
+                "count": int(chosen.sum()),
+                "class_moved": motion.moved_by(level)[chosen].mean() if level else np.nan,
+                "ustar0_m_s": found.ustar0,
+                "shields_own": value,
+                "shields_own_low": low,
+                "shields_own_high": high,
+                "hiding": np.nan,
+                "hiding_wilcock_crowe": float(wilcock_crowe_hiding(size) / size),
+                "hiding_egiazaroff": float(egiazaroff_hiding(size)),
             }
-
-
-def shields(scene: Scene, tau: Any) -> Any:
-    """The Shields number of a stress, Pa."""
-    return tau * np.pi / 6 * scene.grain.diameter**2 / scene.weight
-
-
-def _reynolds(scene: Scene, tau: Any) -> Any:
-    ustar = np.sqrt(tau / scene.fluid.density)
-    return ustar * scene.grain.diameter / scene.fluid.viscosity
+        middle = rows[0]["shields_own"] if 0 in rows else np.nan
+        for row in rows.values():
+            # the grains of the middle class may lie loose: no ratio to a threshold of zero
+            yield row | {"hiding": row["shields_own"] / middle if middle > 0 else np.nan}
 
 
 def forms(answer: Answer) -> Iterator[Row]:
     """Of a train, a row for each form and each fraction of the counted grains of that form."""
-    pile = answer.pile
-    bed, line = pile.bed, pile.model.line
+    pile, bed = answer.pile, answer.pile.bed
     if bed.forms == 1 or bed.profile:
         return
-    period = bed.spacing or (line.x[-2] - line.x[1]) / bed.forms
+    period = bed.spacing or (pile.model.line.x[-2] - pile.model.line.x[1]) / bed.forms
     x = pile.packing.centres[pile.packing.windward, 0] * pile.scene.grain.diameter
     form = np.clip(np.floor(x / period).astype(int), 0, bed.forms - 1)
     ustar0 = np.nan_to_num(threshold.of_grains(answer.motion).value, nan=np.inf)
     for fraction in pile.scene.protocol.fractions:
         first = np.nan
         for number in range(bed.forms):
-            grains = np.sort(ustar0[form == number])
-            needed = max(int(np.ceil(fraction * len(grains) - 1e-9)), 1)
+            grains, speed = np.sort(ustar0[form == number]), answer.speed[form == number]
+            needed = max(ceil(fraction * len(grains) - 1e-9), 1)
             reached = float(grains[needed - 1]) if len(grains) else np.nan
             first = reached if number == 0 else first
             # loose grains of the first form move in still fluid: nothing is a multiple of that
             ratio = reached / first if first > 0 else np.nan
-            speed = answer.speed[form == number]
             yield {
                 "scene_id": answer.scene_id,
                 "form": number + 1,
@@ -255,8 +222,8 @@ def forms(answer: Answer) -> Iterator[Row]:
             }
 
 
-def bed_changes(answers: Sequence[Answer]) -> Iterator[Columns]:
-    """Thresholds on beds that change beside those on the frozen beds, grain by grain.
+def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
+    """Columns of thresholds on beds that change beside those on the frozen beds, by grain.
 
     For each pile that the study asks for on both, up to its last fraction.
     """
@@ -267,16 +234,10 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Columns]:
         if not scene.protocol.update or twin is None:
             continue
         moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
-        on_both = [
-            [
-                threshold.of_pile(one.motion, one.speed, n / count, scene.fluid.density)
-                for n in moved.tolist()
-            ]
-            for one in (answer, twin)
-        ]
-        tau, tau_frozen = ([one.tau for one in found] for found in on_both)
-        ustar0, ustar0_frozen = ([one.ustar0 for one in found] for found in on_both)
-        change = np.divide(tau, tau_frozen) - 1
+        pairs = [(answer.at(n / count), twin.at(n / count)) for n in moved.tolist()]
+        tau, tau_frozen = np.array([[one.tau for one in pair] for pair in pairs]).T
+        ustar0, ustar0_frozen = np.array([[one.ustar0 for one in pair] for pair in pairs]).T
+        change = tau / tau_frozen - 1
         beyond = moved[np.abs(change) > limits.FROZEN_BED] / count
         yield {
             "scene_id": answer.scene_id,
@@ -285,9 +246,30 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Columns]:
             "count": count,
             "moved": moved,
             "fraction_moved": moved / count,
-            "shields": shields(scene, np.array(tau)),
-            "shields_frozen": shields(scene, np.array(tau_frozen)),
+            "shields": shields(scene, tau),
+            "shields_frozen": shields(scene, tau_frozen),
             "change": change,
-            "change_ustar0": np.divide(ustar0, ustar0_frozen) - 1,
+            "change_ustar0": ustar0 / ustar0_frozen - 1,
             "holds_until": beyond[0] if len(beyond) else np.nan,
         }
+
+
+def check_rows(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
+    """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
+    for asked, pile in decision.ready(plan.piles, plan.checks, done).items():
+        scene = plan.piles[asked].scene
+        for cheap, dem, agree in decision.compare(plan.piles[asked], pile, tolerance, cases):
+            yield {
+                "scene_id": asked,
+                **point(scene),
+                "packing": pile.bed.packing,
+                "fraction": cheap.fraction,
+                **_levels(plan.decisions[asked]),
+                "shields": shields(scene, cheap.tau),
+                "shields_dem": shields(scene, dem.tau),
+                "shields_dem_low": shields(scene, dem.tau_low),
+                "shields_dem_high": shields(scene, dem.tau_high),
+                "difference": cheap.tau / dem.tau - 1,
+                "agree": agree,
+                "case": pile.case.name,
+            }

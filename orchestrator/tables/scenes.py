@@ -1,8 +1,7 @@
 """The tables of scenes, of single grains and of flows."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,14 +21,8 @@ from orchestrator.types import Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
-WAY_UP = {
-    "ustar_foot": 0.0,
-    "ustar_quarter": 0.25,
-    "ustar_half": 0.5,
-    "ustar_three_quarters": 0.75,
-    "ustar_top": 1.0,
-}
-"""Columns of u*/u*_0 at parts of the way along the bed from the foot to the top."""
+WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
+"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the top."""
 
 
 def point(scene: Scene) -> Row:
@@ -59,47 +52,46 @@ def rows(study: Study, plan: Plan) -> Iterator[Row]:
 
 def single_grains(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> Iterator[Row]:
     """A row for each single grain that a finished case or the closed form answers."""
-    measured: dict[str, Row] = {}
+    # u* by DEM over that of the closed form, with its interval
+    ratios: dict[str, tuple[float, ...]] = {}
+    beside: dict[str, Row] = {}
     for cell in cells:
         motion = Motion.from_csv(cases / cell.name)
         steps = threshold.of_grains(motion)
-        brackets = zip(steps.value, steps.low, steps.high, motion.fallen > 0, strict=True)
-        for scene, (value, low, high, fell) in zip(cell.scenes, brackets, strict=True):
-            row = {**_single_grain(scene, value, low, high), "fell_upstream": bool(fell)}
-            measured[scene.id] = {**row, "case": cell.name}
+        ids = [scene.id for scene in cell.scenes]
+        ratios |= zip(ids, zip(steps.value, steps.low, steps.high, strict=True), strict=True)
+        for name, fell in zip(ids, motion.fallen > 0, strict=True):
+            beside[name] = {"fell_upstream": bool(fell), "case": cell.name}
     for asked, decision in plan.decisions.items():
         scene = decision.scene
-        if scene.id in measured:
-            yield {"scene_id": asked, **measured[scene.id]}
-        elif asked not in plan.piles and scene.protocol.method != "dem":
-            row = _single_grain(scene, np.nan, np.nan, np.nan)
-            yield {"scene_id": asked, **row, "fell_upstream": False}
+        if asked in plan.piles or (scene.id not in ratios and scene.protocol.method == "dem"):
+            continue
+        value, low, high = ratios.get(scene.id, (np.nan, np.nan, np.nan))
+        exact = closed_form(scene)
+        ustar, shields = float(exact.friction_velocity), float(exact.shields)
+        yield {
+            "scene_id": asked,
+            **point(scene),
+            "answered_method": scene.protocol.method,
+            "reynolds": float(exact.reynolds) * value,
+            "reynolds_closed_form": float(exact.reynolds),
+            "shields_closed_form": shields,
+            "shields_dem": shields * value**2,
+            "shields_dem_low": shields * low**2,
+            "shields_dem_high": shields * high**2,
+            "ustar_closed_form_m_s": ustar,
+            "ustar_m_s": ustar * value,
+            "ustar_low_m_s": ustar * low,
+            "ustar_high_m_s": ustar * high,
+            "drag_over_weight": float(exact.drag) / scene.weight,
+            **beside.get(scene.id, {"fell_upstream": False}),
+        }
 
 
-def _single_grain(scene: Scene, value: float, low: float, high: float) -> Row:
-    """A threshold by DEM, u* over that of the closed form, with its interval; and that."""
-    exact = closed_form(scene)
-    ustar, shields = float(exact.friction_velocity), float(exact.shields)
-    return {
-        **point(scene),
-        "answered_method": scene.protocol.method,
-        "reynolds": float(exact.reynolds) * value,
-        "reynolds_closed_form": float(exact.reynolds),
-        "shields_closed_form": shields,
-        "shields_dem": shields * value**2,
-        "shields_dem_low": shields * low**2,
-        "shields_dem_high": shields * high**2,
-        "ustar_closed_form_m_s": ustar,
-        "ustar_m_s": ustar * value,
-        "ustar_low_m_s": ustar * low,
-        "ustar_high_m_s": ustar * high,
-        "drag_over_weight": float(exact.drag) / scene.weight,
-    }
-
-
-def wall_stress(pile: Pile, cases: Path) -> Mapping[str, Any]:
-    """The friction velocity along the bed, for the solved flow of a pile."""
+def wall_stress(pile: Pile, cases: Path) -> Row:
+    """Columns of the friction velocity along the bed, for the solved flow of a pile."""
     stress = pile.stress(cases)
+    names = ("x_m", "z_m", *(f"ustar_over_ustar0_{kind}" for kind in ("wall", "eq10")))
     return {
         "flow_case": pile.flow.name,
         "alpha_deg": pile.bed.slope_deg,
@@ -107,11 +99,7 @@ def wall_stress(pile: Pile, cases: Path) -> Mapping[str, Any]:
         "z0_m": pile.flow.roughness_m,
         "s_m": stress.s_m,
         "s_over_h": stress.s_m / pile.bed.height,
-        "x_m": stress.x_m,
-        "z_m": stress.z_m,
-        "ustar_over_ustar0_wall": stress.ustar_over_ustar0_wall,
-        "ustar_over_ustar0_eq10": stress.ustar_over_ustar0_eq10,
-        "ustar_over_ustar0_eq10_printed": stress.ustar_over_ustar0_eq10_printed,
+        **{name: getattr(stress, name) for name in (*names, "ustar_over_ustar0_eq10_printed")},
     }
 
 
@@ -119,7 +107,7 @@ def flow(pile: Pile, cases: Path) -> Row:
     """The solved flow of a pile: its settings, its separation and its speed-up."""
     case, stress, line = pile.flow, pile.stress(cases), pile.model.line
     separation, reattachment = bubble(stress, line.h) or (np.nan, np.nan)
-    ustar = stress.ustar_over_ustar0_wall
+    ustar, way = stress.ustar_over_ustar0_wall, np.linspace(0, line.crest_s, len(WAY_UP))
     windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
     length, hill = stress.length_m[windward], measured_hill(pile)
     row = {
@@ -135,17 +123,13 @@ def flow(pile: Pile, cases: Path) -> Row:
         "downstream_over_h": case.settings.downstream,
         "separation_over_h": separation,
         "reattachment_over_h": reattachment,
-        **{
-            name: float(np.interp(part * line.crest_s, stress.s_m, ustar))
-            for name, part in WAY_UP.items()
-        },
+        **dict(zip(WAY_UP, np.interp(way, stress.s_m, ustar).tolist(), strict=True)),
         "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
         "ustar_largest": float(ustar.max()),
     }
     if hill is not None:
         row["measured_reattachment_over_h"] = hill.reattachment or np.nan
-        row["measured_verified"] = hill.verified
-        row["measured_source"] = hill.source
+        row |= {"measured_verified": hill.verified, "measured_source": hill.source}
     return row
 
 

@@ -11,8 +11,6 @@ from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.study import fields
-from orchestrator.study.study import Study
-from orchestrator.types import FloatArray
 
 SMOOTH_BELOW = 5 / 30
 """u* z0/nu below which a bed is hydraulically smooth: u* k_s/nu = 5 with k_s = 30 z0 (Nikuradse,
@@ -61,27 +59,23 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     )
 
 
-def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, study: Study) -> pd.DataFrame:
+def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | None) -> pd.DataFrame:
     """Add the columns ``usable`` and ``why_not`` to thresholds of piles or of single grains.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Thresholds, with ``reynolds`` at the threshold, at which they are judged.
-    scenes : DataFrame
-        The scenes by their id.
-    study : Study
-        Whose tolerance the known errors are held against.
+    They are judged at their own Re*, by the columns of their `scenes`, and by the tolerance against
+    which the known errors are held.
     """
     if table.empty:
         return table
     columns = [name for name in scenes if name not in table or name == "scene_id"]
     rows = table.merge(scenes.drop_duplicates("scene_id")[columns], on="scene_id", how="left")
-    if "answered_method" in rows and "reynolds_closed_form" in rows:
-        is_dem = rows["answered_method"] == "dem"
-        rows["reynolds"] = rows["reynolds"].where(is_dem, rows["reynolds_closed_form"])
-    ustar = (rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]).to_numpy(float)
-    rows["law"] = _beyond_laws(rows, ustar)
+    if "reynolds_closed_form" in rows:
+        by_dem = rows["answered_method"] == "dem"
+        rows["reynolds"] = rows["reynolds"].where(by_dem, rows["reynolds_closed_form"])
+    ustar = rows["reynolds"] * rows["nu_m2_s"] / rows["d_m"]
+    rows["law"] = ""
+    for name, part in rows.groupby("force_law"):
+        rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
     rows["roughness_reynolds"] = ustar * rows["z0_over_d"] * rows["d_m"] / rows["nu_m2_s"]
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     if "u_e_m_s" in rows:
@@ -89,28 +83,23 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, study: Study) -> pd.D
         if "mean_speed_m_s" in rows:
             speed, height = rows["mean_speed_m_s"].fillna(speed), rows["depth_m"].fillna(height)
         rows["flow_reynolds"] = speed * height / rows["nu_m2_s"]
-    texts = ["; ".join(_reasons(row, study.tolerance)) for row in rows.to_dict("records")]
+    texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
     return table.assign(usable=[not text for text in texts], why_not=texts)
 
 
-def _beyond_laws(rows: pd.DataFrame, ustar: FloatArray) -> list[str]:
-    """Reasons against the force law of each row at its u*, m/s; empty if none."""
-    texts = np.full(len(rows), "", dtype=object)
-    for name in sorted(set(rows["force_law"])):
-        chosen, law = (rows["force_law"] == name).to_numpy(), LAWS[name]
-        part = rows[chosen]
-        d = part["d_m"].to_numpy(float)
-        fluid = (part[column].to_numpy(float) for column in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
-        exposure = Exposure(d, part["z0_over_d"].to_numpy(float) * d, *fluid)
-        grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
-        if "share_carried_off" in rows:  # a pile has the share of grains that lift carried off
-            grain = {}
-        weights = {key: part[column].to_numpy(float) for key, column in grain.items()}
-        beyond = why_not(law, ustar[chosen], exposure, **weights)
-        if law.unverified:
-            beyond = [f"unverified force law: {law.unverified}; {text}" for text in beyond]
-        texts[chosen] = [text.removesuffix("; ") for text in beyond]
-    return list(texts)
+def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
+    """Reasons against a force law in some rows at their u*, m/s; empty if none."""
+    law, d = LAWS[name], rows["d_m"].to_numpy(float)
+    fluid = (rows[column].to_numpy(float) for column in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
+    exposure = Exposure(d, rows["z0_over_d"].to_numpy(float) * d, *fluid)
+    grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
+    if "share_carried_off" in rows:  # a pile has the share of grains that lift carried off
+        grain = {}
+    weights = {key: rows[column].to_numpy(float) for key, column in grain.items()}
+    texts = why_not(law, np.asarray(ustar, float), exposure, **weights)
+    if law.unverified:
+        texts = [f"unverified force law: {law.unverified}; {text}" for text in texts]
+    return [text.removesuffix("; ") for text in texts]
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
@@ -126,7 +115,7 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
     if "share_carried_off" not in row:
         return
-    number, flow = row["roughness_reynolds"], row["flow_reynolds"]
+    number, flow, error = row["roughness_reynolds"], row["flow_reynolds"], row["error_estimate"]
     if number < SMOOTH_BELOW:
         yield f"hydraulically smooth bed: u* z0/nu {number:.2g} is below {SMOOTH_BELOW:.2g}"
     if flow < TURBULENT_FROM:
@@ -134,7 +123,6 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"laminar flow: speed times depth over nu, {flow:.0f}, {below}"
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
-    error = row["error_estimate"]
     if pd.isna(error):
         yield "no interval: the error of its levels on such a pile is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):
@@ -142,7 +130,5 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if row["fraction"] * row["count"] < 1 - 1e-9:
         yield f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
     if row.get("row_hold", 0.0) > ROW_HOLD:
-        yield (
-            "the row has no end: its neighbours hold the first grain up to "
-            f"{row['row_hold']:.2g} times the u* of a single one"
-        )
+        times = f"{row['row_hold']:.2g} times the u* of a single one"
+        yield f"the row has no end: its neighbours hold the first grain up to {times}"
