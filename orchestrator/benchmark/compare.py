@@ -1,6 +1,6 @@
 """Run a solver on the scenes of a pack, read its answers, and judge them."""
 
-import csv
+import contextlib
 import fnmatch
 import re
 import shlex
@@ -9,7 +9,6 @@ import signal
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,8 +66,7 @@ sys.exit(code if code >= 0 else 128 - code)
 solver's."""
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """Scenes of a pack by level and by patterns of names; empty for all."""
 
     levels: Sequence[int] = ()
@@ -88,8 +86,7 @@ class Choice:
         return names
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """Limits of a solver for a scene: wall time, s, and memory of each process, bytes."""
 
     seconds: float = 600.0
@@ -107,21 +104,9 @@ class Outcome(NamedTuple):
 def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limits) -> Outcome:
     """Run a solver on scenes of a pack, ours in turn, judge the answers, and write the page.
 
-    Parameters
-    ----------
-    root : Path
-        The pack.
-    command : str
-        The solver's, with ``{case}`` and ``{out}``; it is split as by a shell, but no shell runs.
-    out : Path or None
-        Directory of the results; by default ``results/benchmark-NAME`` of the pack.
-    choice, limits : Choice, Limits
-        The scenes, and the limits of the solver for each.
-
-    Raises
-    ------
-    InputError
-        If the pack, the command or the directory cannot be used.
+    No shell runs the `command`, which has ``{case}`` and ``{out}``. `out` is the directory of the
+    results, by default ``results/benchmark-NAME`` of the pack. Raises InputError if the pack, the
+    command or the directory cannot be used.
     """
     chosen, words = pack.read(root.absolute()), split(command)
     names, digest = choice.names(chosen), chosen.manifest.sha256[pack.EXPECTED]
@@ -135,7 +120,9 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
             )
             raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
         folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest}))
-        ours.root.mkdir(parents=True, exist_ok=True)
+        # runs of an earlier time were not in turn with the solver
+        shutil.rmtree(folder.path(f"{OURS}/cases"), ignore_errors=True)
+        ours.root.mkdir(parents=True)
         for number, name in enumerate(names, 1):
             print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
             _solve(words, chosen.root / pack.SCENES / name, limits, folder, name)
@@ -150,22 +137,9 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
 def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choice) -> Outcome:
     """Judge answers that are there, and write one page of all solvers.
 
-    Parameters
-    ----------
-    root : Path
-        The pack.
-    results : sequence of Path
-        A directory for each solver, which is named by it: ``RESULTS/SCENE/answer.csv``.
-    out : Path or None
-        Directory of the page; by default the only results, if `run` wrote them, or
-        ``results/benchmark-NAME`` of the pack.
-    choice : Choice
-        The scenes.
-
-    Raises
-    ------
-    InputError
-        If the pack or a directory cannot be used, or two have one name.
+    Each of the `results` is the directory of a solver, which is named by it. `out` is that of the
+    page, by default the only results, if `run` wrote them, or ``results/benchmark-NAME`` of the
+    pack. Raises InputError if the pack or a directory cannot be used, or two have one name.
     """
     chosen = pack.read(root.absolute())
     names, solvers = choice.names(chosen), [OURS, *(place.absolute().name for place in results)]
@@ -193,32 +167,30 @@ def _place(out: Path, chosen: Pack) -> Path:
     """The directory of the results, which is not in the pack."""
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
+    if out.name == OURS:
+        raise InputError("two solvers have the name ours", str(out), "use --out")
     return out.absolute()
 
 
 def split(command: str) -> list[str]:
     """The words of a solver's command; files that it names are found from any directory.
 
-    Raises
-    ------
-    InputError
-        If it has no ``{case}`` or ``{out}``, is for a shell, or its program is not there.
+    Raises InputError if it has no ``{case}`` or ``{out}``, is for a shell, or has no program.
     """
     try:
         words = shlex.split(command)
     except ValueError as error:
         raise InputError(f"the command cannot be read: {error}", "--solver") from None
-    lacking = [part for part in ("{case}", "{out}") if not any(part in word for word in words)]
-    operators = [word for word in words if OPERATORS.fullmatch(word)]
-    if lacking:
-        what, remedy = f"the command has no {lacking[0]}", "such as 'my-solver {case} {out}'"
-    elif operators:
-        what, remedy = f"no shell reads the command: {operators[0]}", "write: sh -c '...'"
-    elif shutil.which(words[0]) is None:
-        what, remedy = f"there is no program {words[0]} that may be run", "give its path"
-    else:
-        return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
-    raise InputError(what, "--solver", remedy)
+    for part in ("{case}", "{out}"):
+        if not any(part in word for word in words):
+            remedy = "such as 'my-solver {case} {out}'"
+            raise InputError(f"the command has no {part}", "--solver", remedy)
+    for word in filter(OPERATORS.fullmatch, words):
+        raise InputError(f"no shell reads the command: {word}", "--solver", "write: sh -c '...'")
+    if shutil.which(words[0]) is None:
+        what = f"there is no program {words[0]} that may be run"
+        raise InputError(what, "--solver", "give its path")
+    return [str(Path(word).absolute()) if Path(word).is_file() else word for word in words]
 
 
 def _solve(words: Sequence[str], scene: Path, limits: Limits, folder: Folder, name: str) -> None:
@@ -241,16 +213,13 @@ def _solve(words: Sequence[str], scene: Path, limits: Limits, folder: Folder, na
             output_limit=LOG_BYTES,
             file_limit=FILE_BYTES,
         )
-        error = _fault(ended, limits, log)
-        try:
-            folder.note(f"{name}/{ANSWER}", _content(out))
-        except ValueError as fault:
-            folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
-            error = error or str(fault)
+        folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
+        with contextlib.suppress(OSError), opened(out) as stream:
+            folder.note(f"{name}/{ANSWER}", stream.read(ANSWER_BYTES + 1))
         used = read_json(report) or {"seconds": ended.seconds}
+        folder.note(f"{name}/{USED}", text_of({**used, "error": _fault(ended, limits, log)}))
         with log.open("rb") as stream:
             folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))
-        folder.note(f"{name}/{USED}", text_of({**used, "error": error}))
 
 
 def _fault(ended: process.Ended, limits: Limits, log: Path) -> str:
@@ -261,39 +230,34 @@ def _fault(ended: process.Ended, limits: Limits, log: Path) -> str:
         return f"it printed more than {LOG_BYTES // MIB} MiB"
     if ended.over:
         return "no space is left on the disk"
-    if ended.returncode == 0:
-        return ""
     if ended.returncode == 128 + signal.SIGXFSZ:
         return f"it wrote a file of more than {FILE_BYTES // MIB} MiB"
     printed = process.last_words(log)
-    return f"it ended with {ended.returncode}{printed and f': {printed}'}"
+    return f"it ended with {ended.returncode}{printed and f': {printed}'}" * bool(ended.returncode)
 
 
-def _content(path: Path) -> bytes:
-    """The bytes of an answer; raises ValueError if there is no file, or it is too large."""
+def _answers(path: Path) -> dict[tuple[str, str], float]:
+    """The answers of a file, by quantity and `place_of`; raises ValueError for its first fault."""
     try:
         with opened(path) as stream:
             content = stream.read(ANSWER_BYTES + 1)
+        if len(content) > ANSWER_BYTES:
+            raise ValueError(f"has more than {ANSWER_BYTES // MIB} MiB")
+        # some programs begin a text with a mark of its encoding
+        rows = [line.split(",") for line in content.decode("utf-8-sig").split("\n")]
     except FileNotFoundError:
         raise ValueError(f"it wrote no {ANSWER}") from None
-    except OSError as error:
-        raise ValueError(f"{ANSWER} cannot be read: {error.strerror}") from None
-    if len(content) > ANSWER_BYTES:
-        raise ValueError(f"{ANSWER} has more than {ANSWER_BYTES // MIB} MiB")
-    return content
-
-
-def _parsed(data: bytes) -> dict[tuple[str, str], float]:
-    """The answers of a file, by quantity and `place_of`; raises ValueError for its first fault."""
-    answers: dict[tuple[str, str], float] = {}
-    try:
-        text = data.decode("utf-8-sig")  # some programs begin a text with a mark of its encoding
-        rows = [[word.strip() for word in row] for row in csv.reader(text.splitlines()) if row]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{ANSWER} is no table: {error}") from None
-    if rows[:1] != [["quantity", "at", "value"]]:
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{ANSWER} cannot be read: {error}") from None
+    rows = [[word.strip() for word in row] for row in rows]
+    if rows[0] != ["quantity", "at", "value"]:
         raise ValueError(f"{ANSWER} does not begin with quantity,at,value")
+    if rows[-1] != [""]:
+        raise ValueError(f"{ANSWER} is cut short: its last line has no end")
+    answers: dict[tuple[str, str], float] = {}
     for number, row in enumerate(rows[1:], 2):
+        if row == [""]:
+            continue
         try:
             quantity, at, value = row
             key, answer = (quantity, place_of(at)), float(value)
@@ -303,10 +267,8 @@ def _parsed(data: bytes) -> dict[tuple[str, str], float]:
             what = f"{','.join(row)[:80]!r} is not a quantity, its at and a finite number"
             raise ValueError(f"{ANSWER}, line {number}: {what}")
         if key in answers:
-            raise ValueError(f"{ANSWER} answers {_question(*key)} twice")
+            raise ValueError(f"{ANSWER} answers {row[0]} twice")
         answers[key] = answer
-    if not text.endswith("\n"):
-        raise ValueError(f"{ANSWER} is cut short: its last line has no end")
     return answers
 
 
@@ -315,36 +277,21 @@ def place_of(at: str) -> str:
     return f"{float(at):.7g}" if at.strip() else ""
 
 
-def _question(quantity: str, at: str) -> str:
-    return f"{quantity} at {at}" if at else quantity
-
-
-def _read(results: Path, names: Sequence[str]) -> tuple[dict[Any, float], pd.DataFrame]:
-    """The answers of a solver by scene, quantity and place; for each scene times and a fault."""
-    answers: dict[Any, float] = {}
-    rows = []
-    for name in names:
-        used, of_scene = read_json(results / name / USED) or {}, {}
-        error = str(used.get("error") or "")
-        try:
-            of_scene = {} if error else _parsed(_content(results / name / ANSWER))
-        except ValueError as fault:
-            error = str(fault)
-        answers |= {(name, *key): value for key, value in of_scene.items()}
-        times = {key: used.get(key) for key in ("seconds", "cpu_s", "peak_mib")}
-        # the message repeats the output of a program
-        row: Row = {
-            "scene": name,
-            "message": one_line(error),
-            **times,
-            STEPS: of_scene.get((STEPS, "")),
-        }
-        rows.append(row)
-    table = pd.DataFrame(rows)
-    for key in (*times, STEPS):  # anybody may have written the times
-        number = pd.to_numeric(table[key], errors="coerce")
-        table[key] = number.where(number.between(0, LARGEST, inclusive="neither"))
-    return answers, table
+def _read(folder: Path) -> Row:
+    """What a solver left of a scene: ``answers``, ``message`` with a fault, times and memory."""
+    used = read_json(folder / USED) or {}
+    error, answers = str(used.get("error") or ""), {}
+    try:
+        answers = {} if error else _answers(folder / ANSWER)
+    except ValueError as fault:
+        error = str(fault)
+    times = {key: used.get(key) for key in ("seconds", "cpu_s", "peak_mib")}
+    times[STEPS] = answers.get((STEPS, ""))
+    for key, value in times.items():  # anybody may have written them
+        is_known = isinstance(value, int | float) and 0 < value < LARGEST
+        times[key] = value if is_known else np.nan
+    # the message repeats the output of a program
+    return {"answers": answers, "message": one_line(error), **times}
 
 
 def judge(
@@ -352,15 +299,8 @@ def judge(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Compare the answers of solvers with the expected ones.
 
-    Parameters
-    ----------
-    chosen : Pack
-        The pack.
-    names : sequence of str
-        The scenes.
-    results : sequence of Path
-        For each solver the directory with its ``SCENE/answer.csv``, and ``ours/SCENE/answer.csv``
-        if ours ran in turn with it.
+    For each solver `results` has the directory with its ``SCENE/answer.csv``, and with
+    ``ours/SCENE/answer.csv`` if ours ran in turn with it.
 
     Returns
     -------
@@ -370,100 +310,88 @@ def judge(
     verdicts : DataFrame
         A row for each solver and scene: ``passed``, ``message``, errors and times.
     """
-    expected = chosen.expected[chosen.expected["scene"].isin(names)]
-    places = expected["at"].map(place_of)
-    keys = [*zip(expected["scene"], expected["quantity"], places, strict=True)]
-    tables, times = [], []
-    for place in results:
+    of_scenes: Any = chosen.expected.groupby("scene")
+    expected = {name: rows.to_dict("records") for name, rows in of_scenes}
+    numbers, verdicts = [], []
+    for place in (*results, results[0] / OURS):
         solver = printable(place.absolute().name)
-        (answers, used), (again, used_by_ours) = _read(place, names), _read(place / OURS, names)
-        ours = [again.get(key, stated) for key, stated in zip(keys, expected["ours"], strict=True)]
-        answer = [answers.get(key, np.nan) for key in keys]
-        tables.append(expected.assign(solver=solver, ours=ours, answer=answer))
-        for key in ("seconds", "cpu_s", STEPS):
-            used[f"ours_{key}"] = used_by_ours[key]
-        times.append(used.assign(solver=solver))
-    own = {key: times[0][f"ours_{key}"] for key in ("seconds", STEPS)}
-    own["cpu_s"] = pd.concat(times)["ours_cpu_s"].groupby(level=0).mean()
-    times.append(times[0].assign(solver=OURS, message="", peak_mib=np.nan, **own))
-    tables.append(tables[0].assign(solver=OURS, answer=tables[0]["ours"]))
-    numbers = pd.concat(tables, ignore_index=True)
-    # the error of a value of zero is the answer
-    value = numbers["value"]
-    numbers["error"] = (numbers["answer"] - value) / value.where(value != 0, 1.0)
-    numbers["within"] = within(numbers, numbers["tolerance"])
-
-    verdicts = pd.concat(times).set_index(["solver", "scene"])
-    for key in ("level", "kind"):
-        verdicts[key] = [chosen.scenes[name][key] for _, name in verdicts.index]
-    faults = _faults(numbers, chosen).reindex(verdicts.index)
-    is_silent = (verdicts["message"] != "") | (faults["rank"] > 1)
-    verdicts["answered"] = ~is_silent
-    verdicts["message"] = verdicts["message"].where(verdicts["message"] != "", faults["what"])
-    verdicts["message"] = verdicts["message"].fillna("")
-    verdicts["passed"] = verdicts["message"] == ""
-    judged = numbers[numbers["tolerance"].notna() & ~numbers["quantity"].isin(COUNTS)]
-    signed = judged.set_index(["solver", "scene"])["error"]
-    groups, sizes = signed.groupby(level=[0, 1]), signed.abs().groupby(level=[0, 1])
-    for name, errors in (
-        ("error", sizes.median()),
-        ("worst", sizes.max()),
-        ("bias", groups.median()),
-    ):
-        verdicts[name] = errors.reindex(verdicts.index).where(verdicts["answered"])
-    for ratio, key in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
-        verdicts[ratio] = (verdicts[key] / verdicts[f"ours_{key}"]).where(verdicts["answered"])
-    verdicts.loc[OURS, ["ratio", "cpu_ratio"]] = np.nan
-    return numbers, verdicts.reset_index()
+        for name in names:
+            read = _read(place / name)
+            ours = read if solver == OURS else _read(place / OURS / name)
+            rows = []
+            for row in expected[name]:
+                key, value = (row["quantity"], place_of(row["at"])), row["value"]
+                again = ours["answers"].get(key, row["ours"])
+                answer = again if solver == OURS else read["answers"].get(key, np.nan)
+                row = {"solver": solver, **row, "ours": again, "answer": answer}
+                # the error of a value of zero is the answer
+                row["error"] = (answer - value) / (value or 1.0)
+                rows.append(row | {"within": within(row, row["tolerance"])})
+            numbers += rows
+            verdicts.append(_verdict(solver, chosen.scenes[name], rows, read, ours))
+    table = pd.DataFrame(verdicts)
+    is_ours = table["solver"] == OURS
+    mean = table[~is_ours].groupby("scene")["ours_cpu_s"].mean()
+    table["cpu_s"] = table["cpu_s"].where(~is_ours, table["scene"].map(mean))
+    table.loc[is_ours, ["ratio", "cpu_ratio"]] = np.nan
+    return pd.DataFrame(numbers), table
 
 
-def within(numbers: pd.DataFrame, tolerance: Any) -> "pd.Series[bool]":
-    """Whether answers are in their intervals, widened by a tolerance; missing ones are not."""
-    margin = (tolerance + ROUND) * numbers["value"].abs()
-    return numbers["answer"].between(numbers["low"] - margin, numbers["high"] + margin)
+def within(row: Mapping[Any, Any], tolerance: float) -> bool:
+    """Whether an answer is in its interval, widened by a tolerance; a missing one is not."""
+    margin = (tolerance + ROUND) * abs(row["value"])
+    return bool(row["low"] - margin <= row["answer"] <= row["high"] + margin)
 
 
-def _faults(numbers: pd.DataFrame, chosen: Pack) -> pd.DataFrame:
-    """The worst fault of each solver in each scene that has one: ``rank`` and ``what``.
-
-    Ranks: 3, a number is missing; 2, a count is none; 1, a judged number is off.
-    """
-    index, answer = ["solver", "scene"], numbers["answer"]
-    counts = numbers["quantity"].isin((*COUNTS, "count"))
-    is_none = counts & ((answer < 0) | (answer % 1 != 0))
-    # at the last load step both are asked: together they are the counted grains
-    ends: Any = numbers[numbers["quantity"].isin(("moved", "not_moved"))]
-    ends = ends[ends.duplicated([*index, "at"], keep=False)].groupby(index)
-    total = numbers[numbers["quantity"] == "count"].set_index(index)["answer"]
-    summed = ends["answer"].sum(min_count=2)
-    total = total.reindex(summed.index).fillna(ends["value"].sum())
-    lost = {*summed.index[summed.notna() & (summed != total)]}
-    ids = zip(numbers["solver"], numbers["scene"], strict=True)
-    is_lost = (numbers["quantity"] == "not_moved") & np.array([key in lost for key in ids])
-    is_off = numbers["tolerance"].notna() & ~numbers["within"]
-    rank = np.select([answer.isna(), is_none | is_lost, is_off], [3, 2, 1], 0)
-    # a count that is off is named only if nothing else is
-    size = numbers["error"].abs().where(~counts, 0.0)
-    table = numbers.assign(rank=rank, size=size, is_none=is_none)[rank > 0]
-    table = table.sort_values(["rank", "size"], ascending=False, kind="stable")
-    table["others"] = table.groupby([*index, "rank"])["rank"].transform("size") - 1
-    worst = table.drop_duplicates(index)
-    return worst.assign(what=[_what(row) for row in worst.to_dict("records")]).set_index(index)
-
-
-def _what(row: Mapping[Any, Any]) -> str:
-    question, answer = _question(row["quantity"], row["at"]), row["answer"]
-    if row["rank"] == 3:
-        what = f"{ANSWER} lacks {question}"
-    elif row["is_none"]:
-        what = f"{question} is {answer:g}: it counts grains"
-    elif row["rank"] == 2:
-        what = "the counts do not make N: moved and not_moved at the last load step"
-    else:
-        what = f"{question} is {answer:.6g}, not {row['value']:.6g}"
+def _verdict(solver: str, given: Row, rows: Sequence[Row], read: Row, ours: Row) -> Row:
+    """The verdict on the answers of a solver to a scene; what it and ours used."""
+    message = "" if solver == OURS else read["message"]
+    message = message or _not_whole(rows, given.get("count"))
+    answered = not message
+    judged = [row for row in rows if row["tolerance"] == row["tolerance"]]
+    if off := [row for row in judged if answered and not row["within"]]:
+        # a count is named only if nothing else is off
+        row = max(off, key=lambda row: abs(row["error"]) * (row["quantity"] not in COUNTS))
+        message = f"{_question(row)} is {row['answer']:.6g}, not {row['value']:.6g}"
         if row["low"] < row["high"]:
-            what += f" ({row['low']:.6g} ... {row['high']:.6g})"
-    return what + (f", and {row['others']} more" if row["others"] else "")
+            message += f" ({row['low']:.6g} ... {row['high']:.6g})"
+        message += f", and {len(off) - 1} more are off" * (len(off) > 1)
+    errors = np.array([row["error"] for row in judged if row["quantity"] not in COUNTS])
+    if not answered or not errors.size:
+        errors = np.array([np.nan])
+    return {
+        **{"solver": solver, "scene": rows[0]["scene"]},
+        **{"level": given["level"], "kind": given["kind"], "message": message},
+        **{key: read[key] for key in ("seconds", "cpu_s", "peak_mib", STEPS)},
+        **{f"ours_{key}": ours[key] for key in ("seconds", "cpu_s", STEPS)},
+        **{"answered": answered, "passed": not message},
+        "error": np.median(np.abs(errors)),
+        "worst": np.abs(errors).max(),
+        "bias": np.median(errors),
+        "ratio": read["seconds"] / ours["seconds"] if answered else np.nan,
+        "cpu_ratio": read["cpu_s"] / ours["cpu_s"] if answered else np.nan,
+    }
+
+
+def _not_whole(rows: Sequence[Row], count: float | None) -> str:
+    """What lacks in the answers to a scene, or which count is none; `count` is N of the scene."""
+    if lacking := [row for row in rows if row["answer"] != row["answer"]]:
+        more = f" and {len(lacking) - 1} more" * (len(lacking) > 1)
+        return f"{ANSWER} lacks {_question(lacking[0])}{more}"
+    answers = {(row["quantity"], row["at"]): row["answer"] for row in rows}
+    total = answers.get(("count", ""), count)
+    for row in rows:
+        quantity, answer = row["quantity"], row["answer"]
+        if quantity in (*COUNTS, "count") and (answer < 0 or answer % 1):
+            return f"{_question(row)} is {answer:g}: it counts grains"
+        moved = answers.get(("moved", row["at"]))
+        if quantity == "not_moved" and None not in (moved, total) and moved + answer != total:
+            return f"the counts do not make N: {moved:g} moved and {answer:g} not, of {total:g}"
+    return ""
+
+
+def _question(row: Row) -> str:
+    return f"{row['quantity']} at {row['at']}" if row["at"] else str(row["quantity"])
 
 
 def failures(verdicts: pd.DataFrame) -> pd.DataFrame:

@@ -58,20 +58,9 @@ NAMED: dict[str, Callable[[Any], str]] = {
 def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     """Write a pack, and return how many scenes it has.
 
-    Parameters
-    ----------
-    root : Path
-        Its directory.
-    source : Path or None
-        Directory of a finished study. Without one the answers are formulas: levels 1 and 2.
-    levels : collection of int
-        The levels; empty for all that the source has.
-
-    Raises
-    ------
-    InputError
-        If a level needs a study, or the study is not finished, not answered as it asks, or asks for
-        beds that change or lie in space.
+    `source` is the directory of a finished study; without one the answers are formulas, of levels
+    1 and 2 alone. Raises InputError if a level needs a study, or the study is not finished, not
+    answered as it asks, or asks for beds that change or lie in space.
     """
     levels = levels or (FORMULAS if source is None else {kind.level for kind in KINDS.values()})
     kinds = [name for name, kind in KINDS.items() if kind.level in levels]
@@ -106,21 +95,16 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
 
 def _check(asked: Study, planned: Plan, source: Path) -> None:
     """See that a study is one whose scenes a pack can hold."""
-    faults = {
-        f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask": not all(
-            answer.is_as_asked for answer in planned.decisions.values()
-        ),
-        "protocol.update: a pack holds one flow over each bed": any(
-            scene.protocol.update for scene in asked.scenes
-        ),
-        "bed.width: a pack holds grains in the plane of the flow": any(
-            pile.bed.width for pile in planned.piles.values()
-        ),
-    }
-    for what, is_so in faults.items():
-        if is_so:
-            remedy = "run the study without it into another directory"
-            raise InputError(what, where=str(source), remedy=remedy)
+    what = ""
+    if not all(answer.is_as_asked for answer in planned.decisions.values()):
+        what = f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"
+    elif any(scene.protocol.update for scene in asked.scenes):
+        what = "protocol.update: a pack holds one flow over each bed"
+    elif any(pile.bed.width for pile in planned.piles.values()):
+        what = "bed.width: a pack holds grains in the plane of the flow"
+    if what:
+        remedy = "run the study without it into another directory"
+        raise InputError(what, where=str(source), remedy=remedy)
 
 
 def problems(
@@ -128,16 +112,8 @@ def problems(
 ) -> Iterator[tuple[Problem, tuple[str, ...]]]:
     """The scenes of a study as problems of some kinds, each with the runs that answer it.
 
-    Parameters
-    ----------
-    asked, planned : Study, Plan
-        The study and its plan.
-    results : dict of str to DataFrame
-        Its tables; for formulas alone it may be empty.
-    cases : Path
-        Directory of its cases.
-    kinds : collection of str
-        Names of `KINDS`.
+    The study's tables are `results`, empty for formulas alone, and its runs lie in `cases`; `kinds`
+    are names of `KINDS`.
     """
     if "collision" in kinds:
         for check in scenes.checks():
@@ -221,13 +197,9 @@ class Took(NamedTuple):
 
 
 class Ours:
-    """The solvers of this package on the scenes of a pack, in a directory of cases.
+    """The solvers of this package on the scenes named of a pack, in a directory of cases.
 
-    Raises
-    ------
-    InputError
-        If the study of the pack names a file, or lacks one of the scenes named: the pack is of
-        another version of the program.
+    Raises InputError if the study of the pack names a file, or lacks one of the scenes.
     """
 
     def __init__(self, chosen: Pack, names: Sequence[str], root: Path) -> None:
@@ -246,45 +218,35 @@ class Ours:
         piles = planned.piles.values()
         flows = {digests[run.id[:12]]: p.scene for p in piles for run in p.model.cases}
         self.scenes = {digests[scene.id]: scene for scene in self.study.scenes} | flows
-        self.times: dict[str, Took] = {}
         for name in names:
             if chosen.scenes[name]["kind"] not in CHECKS and name[2:] not in self.scenes:
                 what = f"no scene of its study is {name}: it is of another version of the program"
                 raise InputError(what, where=str(chosen.root), remedy="export it again")
 
     def answer(self, name: str) -> tuple[pd.DataFrame, Took]:
-        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its time.
-
-        Raises
-        ------
-        SolverError
-            If a solver failed.
-        """
+        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its time."""
         given = self.pack.scenes[name]
         if given["kind"] in CHECKS:
             return run_check(given["kind"], given, self.root / "checks")
         group = Group("benchmark", (self.scenes[name[2:]],), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
-        # several scenes share a flow or a poured bed, which is run once
-        shared = [r for p in planned.piles.values() for r in (*p.model.cases, *p.pouring)]
-        needed: Sequence[Case] = [*planned.cases.values()]
-        needed = {"closed-form": [], "flow": shared}.get(given["kind"], needed)
-        for run in needed:
-            if run not in shared or run.name not in self.times:
+        flows = [run for pile in planned.piles.values() for run in pile.model.cases]
+        runs: Sequence[Case] = [*planned.cases.values()]
+        runs = {"closed-form": [], "flow": flows}.get(given["kind"], runs)
+        for run in runs:  # several scenes share a flow, a poured bed or a pile
+            if not case.done_state(run, self.root):
                 engine.execute(run, self.root, LIMIT_S)
-                state = case.done_state(run, self.root) or {}
-                self.times[run.name] = Took(float(state["solver_s"]), float(state["cpu_s"]))
-        done = {run.name for run in needed}
-        results = tables.make(asked, planned, self.root, done) if needed else {}
-        ((problem, runs),) = problems(asked, planned, results, self.root, [given["kind"]])
+        states = planned.done(self.root)
+        results = tables.make(asked, planned, self.root, states) if states else {}
+        ((problem, names),) = problems(asked, planned, results, self.root, [given["kind"]])
         answer = problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
         if given["kind"] == "pile":
-            steps = pd.read_csv(self.root / runs[0] / "samples.csv")["step"].iloc[-1]
+            steps = pd.read_csv(self.root / names[0] / "samples.csv")["step"].iloc[-1]
             row = pd.DataFrame({"quantity": ["steps"], "at": [""], "value": [float(steps)]})
             answer = pd.concat([answer, row])
-        times = [self.times[run] for run in runs] or [Took()]
-        return answer, Took(*map(sum, zip(*times, strict=True)))
+        times = [Took(states[name]["solver_s"], states[name]["cpu_s"]) for name in names]
+        return answer, Took(*map(sum, zip(*(times or [Took()]), strict=True)))
 
 
 def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Took]:

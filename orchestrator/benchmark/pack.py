@@ -90,20 +90,9 @@ _PARAMETERS = TypeAdapter(
 class Problem:
     """A scene with its questions and their answers.
 
-    Attributes
-    ----------
-    name : str
-        Name of the scene, unique among those of its level.
-    kind : str
-        One of `KINDS`.
-    parameters : mapping
-        Numbers and words, SI units in their names.
-    tables : mapping of str to DataFrame
-        Tables that lie beside them, by the stem of the file's name.
-    expected : DataFrame
-        Columns `COLUMNS`, a row for each number that is asked; `at` is a text.
-    seconds : float
-        Time of our answer, s; NaN if it is not known.
+    `name` is unique among the scenes of its level. The entries of ``scene.json`` are `parameters`;
+    `tables` lie beside it, by the stems of their files. `expected` has the columns `COLUMNS` and a
+    row for each number that is asked; `at` is a text. `seconds` is the time of our answer, s.
     """
 
     name: str
@@ -158,19 +147,7 @@ def expectation(
 
 @dataclass(frozen=True)
 class Pack:
-    """A pack that was read.
-
-    Attributes
-    ----------
-    root : Path
-        Its directory.
-    manifest : Manifest
-        Its manifest.
-    scenes : dict of str to dict
-        The parameters of each scene, by its name, as its ``scene.json`` has them.
-    expected : DataFrame
-        ``scene`` and `COLUMNS`; `at` is a text.
-    """
+    """A pack that was read: its directory, its scenes' entries by name, its expected answers."""
 
     root: Path
     manifest: Manifest
@@ -181,10 +158,8 @@ class Pack:
 def read(root: Path) -> Pack:
     """Read a pack, and see that it is as it was exported.
 
-    Raises
-    ------
-    InputError
-        If there is none, or it is of another schema, changed, or holds what no export writes.
+    Raises InputError if there is none, or it is of another schema, changed, or holds what no export
+    writes.
     """
     if not os.path.lexists(root / MANIFEST):
         raise InputError(
@@ -294,12 +269,8 @@ def write(
 
     Scenes of which no number is judged are left out. `root` is new, empty, or the directory of a
     pack of the same study. `study` are the name and the text of the study file; `programs` gave
-    the expected answers, with their versions.
-
-    Raises
-    ------
-    InputError
-        If the directory holds something else.
+    the expected answers, with their versions. Raises InputError if the directory holds something
+    else.
     """
     name, text = study
     with workspace.claimed(root, workspace.PACK, name) as folder:

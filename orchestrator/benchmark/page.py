@@ -127,8 +127,10 @@ def thresholds(chosen: Pack, numbers: pd.DataFrame) -> pd.DataFrame:
     }
     for solver in _solvers(asked):
         rows = asked[asked["solver"] == solver]
-        is_fine = rows["answer"].isna() | compare.within(rows, 0.0)
-        marks = np.select([is_fine, compare.within(rows, rows["tolerance"])], ["", " *"], " **")
+        marks = [
+            "" if compare.within(row, 0.0) else " *" if row["within"] else " **"
+            for row in rows.to_dict("records")
+        ]
         pairs = zip(rows["answer"], marks, strict=True)
         table[solver] = ["—" if x != x else f"{x:#.3g}{mark}" for x, mark in pairs]
     ends = zip(first["low"], first["high"], strict=True)

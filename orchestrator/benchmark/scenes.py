@@ -1,6 +1,5 @@
 """The scenes of a pack: levels 1 and 2 are formulas, levels 3 to 5 the results of a study."""
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -107,7 +106,6 @@ def _asked(rows: Iterable[Row]) -> pd.DataFrame:
 
 def closed_form(scene: Scene) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
-    started = time.perf_counter()
     exact = study_form.closed_form(scene)
     flows = [float(f"{x * float(exact.friction_velocity):.4g}") for x in FLOWS]
     laws = zip(("drag_n", "lift_n"), study_form.forces(scene), strict=True)
@@ -115,8 +113,7 @@ def closed_form(scene: Scene) -> Problem:
     values += [("ustar_m_s", float(exact.friction_velocity), None)]
     values += [(name, float(getattr(exact, name)), None) for name in ("reynolds", "shields")]
     asked = _asked(expectation(name, x, FORMULA, at, ours=x) for name, x, at in values)
-    seconds = time.perf_counter() - started
-    return Problem(scene.id, "closed-form", parameters(scene, "closed-form"), {}, asked, seconds)
+    return Problem(scene.id, "closed-form", parameters(scene, "closed-form"), {}, asked)
 
 
 def pivot(scene: Scene, ours: float = np.nan) -> Problem:
@@ -212,15 +209,9 @@ def _check(
 def passing_time(push: float, criterion: float) -> float:
     """Time, sqrt(d/g'), in which a pushed grain rolls over its neighbour as far as the criterion.
 
-    It rolls without slip on a circle of radius d, from rest: the work of the force and of the
-    weight is its energy, (1 + 2/5) v^2/2 by its moment of inertia.
-
-    Parameters
-    ----------
-    push : float
-        Force along the level bed over that at which the grain begins to roll.
-    criterion : float
-        Displacement along the bed, d; the grain is over its neighbour at cos(beta).
+    `push` is the force along the level bed over that at which the grain begins to roll, `criterion`
+    the displacement along the bed, d. It rolls without slip on a circle of radius d, from rest: the
+    work of the force and of the weight is its energy, (1 + 2/5) v^2/2 by its moment of inertia.
     """
     lean = np.pi / 2 - np.radians(PASSING_DEG)
     force = push * np.tan(lean)
@@ -275,16 +266,8 @@ def flow(pile: Pile, results: Tables) -> Problem:
 def bed(kind: str, pile: Pile, results: Tables, cases: Path) -> Problem:
     """Levels 4 and 5: the grains of a bed that DEM answered.
 
-    Parameters
-    ----------
-    kind : str
-        ``pile``, under the given stress, or ``line``, whose flow the solver finds.
-    pile : Pile
-        The bed; its runs are done.
-    results : dict of str to DataFrame
-        The tables of its study.
-    cases : Path
-        Directory of the runs.
+    The kind is ``pile``, under the given stress, or ``line``, whose flow the solver finds.
+    `results` are the tables of the study, `cases` is the directory of the runs, which are done.
     """
     scene, d = pile.scene, pile.scene.grain.diameter
     curve, thresholds = (
