@@ -188,13 +188,10 @@ def test_how_grains_move(tmp_path: Path) -> None:
     """
     one = _cells(text)
     motion = _run(one, tmp_path)
-    modes = dict(
-        zip((scene.forces.lift_coefficient for scene in one.scenes), motion.mode, strict=True)
-    )
-    places = [scene.forces.law for scene in one.scenes]
-    back = places.index("low")
-    assert MODES[modes[0.0]] == "rolled"
-    assert MODES[modes[100.0]] == "lifted"
+    names = [scene.forces.lift_coefficient for scene in one.scenes]
+    back = [scene.forces.law for scene in one.scenes].index("low")
+    assert MODES[motion.mode[names.index(0.0)]] == "rolled"
+    assert MODES[motion.mode[names.index(100.0)]] == "lifted"
     assert (motion.level[back], motion.mode[back]) == (0, 0)
     assert motion.fallen[back] > 0
     assert np.isnan(threshold.of_grains(motion).value[back])
