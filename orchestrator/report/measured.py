@@ -124,7 +124,7 @@ def fits(results: Results) -> list[Fit]:
 
 def best(ranked: Sequence[Fit]) -> list[Fit]:
     """The first of each law."""
-    return list({fit.law: fit for fit in reversed(ranked)}.values())[::-1]
+    return [fit for at, fit in enumerate(ranked) if fit.law not in {f.law for f in ranked[:at]}]
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:

@@ -6,20 +6,16 @@ from collections.abc import Iterator
 from typing import Any
 
 RC: dict[Any, Any] = {
-    "font.size": 8,
+    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize"), 8),
+    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 7),
+    # numbers at minor ticks stand in line with those at major ones
+    **dict.fromkeys(("xtick.minor.pad", "ytick.minor.pad"), 5),
     "font.sans-serif": ["DejaVu Sans"],  # which matplotlib brings: no font of the machine is used
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "legend.fontsize": 7,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "xtick.minor.pad": 5,  # numbers at minor ticks stand in line with those at major ones
-    "ytick.minor.pad": 5,
     "axes.linewidth": 0.6,
+    "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
     "lines.linewidth": 1.2,
     "lines.markersize": 4.2,
     "mathtext.fontset": "dejavusans",
-    "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
     "legend.frameon": False,
     "legend.handlelength": 2.2,
     "svg.hashsalt": "orchestrator",
@@ -31,12 +27,12 @@ RC: dict[Any, Any] = {
 @contextlib.contextmanager
 def own() -> Iterator[None]:
     """Draw by matplotlib's defaults and `RC` alone while the block runs, not by a matplotlibrc."""
-    import matplotlib  # half a second, which only who draws waits for
+    import matplotlib  # takes half a second, for which only drawing waits
 
     log = logging.getLogger("matplotlib")
     level = log.level
     log.setLevel(logging.ERROR)  # a cache that cannot be kept is of no concern to the user
-    defaults = dict(matplotlib.rcParamsDefault)
+    defaults: dict[Any, Any] = dict(matplotlib.rcParamsDefault)
     del defaults["backend"]  # figures are made without a window
     try:
         with matplotlib.rc_context({**defaults, **RC}):

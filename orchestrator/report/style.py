@@ -31,6 +31,8 @@ SHADES = {
 }
 """Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
 DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
+LONG = 42
+"""Letters of an entry of a legend, of which three columns do not fit into a figure."""
 WATER = "#74aed6"
 AIR = "#8c6d46"
 BED = "#d9c9a3"
@@ -87,9 +89,8 @@ def palette(column: str, values: Sequence[float]) -> dict[float, str]:
     if column == "d_m" and len(values) <= len(DIAMETERS):
         return dict(zip(values, DIAMETERS, strict=False))
     name, first, last = SHADES[column]
-    steps = max(len(values) - 1, 1)
-    shades = (first + (last - first) * i / steps for i in range(len(values)))
-    return {v: to_hex(colormaps[name](x)) for v, x in zip(values, shades, strict=True)}
+    step = (last - first) / max(len(values) - 1, 1)
+    return {v: to_hex(colormaps[name](first + i * step)) for i, v in enumerate(values)}
 
 
 def canvas(height: float) -> Canvas:
@@ -123,7 +124,8 @@ def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) 
         handles: list[Any] = list(looks)  # the stubs know no samples of two marks
         names = [str((item[0] if isinstance(item, tuple) else item).get_label()) for item in looks]
         beside = {tuple: HandlerTuple(ndivide=None)}
-        figure.legend(handles, names, loc="outside lower center", ncols=3, handler_map=beside)
+        columns = 3 if max(map(len, names)) < LONG else 2
+        figure.legend(handles, names, loc="outside lower center", ncols=columns, handler_map=beside)
 
 
 def entry(label: str, colour: str) -> Line2D:
@@ -131,15 +133,9 @@ def entry(label: str, colour: str) -> Line2D:
     return Line2D([], [], color=colour, lw=2.5, label=label)
 
 
-def note(ax: Axes, x: float, text: str) -> None:
-    """A small text at the upper end of a place on the x axis."""
-    ax.text(x, 0.97, text, ha="center", va="top", transform=ax.get_xaxis_transform(), **NOTE)
-
-
 def upright_note(ax: Axes, x: float, text: str, at: Literal["top", "bottom"]) -> None:
     """A small text along the left side of a vertical line."""
-    y = 0.97 if at == "top" else 0.03
-    place = ax.get_xaxis_transform()
+    y, place = 0.97 if at == "top" else 0.03, ax.get_xaxis_transform()
     ax.text(x, y, text, ha="right", va=at, rotation=90, transform=place, **NOTE)
 
 

@@ -206,7 +206,7 @@ def _thresholds(
         table["diameter, mm"] = span("g", "d_m", scale=1e3)
     table[tau] = span(".4f", "shields")
     table["interval"] = span(".4f", "shields_low", "shields_high")
-    if "shields_model_low" in rows:
+    if "shields_model_low" in rows and not ranges:
         wide = span(".3f", "shields_model_low", "shields_model_high")
         shares = zip(wide, first["model_share"], strict=True)
         table["model's interval"] = [f"{a}, most by {b}" if a != "—" else a for a, b in shares]
