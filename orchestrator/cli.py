@@ -121,19 +121,26 @@ def _workers(text: str) -> int:
 
 
 def _study(options: Namespace) -> int:
+    from orchestrator.runs import workspace
+
+    again = "every case was done already; no solver was started"
+    asked = options.source, options.out, options.tolerance
+    if not options.plan and (answer_and_page := workspace.finished(*asked)):
+        print(again, file=sys.stderr)
+        print(*answer_and_page, sep="\n")
+        return 0
     from orchestrator import face, pipeline, plan
-    from orchestrator.runs.workspace import Workspace
 
     study = face.load(options.source, options.tolerance, "--tolerance")
     out, workers = options.out or Path("results") / study.name, options.workers
     if options.plan:
-        cases = Workspace(out.absolute()).cases
+        cases = workspace.Workspace(out.absolute()).cases
         print("\n".join(plan.forecast(study, cases, workers)))
         return 0
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
     finished = pipeline.run(study, out, workers=workers, queue=queue, guests=face.GUESTS)
     if not finished.started:
-        print("every case was done already; no solver was started", file=sys.stderr)
+        print(again, file=sys.stderr)
     if finished.left:
         what = f"the study file has changed: {len(finished.left)} cases are not asked for any more"
         print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)

@@ -2,21 +2,23 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from orchestrator import __version__, plan, report, tables
+from orchestrator import plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.fidelity import limits
 from orchestrator.plan import Plan
 from orchestrator.report import Guest
 from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
-from orchestrator.runs.files import canonical_json, digest_text, read_json, text_of
+from orchestrator.runs.files import text_of
 from orchestrator.runs.progress import Display, Forecast
 from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, claimed, read_marker
 from orchestrator.study.study import Study, parse
@@ -75,15 +77,13 @@ def run(
             planned = plan.settled(study, space.cases)
             _describe(space, study, planned)
             states |= planned.done(space.cases, but=states)
-        marker = read_json(space.drawn)
-        answer = marker.get("answer") if isinstance(marker, dict) else None
-        is_drawn = marker == {**_drawn_of(study, planned, space), "answer": answer}
-        if started or not is_drawn or not space.is_whole(MARKERS):
+        answer = space.answer(_ids(planned))
+        if started or answer is None:
             failures = {name: error for name, error in failures.items() if name in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
             answer = _draw(study, planned, space, states, failures, guests)
         left = space.left(planned.cases) if changed else ()
-        return Finished(space.page, started, failures, left, str(answer))
+        return Finished(space.page, started, failures, left, answer)
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -194,13 +194,14 @@ def _draw(
     answer = report.said(results)
     if not failures:
         terminal.check()
-        marker = {**_drawn_of(study, planned, space), "answer": answer}
+        with warnings.catch_warnings(record=True) as caught:
+            limits.check_study(study)
+        texts = [str(each.message) for each in caught]
+        marker = {**space.drawn_of(_ids(planned)), "answer": answer, "warnings": texts}
         space.put(STATE, text_of(marker))
     return answer
 
 
-def _drawn_of(study: Study, planned: Plan, space: Workspace) -> dict[str, Any]:
-    """Digests of all that the tables and figures are made of, and of them."""
-    cases = [case.id for case in planned.cases.values()]
-    made_of = [__version__, sorted(tables.COLUMNS), study.text, study.tolerance, cases]
-    return {"of": digest_text(canonical_json(made_of)), "sha256": space.written(MARKERS)}
+def _ids(planned: Plan) -> dict[str, str]:
+    """The ids of the cases of a plan, by name."""
+    return {name: case.id for name, case in planned.cases.items()}

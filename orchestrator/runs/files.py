@@ -58,7 +58,7 @@ def opened(path: Path) -> BufferedReader:
     return os.fdopen(handle, "rb")
 
 
-def read_json(path: Path) -> Any | None:
+def read_json(path: Path) -> Any:
     """The file's value, or None where it is missing or cannot be read: unreadable is undone."""
     try:
         with opened(path) as stream:

@@ -5,8 +5,11 @@ import csv
 import fcntl
 import os
 import socket
+import tomllib
+import warnings
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +20,16 @@ from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process
 from orchestrator.runs.case import DONE, Case, failure, names_in, size
-from orchestrator.runs.files import RECORD, Folder, opened, read_json, size_of, text_of
+from orchestrator.runs.files import (
+    RECORD,
+    Folder,
+    canonical_json,
+    digest_text,
+    opened,
+    read_json,
+    size_of,
+    text_of,
+)
 
 LOCK = ".lock"
 WAIT_S = 1.0
@@ -167,6 +179,19 @@ class Workspace(Folder):
         remedy = "name the directory that a study was written to"
         raise InputError("there is no study in this directory", str(self.root), remedy)
 
+    def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
+        """All that a page is made of: the question, the ids of the cases by name, code, files."""
+        about = self.description()
+        question = digest_text(canonical_json([about.get("study"), about.get("tolerance")]))
+        made_of = {"question": question, "cases": dict(ids), "code": _code_digest()}
+        return {**made_of, "sha256": self.written(MARKERS)}
+
+    def answer(self, ids: Mapping[str, str]) -> str | None:
+        """The answer on the page of these cases; None where it is not finished, or has changed."""
+        marker = read_json(self.drawn)
+        is_drawn = isinstance(marker, dict) and {**marker, **self.drawn_of(ids)} == marker
+        return str(marker["answer"]) if is_drawn and self.is_whole(MARKERS) else None
+
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """The cases that are there without being asked for: an earlier study file did."""
         return tuple(name for name in names_in(self.cases) if name not in asked)
@@ -182,6 +207,48 @@ class Workspace(Folder):
             remedy = "`orchestrator study` runs them again; to draw the others, move tables away"
             what = f"{missing}: the tables stay as they are"
             raise OrchestratorError(what, str(self.root), remedy)
+
+
+@cache
+def _code_digest() -> str:
+    """Digest of the names, sizes and times of change of all files of package and templates."""
+    roots = (case_states.PACKAGE, case_states.templates())
+    folders = (each for root in roots for each in os.walk(root))
+    paths = sorted(Path(place, name) for place, _, names in folders for name in names)
+    files = {str(path): path.stat() for path in paths if path.suffix != ".pyc"}
+    stamps = [(name, file.st_size, file.st_mtime_ns) for name, file in files.items()]
+    return digest_text(canonical_json(stamps))
+
+
+def finished(source: str, out: Path | None, tolerance: float | None) -> tuple[str, Path] | None:
+    """The answer and the page of a study file, or preset, that is finished and has not changed.
+
+    None where anything may have changed: the file, its profiles, the tolerance, a case, a table, a
+    figure, this package. The scenes are not made, so no library of numbers is imported.
+    """
+    brought = {path.stem: path for path in case_states.PACKAGE.glob("*/presets/*.toml")}
+    file = brought.get(source, Path(source)).absolute()
+    space = Workspace((out or Path("results", file.stem)).absolute())
+    about, marker = read_json(space.root / STUDY.marker), read_json(space.drawn)
+    try:
+        study, ids = about["study"], marker["cases"]
+        text = file.read_bytes().decode("utf-8-sig")
+        profiles = tomllib.loads(study.removeprefix(text)).get("profiles", {})
+        texts = {name: (file.parent / name).read_bytes().decode("utf-8-sig") for name in profiles}
+        if tolerance is None:
+            tolerance = tomllib.loads(text).get("tolerance")
+        asked = (text, texts, tolerance, os.path.relpath(file, space.root), [*ids])
+        was = (study[: len(text)], profiles, about["tolerance"], about["file"], about["cases"])
+        _check(space, STUDY, file.stem)
+        if asked != was or space.is_held() or (answer := space.answer(ids)) is None:
+            return None
+        if not all(case_states.marker_of(space.cases / name, id_) for name, id_ in ids.items()):
+            return None
+        for text in marker["warnings"]:
+            warnings.warn(text, stacklevel=2)
+        return answer, space.page
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, OrchestratorError):
+        return None
 
 
 def status(directory: Path) -> tuple[str, bool]:

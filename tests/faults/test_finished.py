@@ -134,6 +134,23 @@ def _command(folder: Path, *words: str, **variables: str) -> "subprocess.Complet
     )
 
 
+def test_a_finished_study_is_answered_without_any_library(finished: Bench) -> None:
+    for name in ("numpy", "pandas", "pydantic"):
+        (finished.folder / f"{name}.py").write_text("raise ImportError('for this test')\n")
+    words, path = (
+        (*ORCHESTRATOR, "study", "small.toml", "--out", "out"),
+        f"{finished.folder}:{ROOT}",
+    )
+    ended = _command(finished.folder, *words, PYTHONPATH=path)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.endswith(f"{finished.out}/report.html\n")
+    assert "One grain of" in ended.stdout
+    for change in (["--tolerance", "0.1"], []):
+        if not change:
+            finished.source.write_text(f"title = 'another'\n{finished.source.read_text()}")
+        assert _command(finished.folder, *words, *change, PYTHONPATH=path).returncode == 1
+
+
 def test_warnings_that_are_errors_end_no_command(tmp_path: Path) -> None:
     text = (HEAD + PILE).replace("waiting_time = 3.0", "waiting_time = 2.0")
     (tmp_path / "small.toml").write_text(text)
