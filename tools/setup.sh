@@ -148,6 +148,7 @@ set_up() {
     check_python
     venv_holds "$@" || install_venv "$@"
     linked || link_checkout
+    "$environment/bin/python" -m compileall -q orchestrator || : # a first start without delay
     exec 9<&-
 }
 

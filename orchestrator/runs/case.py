@@ -236,7 +236,7 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
         marked = (directory / DONE).stat().st_mtime_ns
         for name, digest in digests.items():
             path = directory / name
-            if name in state["bulky"] and not os.path.lexists(path):
+            if name in state.get("bulky", ()) and not os.path.lexists(path):
                 continue
             # Digests of a thousand piles are those of 7 GB: they are compared only if size or time
             # have changed. A file written in the same tick of the clock as the marker may have
@@ -265,7 +265,7 @@ def prune(case: Case, cases: Path) -> None:
     """
     directory, state = cases / case.name, done_state(case, cases)
     if state:
-        for path in _matching(directory, state["bulky"]):
+        for path in _matching(directory, state.get("bulky", ())):
             path.unlink()
             with contextlib.suppress(OSError):  # it is not empty
                 os.removedirs(path.parent)
