@@ -3,7 +3,6 @@
 import importlib.util
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from tests.cluster import slurm
 from tests.cluster.slurm import Slurm
 from tests.conftest import Shared
-from tests.faults.bench import undisturbed
+from tests.faults.bench import ORCHESTRATOR, ROOT, undisturbed
 
 STUDY = """
 time_limit = 100
@@ -40,24 +39,17 @@ interface = "lo"
 Start = Callable[..., "subprocess.Popen[str]"]
 
 
-def _here() -> None:
-    lacking = slurm.missing()
-    if importlib.util.find_spec("dask_jobqueue") is None:
-        lacking.append("dask-jobqueue")
-    if not lacking:
-        return
-    why = f"without {', '.join(lacking)}; `sh tools/setup.sh test` installs all"
-    if os.environ.get("SKIP_NOTHING"):
-        pytest.fail(why)
-    pytest.skip(why)
-
-
 @pytest.fixture(scope="session")
 def queue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slurm]:
     """Two nodes of one core."""
-    _here()
-    with slurm.running(tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1) as found:
-        yield found
+    lacking = slurm.missing()
+    if importlib.util.find_spec("dask_jobqueue") is None:
+        lacking.append("dask-jobqueue")
+    if lacking:
+        stop = pytest.fail if os.environ.get("SKIP_NOTHING") else pytest.skip
+        stop(f"without {', '.join(lacking)}; `sh tools/setup.sh test` installs all")
+    with slurm.running(tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1) as started:
+        yield started
 
 
 @pytest.fixture
@@ -67,18 +59,16 @@ def start(tmp_path: Path, queue: Slurm) -> Iterator[Start]:
     (tmp_path / "small.toml").write_text(STUDY)
 
     def run(*arguments: str) -> "subprocess.Popen[str]":
-        root = Path(__file__).parent.parent.parent
-        started.append(
-            subprocess.Popen(
-                [sys.executable, "-m", "orchestrator", *arguments],
-                cwd=tmp_path,
-                env={**queue.environment, "PYTHONPATH": str(root)},
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-            )
+        driver = subprocess.Popen(
+            [*ORCHESTRATOR, *arguments],
+            cwd=tmp_path,
+            env={**queue.environment, "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
         )
-        return started[-1]
+        started.append(driver)
+        return driver
 
     yield run
     for process in started:

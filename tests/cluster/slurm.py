@@ -48,22 +48,14 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 """
 
 
+MUNGE = ("key-file", "socket", "pid-file", "log-file", "seed-file")
+
+
 @dataclass(frozen=True)
 class Slurm:
-    """A running Slurm.
+    """A running Slurm, and the environment in which its commands and their callers find it."""
 
-    Attributes
-    ----------
-    configuration : Path
-        Its slurm.conf, for the environment of whoever uses it.
-    """
-
-    configuration: Path
-
-    @property
-    def environment(self) -> dict[str, str]:
-        """The environment in which its commands, and programs that call them, find it."""
-        return {**os.environ, "SLURM_CONF": str(self.configuration)}
+    environment: dict[str, str]
 
     def says(self, *command: str) -> str:
         """What one of its commands prints."""
@@ -76,6 +68,13 @@ class Slurm:
         lines = self.says("squeue", "--noheader", "--format=%i %T").splitlines()
         return dict(line.split() for line in lines)
 
+    def idle(self) -> int:
+        """Number of the nodes that wait for a job."""
+        try:
+            return self.says("sinfo", "--noheader", "--Node", "--format=%t").split().count("idle")
+        except subprocess.CalledProcessError:
+            return 0
+
 
 def missing() -> list[str]:
     """Programs that a Slurm here lacks."""
@@ -86,57 +85,42 @@ def missing() -> list[str]:
 @contextlib.contextmanager
 def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
     """Start munge, the controller and the nodes in a directory; end them with all their jobs."""
-    configuration = _configure(root, nodes, cores)
-    slurm = Slurm(configuration)
-    daemons = [
-        [
-            f"{SBIN}/munged",
-            "--foreground",
-            "--force",
-            *(f"--{name}={root}/munge.{name.removesuffix('-file')}" for name in MUNGE_FILES),
-        ],
-        [f"{SBIN}/slurmctld", "-D", "-c"],
-        *([f"{SBIN}/slurmd", "-D", "-N", f"n{node}"] for node in range(1, nodes + 1)),
-    ]
+    for folder in ("state", *(f"spool-n{node}" for node in range(1, nodes + 1))):
+        (root / folder).mkdir(parents=True)
+    (root / "munge.key").write_bytes(os.urandom(128))
+    (root / "munge.key").chmod(0o600)
+    first, controller, user = _free_ports(nodes), _free_ports(1), getpass.getuser()
+    ports = {"controller": controller, "first": first, "last": first + nodes - 1}
+    text = CONFIGURATION.format(root=root, user=user, nodes=nodes, cores=cores, **ports)
+    (root / "slurm.conf").write_text(text)
+    # nothing here uses cgroups: this plugin starts where none are mounted, the one for v2 does not
+    (root / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
+    slurm = Slurm({**os.environ, "SLURM_CONF": str(root / "slurm.conf")})
+    options = (f"--{name}={root}/munge.{name.removesuffix('-file')}" for name in MUNGE)
+    daemons = (
+        (f"{SBIN}/munged", "--foreground", "--force", *options),
+        (f"{SBIN}/slurmctld", "-D", "-c"),
+        *((f"{SBIN}/slurmd", "-D", "-N", f"n{node}") for node in range(1, nodes + 1)),
+    )
     with contextlib.ExitStack() as stack:
+        log = stack.enter_context((root / "daemons.log").open("ab"))
         for command in daemons:
-            stack.enter_context(_daemon(command, root, slurm.environment))
-            if command is daemons[0]:
-                _until((root / "munge.socket").exists, "munged", root)
-        _until(lambda: _idle(slurm) == nodes, "idle nodes", root)
+            # a test run that is killed leaves no daemon
+            daemon = subprocess.Popen(
+                ["setpriv", "--pdeathsig", "KILL", "--", *command],
+                env=slurm.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+            stack.callback(_end, daemon)
+            _until((root / "munge.socket").exists, "munged", root)
+        _until(lambda: slurm.idle() == nodes, "idle nodes", root)
         try:
             yield slurm
         finally:
-            slurm.says("scancel", "--user", getpass.getuser())
+            slurm.says("scancel", "--user", user)
             _until(lambda: not slurm.jobs(), "the end of all jobs", root)
-
-
-MUNGE_FILES = ("key-file", "socket", "pid-file", "log-file", "seed-file")
-
-
-def _configure(root: Path, nodes: int, cores: int) -> Path:
-    root.mkdir(parents=True)
-    for folder in ("state", *(f"spool-n{node}" for node in range(1, nodes + 1))):
-        (root / folder).mkdir()
-    key = root / "munge.key"
-    key.write_bytes(os.urandom(128))
-    key.chmod(0o600)
-    first, controller = _free_ports(nodes), _free_ports(1)
-    path = root / "slurm.conf"
-    path.write_text(
-        CONFIGURATION.format(
-            root=root,
-            user=getpass.getuser(),
-            controller=controller,
-            nodes=nodes,
-            first=first,
-            last=first + nodes - 1,
-            cores=cores,
-        )
-    )
-    # nothing here uses cgroups: this plugin starts where none are mounted, the one for v2 does not
-    (root / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
-    return path
 
 
 def _free_ports(count: int) -> int:
@@ -147,40 +131,20 @@ def _free_ports(count: int) -> int:
             try:
                 sockets[0].bind(("127.0.0.1", 0))
                 first: int = sockets[0].getsockname()[1]
-                for place, one in enumerate(sockets[1:], 1):
-                    one.bind(("127.0.0.1", first + place))
+                for place, each in enumerate(sockets[1:], 1):
+                    each.bind(("127.0.0.1", first + place))
             except (OSError, OverflowError):
                 continue
             return first
 
 
-@contextlib.contextmanager
-def _daemon(command: list[str], root: Path, environment: dict[str, str]) -> Iterator[None]:
-    with (root / "daemons.log").open("ab") as log:
-        # a test run that is killed leaves no daemon
-        process = subprocess.Popen(
-            ["setpriv", "--pdeathsig", "KILL", "--", *command],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
-        )
+def _end(daemon: "subprocess.Popen[bytes]") -> None:
+    daemon.terminate()
     try:
-        yield
-    finally:
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _idle(slurm: Slurm) -> int:
-    try:
-        return slurm.says("sinfo", "--noheader", "--Node", "--format=%t").split().count("idle")
-    except subprocess.CalledProcessError:
-        return 0
+        daemon.wait(10)
+    except subprocess.TimeoutExpired:
+        daemon.kill()
+        daemon.wait()
 
 
 def _until(condition: Callable[[], bool], what: str, root: Path) -> None:

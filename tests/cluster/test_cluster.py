@@ -12,6 +12,7 @@ import pytest
 from orchestrator.runs import cluster
 from tests.cluster.conftest import Start, tables
 from tests.cluster.slurm import Slurm
+from tests.faults.bench import ORCHESTRATOR, ROOT, processes_in
 
 ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--workers", "2")
 
@@ -28,18 +29,6 @@ def _at_work(cases: Path) -> set[str]:
     """Cases that a solver of LIGGGHTS is in the middle of."""
     begun = {path.parent.name for path in cases.glob("pile-*/samples.csv")}
     return begun - {path.parent.name for path in cases.glob("*/done.json")}
-
-
-def _solvers(cases: Path) -> int:
-    """Programs that run in a case directory, on any node."""
-    count = 0
-    for entry in Path("/proc").iterdir():
-        try:
-            inside = Path(os.readlink(entry / "cwd")).is_relative_to(cases)
-            count += entry.name.isdigit() and inside
-        except OSError:
-            continue
-    return count
 
 
 def _end(driver: "subprocess.Popen[str]") -> None:
@@ -70,7 +59,7 @@ def test_a_cancelled_job_is_made_up_for(
     queue.says("scancel", *first)
     _end(driver)
     assert tables(tmp_path / "out") == local_tables
-    assert not _solvers(cases)
+    assert not processes_in(cases)
 
 
 def test_a_killed_driver_is_continued(
@@ -85,7 +74,7 @@ def test_a_killed_driver_is_continued(
     _end(start(*ON_SLURM))
     assert tables(tmp_path / "out") == local_tables
     assert {path: path.stat().st_mtime_ns for path in before} == before
-    assert not _solvers(cases)
+    assert not processes_in(cases)
 
 
 def _refused(driver: "subprocess.Popen[str]", *words: str) -> None:
@@ -125,6 +114,19 @@ def test_settings_that_make_no_jobs_are_refused(
     text = path.read_text().replace('interface = "lo"', "")
     path.write_text(text + ("" if "interface" in settings else 'interface = "lo"\n') + settings)
     _refused(start(*ON_SLURM), *words)
+
+
+def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text("grain.diameter = 1e-3\n")
+    # stands before any that is installed
+    missing = "raise ModuleNotFoundError('none', name='dask_jobqueue')\n"
+    (tmp_path / "dask_jobqueue.py").write_text(missing)
+    command = [*ORCHESTRATOR, "study", "x.toml", "--cluster", "pbs"]
+    env = {**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"}
+    ended = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert ended.returncode == 2
+    assert len(ended.stderr.splitlines()) == 1
+    assert "pip install 'dask-jobqueue>=0.9'" in ended.stderr
 
 
 def test_a_queue_without_workers_is_told_of(

@@ -82,13 +82,3 @@ def test_a_broken_library_is_one_line(tmp_path: Path, name: str) -> None:
     assert examined.returncode == 1
     (line,) = (line for line in examined.stdout.splitlines() if line.startswith("NOT"))
     assert f"pip install --force-reinstall {name}" in line
-
-
-def test_a_package_without_its_templates_says_so(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "orchestrator", tmp_path / "package" / "orchestrator")
-    (tmp_path / "small.toml").write_text(HEAD + CELLS)
-    ended = _run(tmp_path, "study", "small.toml", PYTHONPATH=str(tmp_path / "package"))
-    assert ended.returncode == 1
-    assert "package/templates/liggghts/" in ended.stderr
-    assert "lacks this directory of templates (install the package again)" in ended.stderr
-    assert ended.stderr.count("\n") == 1
