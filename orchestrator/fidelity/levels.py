@@ -47,8 +47,8 @@ class Level:
     sets, on_poured : mapping
         The fields that it sets, and those that it sets to something else on a poured bed.
     derived : str
-        The field that follows from the scene: "octave", "threshold_speed", "paper_stiffness",
-        "strip_width", or empty.
+        The field that follows from the scene: "threshold_speed", "paper_stiffness", "strip_width",
+        or empty.
     same_model : bool
         Whether it has the model choices of the reference; others are measured and never chosen.
     most_grains : float
@@ -98,11 +98,8 @@ class Level:
         fields, bed = {**self.sets, **(self.on_poured if scene.is_poured else {})}, scene.bed
         assert isinstance(bed, PileBed)
         if fields.get("flow.model") == "solve":
-            fields["flow.roughness"] = None
-        if self.derived == "octave":
-            octave = round(math.log2(bed.roughness / bed.height))
-            fields["flow.roughness"] = float(f"{bed.height * 2.0**octave:.6g}")
-        elif self.derived == "threshold_speed":
+            fields = {"flow.roughness": None, "flow.nodes": False, **fields}
+        if self.derived == "threshold_speed":
             ustar = float(closed_form(scene).friction_velocity)
             speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
             fields["flow.speed"] = float(f"{speed:.6g}")

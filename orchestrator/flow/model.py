@@ -1,9 +1,12 @@
 """Flow models: each gives the stress along a bed line, and says which cases it needs for that."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, lru_cache
+from math import floor, log10
 from pathlib import Path
+
+import numpy as np
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.flow import theory
@@ -13,6 +16,9 @@ from orchestrator.physics.velocity import log_law_speed
 from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import BUILDABLE_DEG, Scene
+
+NODES_PER_DECADE, NODES = 2, 4
+"""Nodes in each tenfold of z0/h, and how many of them a flow in between is interpolated from."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,11 @@ class FlowModel(ABC):
         InputError
             If one cannot be meshed, naming the field of the study file.
         """
+        return tuple(run for solve in self.solves for run in solve.cases)
+
+    @property
+    def solves(self) -> "tuple[Solved, ...]":
+        """The solved flows that it is made of."""
         return ()
 
     @abstractmethod
@@ -67,6 +78,11 @@ class Theory(FlowModel):
 
 class Solved(FlowModel):
     """Steady turbulent flow by OpenFOAM; scenes that differ in their grains alone share it."""
+
+    @property
+    def solves(self) -> "tuple[Solved, ...]":
+        """Itself."""
+        return (self,)
 
     @property
     def cases(self) -> tuple[FlowCase, ...]:
@@ -91,6 +107,49 @@ class Solved(FlowModel):
         return _read(path, file.st_size, file.st_mtime_ns)
 
 
+class Interpolated(FlowModel):
+    """The flow between solves at fixed values of z0/h, which beds of one form share.
+
+    On one mesh the stress of each face is a smooth function of ln z0. The cubic through the four
+    nodes around it is within 0.4 % of the solve, where they are half a decade apart.
+    """
+
+    @cached_property
+    def weights(self) -> "dict[Solved, float]":
+        """The weight of each solve, that of the nearest node first.
+
+        A bed so rough that the mesh does not resolve the node above it is solved by itself.
+        """
+        scene, height, z0 = self.scene, self.line.h, self.scene.solve_roughness
+        place = NODES_PER_DECADE * log10(z0 / height)
+        highest = floor(NODES_PER_DECADE * log10(scene.first_cell_height / height))
+        if floor(place) + 1 > highest:
+            return {_at(scene, z0): 1.0}
+        first = min(floor(place) + 1 - NODES // 2, highest + 1 - NODES)
+        nodes = sorted(range(first, first + NODES), key=lambda node: abs(node - place))
+        solves = [_at(scene, float(f"{height * 10 ** (n / NODES_PER_DECADE):.6g}")) for n in nodes]
+        weights = [np.prod([(place - m) / (n - m) for m in nodes if m != n]) for n in nodes]
+        return {s: float(w) for s, w in zip(solves, weights, strict=True) if abs(w) > 1e-9}
+
+    @property
+    def solves(self) -> tuple[Solved, ...]:
+        """The solves at the nodes."""
+        return tuple(self.weights)
+
+    def stress(self, cases: Path) -> WallStress:
+        """The stress between the nodes, cubic in ln z0."""
+        parts = [(solve.stress(cases), weight) for solve, weight in self.weights.items()]
+        names = "tau_wall", "ustar_over_ustar0_eq10", "ustar_over_ustar0_eq10_printed"
+        sums = {name: sum(weight * getattr(part, name) for part, weight in parts) for name in names}
+        return replace(parts[0][0], **sums)
+
+
+def _at(scene: Scene, roughness: float) -> Solved:
+    """The solve at a roughness length, on the mesh of the scene."""
+    changes = {"roughness": roughness, "nodes": False, "first_cell_height": scene.first_cell_height}
+    return Solved(Scene(**{**dict(scene), "flow": scene.flow.model_copy(update=changes)}))
+
+
 @lru_cache(maxsize=256)
 def _read(path: Path, size: int, changed_ns: int) -> WallStress:
     """The stress in a file as it is now: hundreds of piles share a flow."""
@@ -109,4 +168,6 @@ def _shared(
 
 def model(scene: Scene) -> FlowModel:
     """The flow model that a scene of a pile asks for."""
-    return Solved(scene) if scene.flow.model == "solve" else Theory(scene)
+    if scene.flow.model != "solve":
+        return Theory(scene)
+    return Interpolated(scene) if scene.flow.nodes else Solved(scene)

@@ -54,9 +54,8 @@ class Geometry:
 
     @property
     def flow(self) -> FlowCase:
-        """The run of the flow, of a scene whose flow is solved."""
-        (case,) = self.model.cases
-        return case
+        """The run of the flow, of a scene whose flow is solved; of nodes that of the nearest."""
+        return self.model.cases[0]
 
     @cached_property
     def line(self) -> BedLine:

@@ -577,6 +577,12 @@ class Pile(Geometry):
         worn = (run for run in self.method.cases if isinstance(run, WornFlow))
         return (*self.model.cases, *worn)
 
+    @property
+    def solves(self) -> "dict[str, Pile]":
+        """By the name of each solved flow over the whole bed, the pile under that flow alone."""
+        solves = self.model.solves
+        return {run.cases[0].name: Pile(run.scene, self.cases) for run in solves}
+
     def stress(self, cases: Path) -> WallStress:
         """The stress along the whole bed; `cases` is the directory of the finished runs."""
         return self.model.stress(cases)

@@ -98,7 +98,8 @@ class Results:
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
         piles = self.plan.piles.values()
-        return {flow.name: pile for pile in piles for flow in pile.model.cases if flow.name in done}
+        solves = (item for pile in piles for item in pile.solves.items())
+        return {name: solve for name, solve in solves if name in done}
 
 
 def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:

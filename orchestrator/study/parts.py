@@ -252,6 +252,9 @@ class Flow(Part):
     )
     """roughness length at which the flow is found, for beds of nearly the same one to share it; by
     default the bed's"""
+    nodes: bool = _solved("nodes of z₀", False, since=True)
+    """whether the flow is interpolated in ln z₀, face by face, between solves at fixed values of
+    z₀/h, which beds of one form share"""
     turbulence_model: Turbulence = _solved(
         "turbulence model",
         "kEpsilon",

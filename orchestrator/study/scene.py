@@ -151,6 +151,9 @@ class Scene(Part):
             what = f"{cell:g} m is above a quarter of the pile's {height:g} m"
             raise UnfitError("flow.first_cell_height", what, "lower it, or raise bed.height")
         if self.protocol.update:
+            if flow.nodes:
+                what = "a flow between nodes knows no bed that changes"
+                raise UnfitError("flow.nodes", what, "leave it out, or protocol.update")
             if flow.model != "solve" or self.protocol.method == "pivot":
                 what = f'flow.model "{flow.model}" or the method "{self.protocol.method}"'
                 what = f"{what} knows no bed that changes"

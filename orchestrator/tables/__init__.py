@@ -38,8 +38,8 @@ NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 
 def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     """The tables of a study that have rows, from the cases that are done; in the study's order."""
-    flows = {flow.name: pile for pile in plan.piles.values() for flow in pile.model.cases}
-    flows = {name: pile for name, pile in flows.items() if name in done}
+    flows = {name: solve for pile in plan.piles.values() for name, solve in pile.solves.items()}
+    flows = {name: solve for name, solve in flows.items() if name in done}
     answers = [
         piles.Answer.read(plan.decisions[scene_id], pile, cases)
         for scene_id, pile in plan.piles.items()

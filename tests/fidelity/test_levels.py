@@ -72,12 +72,6 @@ def test_a_scene_is_changed_in_fields_that_exist(field: str, value: object, pile
         changed(pile(), {field: value})
 
 
-def test_beds_of_nearly_one_roughness_share_a_flow(pile: MakePile) -> None:
-    shared = level("flow", "shared")
-    near = [shared.answer(pile(roughness=z0)).flow.roughness for z0 in (3.0e-5, 3.4e-5, 1e-4)]
-    assert near[0] == near[1] != near[2]
-
-
 @pytest.mark.parametrize(
     ("fields", "taken"),
     [

@@ -8,10 +8,13 @@ import pytest
 from orchestrator import plan, tables
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_asked
+from orchestrator.flow.case import WALL_STRESS
 from orchestrator.flow.model import model
+from orchestrator.flow.stress import WallStress
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import study
+from orchestrator.types import FloatArray
 
 TEXT = """
 [grain]
@@ -130,3 +133,25 @@ def test_tables_have_the_discharge(tmp_path: Path) -> None:
 def test_a_channel_has_a_depth_that_forms_do_not_fill(flow: str, what: str) -> None:
     with pytest.raises(InputError, match=what):
         study.parse(TEXT + flow, name="t", where="t")
+
+
+def test_between_nodes_the_stress_is_cubic_in_ln_z0(tmp_path: Path) -> None:
+    text = 'nodes = true\n[axes]\n"bed.roughness" = [3e-6, 3.3e-5, 1.1e-4, 4e-4]\n'
+    *between, rough = (pile.model for pile in piles(text))
+    assert len(rough.cases) == 1  # the mesh does not resolve the node above it
+    shared = {run.name for at in between for run in at.cases}
+    assert len(shared) < 4 * len(between)  # beds of one form share nodes
+    face = np.arange(1.0, 6.0)
+
+    def stress(z0: float) -> FloatArray:
+        return face + face**2 * np.log(z0) - 0.1 * np.log(z0) ** 2 + 0.02 * np.log(face * z0) ** 3
+
+    for at in (*between, rough):
+        for run in at.cases:
+            (tmp_path / run.name).mkdir(exist_ok=True)
+            tau = stress(run.roughness_m)
+            table = WallStress(face, face, face, face, face, tau, tau, 2 * tau)
+            table.to_csv(tmp_path / run.name / WALL_STRESS)
+        interpolated, expected = at.stress(tmp_path), stress(at.scene.bed.roughness)
+        np.testing.assert_allclose(interpolated.tau_wall, expected, rtol=1e-4)
+        np.testing.assert_allclose(interpolated.ustar_over_ustar0_eq10, expected, rtol=1e-4)
