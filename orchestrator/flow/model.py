@@ -147,7 +147,8 @@ class Interpolated(FlowModel):
 def _at(scene: Scene, roughness: float) -> Solved:
     """The solve at a roughness length, on the mesh of the scene."""
     changes = {"roughness": roughness, "nodes": False, "first_cell_height": scene.first_cell_height}
-    return Solved(Scene(**{**dict(scene), "flow": scene.flow.model_copy(update=changes)}))
+    parts = {name: getattr(scene, name) for name in Scene.model_fields}
+    return Solved(Scene(**{**parts, "flow": scene.flow.model_copy(update=changes)}))
 
 
 @lru_cache(maxsize=256)

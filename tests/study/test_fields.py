@@ -53,6 +53,8 @@ def other_value(one: Quantity, scene: Scene) -> Any:
     if isinstance(value, str):
         words = one.info.choices or get_args(fields.declared(one).annotation)
         return next(word for word in words if word not in (value, "paper"))
+    if isinstance(value, bool):
+        return not value
     return value + 1 if isinstance(value, int) else 0.95 * value or 0.5
 
 
