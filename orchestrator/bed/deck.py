@@ -274,12 +274,12 @@ def write_grains(
 
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
-    """Read a CSV of numbers that a deck has written, of at least so many rows.
+    """Read a CSV that a deck, or the code that read its results, has written.
 
     Raises
     ------
     SolverError
-        If it is missing or cut short.
+        If it is missing or cut short, or has fewer rows.
     """
     try:
         text = path.read_text(encoding="ascii")

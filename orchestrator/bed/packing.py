@@ -18,23 +18,19 @@ from orchestrator.study.parts import Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TIE = 1e-6
-"""Part of a diameter: neighbours of a lattice lie exactly on the limits below, and round-off must
-not decide a tie."""
+"""Neighbours of a lattice lie exactly on the limits below; round-off must not decide, diameters."""
 TOUCH = 1e-3
 """Two grains closer than this touch, of the mean of their diameters."""
 APRON = 10.0
 """Length of the fixed flat bed beyond each toe, diameters."""
 STRAY = 0.1
-"""Rows of a disordered bed are straight within this, diameters: no neighbour of a row covers
-another, and none stands out too far."""
+"""Rows of a disordered bed are straight within this, diameters."""
 DISORDERED = 4
-"""Least rows of a disordered bed that are not a lattice, however few of them may move: the packing
-is the same for any number of mobile layers up to it."""
+"""Least disordered rows: the packing is the same for any number of mobile layers up to it."""
 PERTURBATION = 1e-9
-"""How far the grains of a lattice's replica lie aside, diameters: as far as matters to nothing but
-which grain of a chain goes first."""
+"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes first."""
 LEE_DEPTH = 1.5
-"""Thickness of the fixed lee side, layers: no grain falls through it, cut as it may be."""
+"""Thickness of the fixed lee side, layers: no grain falls through it."""
 SHARP_DEG = 8.0
 """Bend from which on rows do not follow the bed round a corner."""
 SLIT = 0.15

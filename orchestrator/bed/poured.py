@@ -167,13 +167,6 @@ class PouredBed(Case):
         upper = np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
         return np.vstack([upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])])
 
-    @property
-    def cut(self) -> dict[str, FloatArray]:
-        """The cut, by the names of its files: x of each segment's ends, height at x0, rise."""
-        (x, z), tangents = self.line.corners.T, self.line.tangents
-        raised = z[:-1] + self.surface / tangents[:, 0]
-        return {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": tangents[:, 1] / tangents[:, 0]}
-
     def rain(self, sizes: FloatArray) -> FloatArray:
         """Places in the air, shape (n, 3), of grains of n sizes (d), none touching another.
 
@@ -254,8 +247,10 @@ class PouredBed(Case):
                 "calm": CALM,
             },
         )
-        for name, values in self.cut.items():
-            scaled = values if name == "slope" else values * DIAMETER
+        (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
+        x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
+        cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
+        for name, scaled in cut.items():
             (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in scaled.tolist()))
         margin = float(sizes.max()) + 1
         bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
@@ -275,16 +270,6 @@ class PouredBed(Case):
     def collect(self, directory: Path) -> None:
         """See that the bed came to rest, and write its grains to ``bed.csv``."""
         liggghts.check_log(directory)
-        self._check_rest(directory)
-        _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
-        number = rows["id"].to_numpy(np.int64) - 1
-        bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
-        fixed = (number < len(self.floor)).astype(int)
-        bed.assign(size=self.grains[1][number], fixed=fixed).to_csv(directory / BED, index=False)
-
-    @staticmethod
-    def _check_rest(directory: Path) -> None:
-        """See that each stage ended as calm as it should, and left grains."""
         where = str(directory / SETTLING)
         last = deck.read_table(directory / SETTLING).groupby("stage").last()
         energy = (last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)).to_numpy()
@@ -296,6 +281,11 @@ class PouredBed(Case):
             what = f"the poured bed does not come to rest: {energy[-1]:.2g} W d a grain"
             remedy = "a gentler slope, or a larger grain.friction_angle_deg"
             raise Noisy(what, where=where, remedy=remedy)
+        _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
+        number = rows["id"].to_numpy(np.int64) - 1
+        bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
+        fixed = (number < len(self.floor)).astype(int)
+        bed.assign(size=self.grains[1][number], fixed=fixed).to_csv(directory / BED, index=False)
 
 
 def read(
@@ -316,7 +306,7 @@ def read(
     InputError
         If no grain is counted.
     """
-    rows = pd.read_csv(directory / BED)
+    rows = deck.read_table(directory / BED)
     centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)
     mobile = rows["fixed"].to_numpy() == 0
     segment, along = line.nearest(centres)

@@ -56,8 +56,7 @@ class Motion:
     fallen : ndarray of int, shape (N,)
         Load step in which a grain was first the criterion upstream of its place; 0 for never.
     carried : ndarray of bool, shape (N,)
-        Whether it moved by being carried off: it was gone before it was seen beyond the
-        displacement criterion.
+        Whether it was gone before it was seen beyond the displacement criterion: carried off.
     mode : ndarray of int, shape (N,)
         How it moved: index into `MODES`.
     exact : bool
@@ -168,8 +167,8 @@ class Motion:
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
         """Read what `to_csv` wrote."""
-        load_steps = pd.read_csv(directory / LOAD_STEPS)
-        grains = pd.read_csv(directory / MOTION)
+        load_steps = read_table(directory / LOAD_STEPS)
+        grains = read_table(directory / MOTION)
         return cls(
             flow=load_steps["flow"].to_numpy(float),
             level=grains["moved_in"].to_numpy(np.int64),
@@ -360,13 +359,6 @@ def _present(listed: BoolArray, directory: Path, ids: IntArray, samples: pd.Data
 
 def _of_another_run(path: Path, what: str) -> SolverError:
     return SolverError(what, where=str(path), remedy="run the case again")
-
-
-def last_places(directory: Path) -> pd.DataFrame:
-    """X and z (m) of the mobile grains that are there at the end of a run, by their ids."""
-    steps, rows = read_dump(directory / BED, BED_COLUMNS)
-    last: pd.DataFrame = rows[rows["step"] == steps[-1]].set_index("id")[["x", "z"]]
-    return last
 
 
 def check_rest(

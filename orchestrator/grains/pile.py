@@ -105,8 +105,8 @@ class Worn:
     @classmethod
     def from_csv(cls, directory: Path) -> "Worn":
         """Read what `to_csv` wrote."""
-        values = pd.read_csv(directory / GRAINS, index_col="id").to_numpy(float)
-        return cls(values[:, :2], values[:, 2], values[:, 3])
+        values = deck.read_table(directory / GRAINS).to_numpy(float)
+        return cls(values[:, 1:3], values[:, 3], values[:, 4])
 
 
 @dataclass(frozen=True)
@@ -370,9 +370,10 @@ class PileCase(GrainCase):
         # the grains when the run has ended; those that have moved are taken off the bed
         left = worn.left.copy()
         left[grains.counted_ids - 1] = np.where(moved.level > 0, moved.flow[moved.level], np.inf)
-        last = motion.last_places(directory) / scene.grain.diameter
+        steps, rows = deck.read_dump(directory / motion.BED, motion.BED_COLUMNS)
+        last = rows[rows["step"] == steps[-1]]
         places = np.where((grains.kind == deck.FIXED)[:, None], worn.places, np.nan)
-        places[last.index - 1] = last
+        places[last["id"] - 1] = last[["x", "z"]] / scene.grain.diameter
         places[np.isfinite(left)] = np.nan
         speed = np.where(worn.present, loads.ratio, worn.speed)
         Worn(places, left, speed).to_csv(directory)
