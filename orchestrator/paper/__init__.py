@@ -4,7 +4,6 @@ Only the command line and the Python face import it.
 """
 
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,24 +17,13 @@ PRESETS = Path(__file__).parent / "presets"
 CLAIMS = "claims.csv"
 
 
-@cache
-def _texts() -> frozenset[str]:
-    return frozenset(path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml"))
-
-
 def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Addition | None:
     """The report card of a study of the paper; none for any other.
 
-    Parameters
-    ----------
-    study : Study
-        The paper's studies are the presets of this package, word for word.
-    tables : mapping of str to DataFrame
-        Its tables.
-    figures : sequence of str
-        Names of the page's figures, in its order.
+    The paper's studies are the presets of this package, word for word; `figures` are the names of
+    the page's figures, in its order.
     """
-    if study.text not in _texts():
+    if study.text not in [path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")]:
         return None
     from orchestrator.paper import claims
 

@@ -11,8 +11,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from orchestrator.paper import measures
-from orchestrator.paper.comparison import RULE, Comparison, Verdict, combined
-from orchestrator.paper.evidence import Evidence
+from orchestrator.paper.evidence import RULE, Comparison, Evidence, Verdict, combined
 from orchestrator.report import page
 from orchestrator.tables import Tables
 
@@ -57,9 +56,8 @@ class Judged:
             lines = (one for one in self.comparisons if one.is_decisive)
             lacking = "; ".join(one.name for one in lines if one.verdict == "no data")
             return f"The study has no scenes for: {lacking or 'any of its comparisons'}."
-        return (
-            f"Not explained: on the preset `paper` without a tolerance it is {self.claim.verdict}."
-        )
+        there = f"on the preset `paper` without a tolerance it is {self.claim.verdict}"
+        return f"Not explained: {there}."
 
 
 def judge(tables: Tables) -> list[Judged]:
@@ -74,20 +72,15 @@ def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: boo
     `figures` are the names of the page's figures in their order. With a tolerance (`has_tolerance`)
     many scenes are answered without DEM, which the section says.
     """
-    entries = [one for one in judged if one.verdict != "no data"]
-    counts = Counter(one.verdict for one in entries)
-    shown = [
-        [number for number, name in enumerate(figures, 1) if name.startswith(one.claim.figures)]
-        for one in entries
-    ]
-    values = {
-        "entries": list(zip(entries, shown, strict=True)),
-        "counts": counts,
-        "rule": RULE,
-        "lacking": [one for one in judged if one.verdict == "no data"],
-        "has_tolerance": has_tolerance,
-    }
-    return Markup(page.fill("card.html.j2", Path(__file__).parent, **values))
+    entries = []
+    for one in (one for one in judged if one.verdict != "no data"):
+        named = [name.startswith(one.claim.figures) for name in figures]
+        entries.append((one, [number for number, is_shown in enumerate(named, 1) if is_shown]))
+    counts = Counter(one.verdict for one, _ in entries)
+    lacking = [one for one in judged if one.verdict == "no data"]
+    values = {"entries": entries, "counts": counts, "lacking": lacking, "rule": RULE}
+    template = ("card.html.j2", Path(__file__).parent)
+    return Markup(page.fill(*template, **values, has_tolerance=has_tolerance))
 
 
 def frame(judged: Sequence[Judged]) -> pd.DataFrame:

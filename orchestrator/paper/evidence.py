@@ -1,15 +1,25 @@
-"""The tables of a study as the claims of the paper are judged by them."""
+"""The tables of a study as claims are judged by them, and comparisons of many of its scenes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from orchestrator.study import fields
 from orchestrator.tables import COLUMNS, Tables
+from orchestrator.types import BoolArray, FloatArray
 
+Verdict = Literal["reproduced", "partly", "not", "no data"]
+
+SHARE = 0.95
+"""Share of comparisons from which a statement counts as true; from one less it, as false."""
+RULE = (
+    f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; not: in at "
+    f"most {1 - SHARE:.0%} of each; else partly; no data: if a judged line has none"
+)
 WAITING_TIME = 5.0
 """Least waiting time of a held flow, sqrt(d/g'); load steps that wait less make a ramp."""
 REGIMES = {"low": "low regime", "high": "high regime"}
@@ -26,25 +36,100 @@ PAPER = {"rho_sol_kg_m3": 2500.0, "rho_f_kg_m3": 1.0, "g_m_s2": 9.81, "phi_deg":
 
 
 @dataclass(frozen=True)
+class Comparison:
+    """Values of one quantity in many scenes, and the range in which a claim has them.
+
+    `values` are numbers, NaN where a scene has none, printed by `form`; the claim is true of those
+    `above` the one bound and not above the other, `below`. Without a bound they are shown and not
+    judged. Bools say themselves if the claim is true, and are judged unless `is_judged` is False.
+    """
+
+    name: str
+    values: Any
+    above: float = -np.inf
+    below: float = np.inf
+    form: str = ".3g"
+    is_judged: bool = True
+
+    @cached_property
+    def has_bools(self) -> bool:
+        """Whether the values are the answers themselves."""
+        return np.asarray(self.values).dtype == bool
+
+    @property
+    def is_decisive(self) -> bool:
+        """Whether the verdict of a claim depends on these values."""
+        return self.is_judged and (self.has_bools or self.above > -np.inf or self.below < np.inf)
+
+    @cached_property
+    def numbers(self) -> FloatArray:
+        """The values without those that are missing."""
+        values: FloatArray = np.asarray(self.values, float)
+        return values[~np.isnan(values)]
+
+    @property
+    def true(self) -> BoolArray:
+        """Whether the claim is true, for each of the `numbers`."""
+        above = 0.0 if self.has_bools else self.above
+        return (self.numbers > above) & (self.numbers <= self.below)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict by the share of true comparisons."""
+        if not len(self.numbers):
+            return "no data"
+        share = self.true.mean()
+        return "reproduced" if share >= SHARE else "not" if share <= 1 - SHARE else "partly"
+
+    def __str__(self) -> str:
+        if not len(self.numbers):
+            return f"{self.name}: no data"
+        count = f"in {int(self.true.sum())} of {len(self.numbers)}"
+        if self.has_bools:
+            return f"{self.name}: {count}"
+        ends = np.quantile(self.numbers, [0.5, 0.0, 1.0]).tolist()
+        middle, least, most = (format(end, self.form) for end in ends)
+        spread = middle if least == most else f"{middle} in the median ({least} … {most})"
+        bounds = {"above": self.above, "at most": self.below}
+        limits = [f"{word} {x:{self.form}}" for word, x in bounds.items() if np.isfinite(x)]
+        judged = f", {' and '.join(limits)} {count}" if limits else ""
+        missing = np.size(self.values) - len(self.numbers)
+        lacking = f"; {missing} without a value" if missing else ""
+        return f"{self.name}: {spread}{judged}{lacking}"
+
+
+def combined(verdicts: Iterable[Verdict]) -> Verdict:
+    """The verdict of several statements: partly where they differ, none where one lacks data."""
+    different = set(verdicts)
+    if not different or "no data" in different:
+        return "no data"
+    return different.pop() if len(different) == 1 else "partly"
+
+
 class Evidence:
     """The tables of a study."""
 
-    tables: Tables
+    def __init__(self, tables: Tables) -> None:
+        self._tables = tables
+        self._joined: dict[str, pd.DataFrame] = {}
 
     @cached_property
     def scenes(self) -> pd.DataFrame:
         """Every scene of the paper's grains and gas, once."""
-        table = self.tables["scenes"].drop_duplicates("scene_id")
+        table = self._tables["scenes"].drop_duplicates("scene_id")
         return table[(table[list(PAPER)] == pd.Series(PAPER)).all(axis=1)]
 
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its scenes; it has all columns even without rows."""
-        table = self.tables.get(name, pd.DataFrame())
-        if table.empty:
-            return pd.DataFrame(columns=list(COLUMNS), dtype=float)
-        extra = [column for column in self.scenes if column not in table or column == "scene_id"]
-        table = table.merge(self.scenes[extra], on="scene_id", how="inner", validate="many_to_one")
-        return table if name in ANSWERS else table[table["answered_method"] == "dem"]
+        if name not in self._joined:
+            table = self._tables.get(name, pd.DataFrame(columns=list(COLUMNS), dtype=float))
+            if len(table):
+                extra = [item for item in self.scenes if item not in table or item == "scene_id"]
+                table = table.merge(self.scenes[extra], on="scene_id", validate="many_to_one")
+                by_dem = table["answered_method"] == "dem"
+                table = table if name in ANSWERS else table[by_dem]
+            self._joined[name] = table
+        return self._joined[name]
 
     @cached_property
     def grains(self) -> pd.DataFrame:
@@ -69,12 +154,13 @@ class Evidence:
         chosen = table["stress"].isin(stresses or ("wall",)) & (table["packing"] == packing)
         return table[chosen & (table["force_law"] == table["regime"])]
 
-    def curves(self) -> Iterator[pd.DataFrame]:
+    @cached_property
+    def curves(self) -> list[pd.DataFrame]:
         """Of each pile the load steps in which some grains had moved, in their order."""
-        for _, rows in self.piles("pile_curve").groupby("scene_id"):
-            moved = rows[rows["moved"] > 0].sort_values("load_step")
-            if moved["fraction_moved"].nunique() > 2:
-                yield moved
+        table = self.piles("pile_curve")
+        moved = table[table["moved"] > 0].sort_values("load_step")
+        by_scene = [rows for _, rows in moved.groupby("scene_id")]
+        return [rows for rows in by_scene if rows["fraction_moved"].nunique() > 2]
 
 
 def commonest(grains: pd.DataFrame) -> pd.DataFrame:
@@ -100,15 +186,12 @@ def parts(table: pd.DataFrame, *columns: str) -> Iterator[tuple[Any, pd.DataFram
 def pairs(table: pd.DataFrame, along: str, value: str, ignore: Sequence[str] = ()) -> pd.DataFrame:
     """Neighbours in one column that agree in all other parameters.
 
-    Returns
-    -------
-    DataFrame
-        A row for each pair: ``force_law`` and ``ratio``, the value at the higher end over that at
-        the lower; NaN where one of them is missing.
+    A row for each pair has its ``force_law`` and the ``ratio`` of the value at the higher end to
+    that at the lower; NaN where one of them is missing.
     """
     series = table.groupby(others(table, along, *ignore), dropna=False).ngroup()
     ordered = table.assign(series=series).sort_values(["series", along], kind="stable")
     before = ordered.shift()
     beside = (ordered["series"] == before["series"]) & (ordered[along] > before[along])
-    found = ordered[["force_law"]].assign(ratio=ordered[value] / before[value])
-    return found[beside].reset_index(drop=True)
+    ratios = ordered[["force_law"]].assign(ratio=ordered[value] / before[value])
+    return ratios[beside].reset_index(drop=True)

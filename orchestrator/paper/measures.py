@@ -9,12 +9,12 @@ import pandas as pd
 
 import orchestrator
 from orchestrator.fidelity.limits import FROZEN_BED
-from orchestrator.paper.comparison import Comparison
 from orchestrator.paper.evidence import (
     BRIDGED,
     GRAIN,
     REGIMES,
     WAITING_TIME,
+    Comparison,
     Evidence,
     others,
     pairs,
@@ -56,13 +56,11 @@ def by_regime(
 
 def along(evidence: Evidence, table: str, along: str, rises: bool, name: str) -> Comparisons:
     """Whether thresholds of single grains or of piles rise, or fall, along a column."""
-    if table == "held":
-        found = pairs(evidence.held, along, "shields_dem")
-    else:
-        found = pairs(evidence.piles("pile_threshold"), along, "shields")
-    if not rises:
-        found["ratio"] = 1 / found["ratio"]
-    yield from by_regime(found, "ratio", name, 1.0)
+    is_held = table == "held"
+    rows = evidence.held if is_held else evidence.piles("pile_threshold")
+    neighbours = pairs(rows, along, "shields_dem" if is_held else "shields")
+    ratio = neighbours["ratio"] if rises else 1 / neighbours["ratio"]
+    yield from by_regime(neighbours.assign(ratio=ratio), "ratio", name, 1.0)
 
 
 def constant(evidence: Evidence) -> Comparisons:
@@ -81,9 +79,8 @@ def constant(evidence: Evidence) -> Comparisons:
     name = f"Re* up to which τ is within {NEARLY:.0%} of its limit for Re* → 0, by the closed form"
     yield Comparison(f"{name}, for each β and z₀", reach, end)
     yield Comparison("the same beside a tenth of that range", reach, SMALL_RE)
-    yield Comparison(
-        "closed form: change of τ from Re* → 0 to 3", 1 / (1 + lift * end) - 1, form="+.0%"
-    )
+    name = "closed form: change of τ from Re* → 0 to 3"
+    yield Comparison(name, 1 / (1 + lift * end) - 1, form="+.0%")
     yield Comparison("DEM: change of τ over the Re* of the study", changes, form="+.0%")
 
 
@@ -112,18 +109,17 @@ def best_fit(evidence: Evidence) -> Comparisons:
     water = [curve.points(2000) for curve in curves.WATER]
     for law in (*REGIMES, BRIDGED):
         table = _fits(flat[flat["force_law"] == law], water)
-        if law != BRIDGED or len(table):
-            named = table[table["beta_deg"].between(*BETA) & table["is_z0_named"]]
-            best = table.iloc[:1]
-            at = (
-                f", of β = {best['beta_deg'].iloc[0]:g}°, {best['z0'].iloc[0]}" if len(best) else ""
-            )
-            prefix = REGIMES.get(law, "bridged law")
-            fit = f"{prefix}: mean factor of τ from the curves for water"
-            yield Comparison(f"{fit}, best fit{at}", best["factor"], -np.inf, GOOD)
-            among = best.index.isin(named.index)
-            yield Comparison(f"{prefix}: the best fit is one of those named", among)
-            yield Comparison(f"{fit}, fits of the named β and z₀", named["factor"])
+        if law == BRIDGED and table.empty:
+            continue
+        named = table[table["beta_deg"].between(*BETA) & table["is_z0_named"]]
+        best = table.iloc[:1]
+        of = [f", of β = {row.beta_deg:g}°, {row.z0}" for row in best.itertuples()]
+        prefix = REGIMES.get(law, "bridged law")
+        fit = f"{prefix}: mean factor of τ from the curves for water"
+        yield Comparison(f"{fit}, best fit{''.join(of)}", best["factor"], -np.inf, GOOD)
+        among = best.index.isin(named.index)
+        yield Comparison(f"{prefix}: the best fit is one of those named", among)
+        yield Comparison(f"{fit}, fits of the named β and z₀", named["factor"])
 
 
 def _over_d(z0: float) -> str:
@@ -143,10 +139,9 @@ def _fits(grains: pd.DataFrame, lines: Iterable[tuple[FloatArray, FloatArray]]) 
         ordered = own.sort_values("reynolds")
         tau = _read(ordered["reynolds"].to_numpy(), ordered["shields_dem"].to_numpy(), grid)
         away = np.abs(tau[covered] - np.nanmean(table[:, covered], axis=0)).mean()
-        is_named = abs(z0 / Z0_OVER_D - 1) < 1e-3
-        rows.append((beta, _over_d(z0), is_named, float(np.exp(away))))
-    found = pd.DataFrame(rows, columns=["beta_deg", "z0", "is_z0_named", "factor"])
-    return found.sort_values("factor", kind="stable")
+        rows.append((beta, _over_d(z0), abs(z0 / Z0_OVER_D - 1) < 1e-3, float(np.exp(away))))
+    fits = pd.DataFrame(rows, columns=["beta_deg", "z0", "is_z0_named", "factor"])
+    return fits.sort_values("factor", kind="stable")
 
 
 def _read(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
@@ -158,12 +153,12 @@ def _read(x: FloatArray, y: FloatArray, grid: FloatArray) -> FloatArray:
 
 def order(evidence: Evidence) -> Comparisons:
     """Which grains of a pile move first, and where the motion goes."""
-    packings = {
-        "aligned": "rows along the slope",
-        "disordered": "random gaps",
-        "horizontal": "level rows",
-    }
-    for packing, name in packings.items():
+    rows = "rows along the slope"
+    for packing, name in (
+        ("aligned", rows),
+        ("disordered", "random gaps"),
+        ("horizontal", "level rows"),
+    ):
         downward, ranks = [], []
         for _, grains in parts(evidence.piles("pile_grain", packing), "scene_id"):
             step = grains.sort_values("s_m")["moved_in_load_step"].to_numpy(int)
@@ -181,45 +176,42 @@ def order(evidence: Evidence) -> Comparisons:
 
 
 def above_single(evidence: Evidence) -> Comparisons:
-    """Thresholds of piles over that of one grain of the same slope, d and z0."""
-    table = evidence.piles("pile_threshold")
-    table = table.assign(ratio=table["shields"] / _one_grain(table))
+    """Thresholds of piles over those of one grain of the same slope, d and z0."""
+    table = evidence.piles("pile_threshold").assign(single=np.nan)
+    for law, rows in table.groupby("force_law"):
+        exact = orchestrator.threshold(
+            rows["d_m"],
+            density=rows["rho_sol_kg_m3"],
+            fluid_density=rows["rho_f_kg_m3"],
+            viscosity=rows["nu_m2_s"],
+            slope_deg=rows["alpha_deg"],
+            entrainment_angle_deg=rows["beta_deg"],
+            roughness=rows["z0_over_d"] * rows["d_m"],
+            lift_coefficient=rows["alpha_s"],
+            gravity=rows["g_m_s2"],
+            law=str(law),
+        )
+        table.loc[rows.index, "single"] = exact["shields"].to_numpy()
+    table = table.assign(ratio=table["shields"] / table["single"])
     for fraction, rows in parts(table, "fraction"):
         name = f"τ over that of one grain by the closed form, n/N = {fraction:.0%}"
         yield from by_regime(rows, "ratio", name, 1.0)
-
-
-def _one_grain(table: pd.DataFrame) -> pd.Series:
-    """Shields number at the threshold of a single grain by the closed form, for each row."""
-    found = pd.Series(np.nan, index=table.index)
-    for law, own in table.groupby("force_law"):
-        exact = orchestrator.threshold(
-            own["d_m"],
-            density=own["rho_sol_kg_m3"],
-            fluid_density=own["rho_f_kg_m3"],
-            viscosity=own["nu_m2_s"],
-            slope_deg=own["alpha_deg"],
-            entrainment_angle_deg=own["beta_deg"],
-            roughness=own["z0_over_d"] * own["d_m"],
-            lift_coefficient=own["alpha_s"],
-            gravity=own["g_m_s2"],
-            law=str(law),
-        )
-        found[own.index] = exact["shields"].to_numpy()
-    return found
 
 
 def wiggles(evidence: Evidence) -> Comparisons:
     """Roughness of the curves of the fraction, by DEM and by pivots."""
     grains = dict(parts(evidence.piles("pile_grain"), "scene_id"))
     rows = []
-    for curve in evidence.curves():
+    for curve in evidence.curves:
         scene = curve.iloc[0]
         if scene["scene_id"] in grains:
             stress = grains[scene["scene_id"]].sort_values("s_m")["ustar_over_ustar0"].to_numpy()
+            width = 2 * int(WINDOW * len(stress) / 2) + 1
+            padded = np.pad(stress, width // 2, mode="edge")
+            smoothed = np.convolve(padded, np.full(width, 1 / width), mode="valid")
             fractions = curve["fraction_moved"].to_numpy(), _pivots(curve, stress)
-            smooth = _pivots(curve, _smoothed(stress))
-            rows.append((scene["d_m"], 1 / scene["count"], *map(wiggle, (*fractions, smooth))))
+            each = map(wiggle, (*fractions, _pivots(curve, smoothed)))
+            rows.append((scene["d_m"], 1 / scene["count"], *each))
     columns = ["d_m", "grain", "DEM", "pivots", "pivots under a smoothed stress"]
     table = pd.DataFrame(rows, columns=columns, dtype=float).dropna()
     coarse, fine = table[table["d_m"] > COARSE_M], table[table["d_m"] <= COARSE_M]
@@ -254,16 +246,10 @@ def _pivots(curve: pd.DataFrame, stress: FloatArray) -> FloatArray:
     return np.asarray([np.mean(need <= ustar0) for ustar0 in flow])
 
 
-def _smoothed(stress: FloatArray) -> FloatArray:
-    width = 2 * int(WINDOW * len(stress) / 2) + 1
-    padded = np.pad(stress, width // 2, mode="edge")
-    return np.convolve(padded, np.full(width, 1 / width), mode="valid")
-
-
 def saturation(evidence: Evidence) -> Comparisons:
     """How the rise of the fraction slows down."""
     rows = []
-    for curve in evidence.curves():
+    for curve in evidence.curves:
         low, middle, high = (_stress_at(curve, fraction) for fraction in (0.2, 0.5, 0.8))
         later = _fraction_at(curve, LATER * _stress_at(curve, 0.3))
         bend = (middle - low) / (high - middle)
@@ -271,13 +257,12 @@ def saturation(evidence: Evidence) -> Comparisons:
     table = pd.DataFrame(rows) if rows else evidence.joined("none").assign(bend=[], later=[])
     name = "slope of n/N against τ from 50 to 80 % over that from 20 to 50 %"
     yield Comparison(name, table["bend"], -np.inf, 1.0)
-    name = f"n/N at {LATER:g} τ₃₀"
-    for along, pair in (
-        ("d_m", "largest d over smallest"),
-        ("alpha_deg", "steepest over flattest"),
-    ):
-        ends = table.groupby(others(table, along), dropna=False)[along]
-        at_end = (table[along] == ends.transform("min")) | (table[along] == ends.transform("max"))
+    name, ends = f"n/N at {LATER:g} τ₃₀", ("largest d over smallest", "steepest over flattest")
+    for along, pair in zip(("d_m", "alpha_deg"), ends, strict=True):
+        values = table.groupby(others(table, along), dropna=False)[along]
+        at_end = (table[along] == values.transform("min")) | (
+            table[along] == values.transform("max")
+        )
         ratio = pairs(table[at_end], along, "later")["ratio"]
         yield Comparison(f"{name}, {pair}", ratio, -np.inf, 1.0)
     for alpha, piles in parts(table, "alpha_deg"):
@@ -298,14 +283,14 @@ def _fraction_at(curve: pd.DataFrame, shields: float) -> float:
 
 def fraction(evidence: Evidence) -> Comparisons:
     """The fraction at one stress, by slope."""
-    found = {curve["scene_id"].iloc[0]: curve for curve in evidence.curves()}
-    firsts = pd.DataFrame([curve.iloc[0] for curve in found.values()])
+    by_scene = {curve["scene_id"].iloc[0]: curve for curve in evidence.curves}
+    firsts = pd.DataFrame([curve.iloc[0] for curve in by_scene.values()])
     rows = []
     for _, same in parts(firsts, *others(firsts, "alpha_deg")):
-        series = [found[key] for key in same.sort_values("alpha_deg")["scene_id"]]
+        series = [by_scene[key] for key in same.sort_values("alpha_deg")["scene_id"]]
         for flat, steep in pairwise(series):
-            half = _stress_at(flat, 0.5)
-            rows.append((flat["force_law"].iloc[0], _fraction_at(steep, half)))
+            reached = _fraction_at(steep, _stress_at(flat, 0.5))
+            rows.append((flat["force_law"].iloc[0], reached))
     table = pd.DataFrame(rows, columns=["force_law", "steep"])
     name = "n/N of the next steeper pile at the τ that moves 50 % of a pile"
     yield from by_regime(table, "steep", name, below=0.5, form=".0%")
@@ -333,10 +318,8 @@ def regimes(evidence: Evidence) -> Comparisons:
     piles = evidence.scenes[evidence.scenes["bed"] == "pile"]
     piles = piles[piles["nu_m2_s"] == piles["nu_m2_s"].min()]
     keys = ["alpha_deg", "d_m", "z0_over_d"]
-    each = piles.drop_duplicates(keys)
-    least, largest = PILES_M
-    is_whole = each["d_m"].min() < 1.01 * least and each["d_m"].max() > 0.99 * largest
-    if not is_whole:
+    each, (least, largest) = piles.drop_duplicates(keys), PILES_M
+    if not (each["d_m"].min() < 1.01 * least and each["d_m"].max() > 0.99 * largest):
         return
     for z0, part in parts(each, "z0_over_d"):
         name = f"z₀ = {_over_d(z0)}: piles at the lowest ν of the study that lie in a regime"
@@ -352,8 +335,7 @@ def regimes(evidence: Evidence) -> Comparisons:
         high = table[(table["force_law"] == "high") & table["reynolds"].notna()]
         if len(high):
             unit = Exposure(1.0, high["z0_over_d"].to_numpy(float), 1.0, 1.0, 1.0)
-            particle = law.particle_reynolds(high["reynolds"].to_numpy(float), unit)
-            within = particle <= law.drag_end
+            within = law.particle_reynolds(high["reynolds"].to_numpy(float), unit) <= law.drag_end
             name = f"high regime: thresholds of {name} within the range of the drag law"
             yield Comparison(name, within, is_judged=False)
 
@@ -363,18 +345,16 @@ def stress(evidence: Evidence) -> Comparisons:
     table = evidence.piles("pile_threshold", "aligned", "wall", "eq10")
     coded = table.assign(code=(table["stress"] == "eq10").astype(float))
     for symbol, column, bound in (("u*₀", "ustar0_m_s", NEARLY), ("τ", "shields", np.inf)):
-        found = pairs(coded, "code", column, ["stress"])
-        found["ratio"] -= 1
+        changes = pairs(coded, "code", column, ["stress"])
+        changes["ratio"] -= 1
         name = f"{symbol} by Eq. 10 over that by the wall stress, less 1"
-        yield from by_regime(found, "ratio", name, -bound, below=bound, form="+.1%")
+        yield from by_regime(changes, "ratio", name, -bound, below=bound, form="+.1%")
 
 
 def coupling(evidence: Evidence) -> Comparisons:
     """The flow of the whole pile, kept until the last grain has gone."""
     table = evidence.joined("pile_threshold")
     table = table[(table["force_law"] == table["regime"]) & table["frozen_bed"].notna()]
-    name = "known change of τ where the bed line is drawn anew"
     for part, rows in parts(table, "fraction"):
-        yield Comparison(
-            f"n/N = {part:.0%}: {name}", rows["frozen_bed"], -np.inf, FROZEN_BED, form=".0%"
-        )
+        name = f"n/N = {part:.0%}: known change of τ where the bed line is drawn anew"
+        yield Comparison(name, rows["frozen_bed"], -np.inf, FROZEN_BED, form=".0%")

@@ -1,19 +1,21 @@
 """The report card: verdicts follow from the numbers, by the rule that it states."""
 
-from collections.abc import Callable
+import re
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import paper, report
 from orchestrator.paper import PRESETS, claims, measures
 from orchestrator.paper.claims import CLAIMS, Judged
-from orchestrator.paper.comparison import Comparison, Verdict, combined
-from orchestrator.paper.evidence import BRIDGED, pairs
+from orchestrator.paper.evidence import BRIDGED, Comparison, Verdict, combined, pairs
 from orchestrator.physics import curves
 from orchestrator.report.results import Results
+from orchestrator.runs.files import Folder
 from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.parts import PileBed
@@ -28,19 +30,9 @@ NAMES = [
 ]
 
 
-def judge(tables: Tables) -> dict[str, Judged]:
-    return dict(zip(NAMES, claims.judge(tables), strict=True))
-
-
-def changed(
-    tables: Tables, name: str, change: Callable[[pd.DataFrame], pd.DataFrame]
-) -> dict[str, Judged]:
-    return judge({**tables, name: change(tables[name])})
-
-
-@pytest.fixture(scope="module")
-def judged(results: Results) -> dict[str, Judged]:
-    return judge(results.tables)
+def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, Judged]:
+    """The verdicts by the name of the measure, some tables of the study being replaced."""
+    return dict(zip(NAMES, claims.judge({**tables, **changed}), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -60,34 +52,24 @@ def exact() -> Tables:
 
 
 @pytest.mark.parametrize(
-    ("true", "verdict"),
-    [(19, "reproduced"), (18, "partly"), (1, "not"), (None, "no data")],
+    ("true", "verdict"), [(19, "reproduced"), (18, "partly"), (1, "not"), (None, "no data")]
 )
 def test_a_verdict_follows_from_the_share(true: int | None, verdict: Verdict) -> None:
-    number = 0 if true is None else 20
-    numbers = np.where(np.arange(number) < (true or 0), 2.0, 0.5)
+    numbers = np.where(np.arange(0 if true is None else 20) < (true or 0), 2.0, 0.5)
     assert Comparison("", numbers, 1.0).verdict == verdict
     assert Comparison("", -numbers, below=-1.0).verdict == verdict
     assert Comparison("", numbers > 1).verdict == verdict
     assert Comparison("", [*numbers, np.nan], 1.0).verdict == verdict
-
-
-def test_verdicts_that_differ_are_partly_and_one_without_data_is_none() -> None:
-    assert combined(["reproduced", "not"]) == "partly"
-    assert combined(["not", "not"]) == "not"
-    assert combined(["not", "no data"]) == combined([]) == "no data"
+    assert combined([verdict, verdict]) == verdict
+    if verdict != "no data":
+        assert combined([verdict, "partly"]) == "partly"
+    assert combined([verdict, "no data"]) == combined([]) == "no data"
 
 
 def test_pairs_agree_in_all_else() -> None:
-    table = pd.DataFrame(
-        {
-            "force_law": "high",
-            "alpha_deg": [20.0, 15.0, 25.0, 15.0],
-            "d_m": [1e-3, 1e-3, 1e-3, 5e-4],
-            "seed": [None] * 4,
-            "value": [3.0, 2.0, np.nan, 9.0],
-        }
-    )
+    columns = {"alpha_deg": [20.0, 15.0, 25.0, 15.0], "d_m": [1e-3, 1e-3, 1e-3, 5e-4]}
+    table = pd.DataFrame({**columns, "value": [3.0, 2.0, np.nan, 9.0]})
+    table = table.assign(force_law="high", seed=None)
     ratio = pairs(table, "alpha_deg", "value")["ratio"]
     assert ratio[0] == 1.5
     assert len(ratio) == 2
@@ -97,7 +79,8 @@ def test_pairs_agree_in_all_else() -> None:
             assert pairs(differing, "alpha_deg", "value").empty, column
 
 
-def test_a_small_study_is_judged(judged: dict[str, Judged]) -> None:
+def test_a_small_study_is_judged(results: Results) -> None:
+    judged = judge(results.tables)
     verdicts = {name: one.verdict for name, one in judged.items() if one.verdict != "no data"}
     assert verdicts == {
         "constant": "partly",
@@ -116,72 +99,61 @@ def test_a_reason_explains_its_verdict_or_is_none(results: Results, exact: Table
 
 
 def test_ramps_alone_reproduce_nothing(results: Results) -> None:
-    ramps = results.tables["scenes"].assign(waiting_time=1.0)
-    grains = results.tables["single_grain"]
+    scenes, grains = results.tables["scenes"], results.tables["single_grain"]
     raised = grains.assign(shields_dem_low=2 * grains["shields_closed_form"])
-    one = judge({**results.tables, "scenes": ramps, "single_grain": raised})["numerical"]
-    assert one.verdict == "no data"
-    assert "held flows" in one.why
-    is_ramp = results.tables["scenes"]["alpha_deg"] > 0
-    both = ramps.assign(waiting_time=np.where(is_ramp, 1.0, 6.0))
-    ids = ramps.loc[is_ramp, "scene_id"]
-    raised = grains.assign(
-        shields_dem_low=np.where(grains["scene_id"].isin(ids), 2.0, 0.9)
-        * grains["shields_closed_form"]
-    )
-    one = judge({**results.tables, "scenes": both, "single_grain": raised})["numerical"]
-    assert one.verdict == "partly"
+    one = judge(results.tables, scenes=scenes.assign(waiting_time=1.0), single_grain=raised)
+    assert one["numerical"].verdict == "no data"
+    assert "held flows" in one["numerical"].why
+    is_ramp = scenes["alpha_deg"] > 0
+    both = scenes.assign(waiting_time=np.where(is_ramp, 1.0, 6.0))
+    factor = np.where(grains["scene_id"].isin(scenes.loc[is_ramp, "scene_id"]), 2.0, 0.9)
+    raised = grains.assign(shields_dem_low=factor * grains["shields_closed_form"])
+    assert judge(results.tables, scenes=both, single_grain=raised)["numerical"].verdict == "partly"
 
 
 def test_verdicts_turn_with_the_numbers(results: Results) -> None:
-    inverse = changed(
-        results.tables, "single_grain", lambda t: t.assign(shields_dem=1 / t["shields_dem"])
-    )
-    assert inverse["held beta_deg"].verdict == "not"
-    assert inverse["held alpha_deg"].verdict == "not"
-
-    def reverse(table: pd.DataFrame) -> pd.DataFrame:
-        step = table["moved_in_load_step"]
-        return table.assign(moved_in_load_step=step.max() + 1 - step)
-
-    assert changed(results.tables, "pile_grain", reverse)["order"].verdict == "not"
-    for moved, verdict in ((0.04, "reproduced"), (0.2, "not")):
-        set_change = partial(pd.DataFrame.assign, frozen_bed=moved)
-        frozen = changed(results.tables, "pile_threshold", set_change)
-        assert frozen["coupling"].verdict == verdict
+    grains, moved = results.tables["single_grain"], results.tables["pile_grain"]
+    inverse = grains.assign(shields_dem=1 / grains["shields_dem"])
+    turned = judge(results.tables, single_grain=inverse)
+    assert turned["held beta_deg"].verdict == turned["held alpha_deg"].verdict == "not"
+    step = moved["moved_in_load_step"]
+    reverse = moved.assign(moved_in_load_step=step.max() + 1 - step)
+    assert judge(results.tables, pile_grain=reverse)["order"].verdict == "not"
+    for change, verdict in ((0.04, "reproduced"), (0.2, "not")):
+        frozen = results.tables["pile_threshold"].assign(frozen_bed=change)
+        assert judge(results.tables, pile_threshold=frozen)["coupling"].verdict == verdict
 
 
 def test_the_closed_form_is_judged(exact: Tables) -> None:
-    found = judge(exact)
-    assert found["conditioning"].verdict == "not"
-    assert found["best_fit"].verdict == "partly"
+    judged = judge(exact)
+    assert judged["conditioning"].verdict == "not"
+    assert judged["best_fit"].verdict == "partly"
     # lift over drag at Re* = 3 is alpha_s/pi, over tan(beta)
     steepest = 1 / (1 + 1.615 / np.pi) - 1
-    change = next(one for one in found["constant"].comparisons if "closed form: change" in one.name)
+    lines = judged["constant"].comparisons
+    change = next(line for line in lines if "closed form: change" in line.name)
     assert change.numbers.min() == pytest.approx(steepest, rel=1e-3)
+    # soft contacts that matter are seen
+    soft = exact["scenes"].set_index("scene_id")["stiffness"] < 1e4
+    grains = exact["single_grain"]
+    factor = np.where(soft.loc[grains["scene_id"]], 1.2, 1.0)
+    softer = grains.assign(ustar_m_s=grains["ustar_m_s"] * factor)
+    assert judge(exact, single_grain=softer)["conditioning"].verdict == "partly"
 
 
 def test_grains_on_the_curves_fit_them(exact: Tables) -> None:
-    scenes = exact["scenes"].set_index("scene_id")
     grains = exact["single_grain"].copy()
-    own = scenes.loc[grains["scene_id"]]
+    own = exact["scenes"].set_index("scene_id").loc[grains["scene_id"]]
     wide = grains["reynolds"].to_numpy() > 0.01
     named = ((own["beta_deg"] == 50) & (own["z0_over_d"] < 0.05)).to_numpy() & wide
     at = np.log(grains.loc[named, "reynolds"])
     lines = [curve.points(2000) for curve in curves.WATER]
     logs = [np.interp(at, np.log(x), np.log(y), left=np.nan, right=np.nan) for x, y in lines]
     grains.loc[named, "shields_dem"] = np.exp(np.nanmean(logs, axis=0))
-    found = judge({**exact, "single_grain": grains})["best_fit"]
-    assert found.verdict == "reproduced"
-    factors = [one.numbers for one in found.comparisons if one.is_decisive and not one.has_bools]
+    fit = judge(exact, single_grain=grains)["best_fit"]
+    assert fit.verdict == "reproduced"
+    factors = [one.numbers for one in fit.comparisons if one.is_decisive and not one.has_bools]
     assert np.concatenate(factors) == pytest.approx(1.0, abs=0.06)
-
-
-def test_soft_contacts_that_matter_are_found(exact: Tables) -> None:
-    soft = exact["scenes"].set_index("scene_id")["stiffness"] < 1e4
-    factor = np.where(soft.loc[exact["single_grain"]["scene_id"]], 1.2, 1.0)
-    found = changed(exact, "single_grain", lambda t: t.assign(ustar_m_s=t["ustar_m_s"] * factor))
-    assert found["conditioning"].verdict == "partly"
 
 
 def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
@@ -206,16 +178,14 @@ def test_a_wiggle_is_the_distance_from_a_smooth_curve() -> None:
 
 
 def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> None:
-    grains = results.joined("single_grain")
-    in_regime = (grains["force_law"] == grains["regime"]).to_numpy()
+    tables, joined = results.tables, results.joined("single_grain")
+    in_regime = (joined["force_law"] == joined["regime"]).to_numpy()
     assert not in_regime.all()
-    found = changed(
-        results.tables,
-        "single_grain",
-        lambda t: t.assign(shields_dem=t["shields_dem"].where(in_regime, 1e9)),
-    )
-    assert claims.frame(list(found.values())).equals(claims.frame(claims.judge(results.tables)))
-    water = changed(results.tables, "scenes", lambda t: t.assign(rho_f_kg_m3=1000.0))
+    grains = tables["single_grain"]
+    absurd = grains.assign(shields_dem=grains["shields_dem"].where(in_regime, 1e9))
+    judged = claims.judge({**tables, "single_grain": absurd})
+    assert claims.frame(judged).equals(claims.frame(claims.judge(tables)))
+    water = judge(tables, scenes=tables["scenes"].assign(rho_f_kg_m3=1000.0))
     assert {one.verdict for one in water.values()} == {"no data"}
 
 
@@ -225,7 +195,37 @@ def test_the_section_counts_and_escapes(results: Results) -> None:
     assert section.count('<tr><th scope="row">') == sum(one.verdict != "no data" for one in judged)
     assert "--tolerance 0" in section
     assert "Figure 2" in section
-    assert "--tolerance" not in claims.section(judged, [], has_tolerance=False)
     bad = replace(judged[1], comparisons=(Comparison("<b>&", [1.0], 0.5),))
-    assert "&lt;b&gt;&amp;" in claims.section([bad], [], has_tolerance=False)
+    plain = claims.section([bad], [], has_tolerance=False)
+    assert "--tolerance" not in plain
+    assert "&lt;b&gt;&amp;" in plain
     assert claims.section([], [], has_tolerance=False).strip() == ""
+
+
+def test_only_the_command_line_and_the_python_face_import_it() -> None:
+    package = Path(paper.__file__).parents[1]
+    users = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*.py")
+        if "paper" not in path.relative_to(package).parts
+        and re.search(r"import paper|orchestrator\.paper|import .*\bpaper\b", path.read_text())
+    }
+    assert users <= {"cli.py", "face.py"}
+    assert {"paper", "reference"} & set(study.presets()) == set()
+
+
+@pytest.mark.parametrize("is_paper", [True, False])
+def test_a_study_of_the_paper_alone_gets_a_report_card(
+    results: Results, tmp_path: Path, is_paper: bool
+) -> None:
+    text = (PRESETS / "paper.toml").read_text(encoding="utf-8") if is_paper else "title = ''"
+    (tmp_path / "cases").mkdir()
+    grains = {name: results.tables[name] for name in ("scenes", "single_grain")}
+    whole = replace(results, study=replace(results.study, text=text), tables=grains)
+    report.write(whole, pd.DataFrame(), {}, Folder(tmp_path), (paper.report_card,))
+    page = (tmp_path / report.PAGE).read_text(encoding="utf-8")
+    assert ('id="claims"' in page) == (tmp_path / paper.CLAIMS).exists() == is_paper
+    if is_paper:
+        table = pd.read_csv(tmp_path / paper.CLAIMS)
+        assert len(table) == len(CLAIMS)
+        assert set(table["verdict"]) > {"no data"}
