@@ -1,9 +1,9 @@
 """The registry of the fields of a scene: what follows from where each is declared."""
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any
+from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
@@ -23,7 +23,6 @@ PARTS: Mapping[str, type[Part]] = {
     "protocol": Protocol,
 }
 """The tables of a study file; a bed of one grain has no field that a pile has not."""
-NO_COLUMN = "-"
 ANSWERED = "answered_"
 """Before the column of a field: its value in the scene that was run in place of the one asked."""
 
@@ -32,15 +31,11 @@ ANSWERED = "answered_"
 class Quantity:
     """A field of a study file, or a quantity that follows from fields."""
 
-    name: str
-    """As a study file writes it, such as ``bed.slope_deg``; empty for one that follows."""
-    column: str
-    """Its column in tables."""
+    name: str  # as a study file writes it, such as bed.slope_deg; empty for one that follows
+    column: str  # of the tables
     info: Info
     meaning: str
-    """A phrase."""
-    read: Callable[[Scene], Any]
-    """Its value in a scene, None where that leaves it open."""
+    read: Callable[[Scene], Any]  # its value in a scene, None where that leaves it open
 
     def asked(self, scene: Scene) -> Any:
         """Its value as a scene asks for it; None where it is left open or has no effect."""
@@ -74,6 +69,7 @@ def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], b
     return lambda scene: isinstance(scene.bed, PileBed) and bool(condition(scene, scene.bed))
 
 
+RANDOM = ("disordered", "poured")
 APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
@@ -83,9 +79,7 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "profiles": _of_piles(lambda scene, bed: bed.profile),
     "disordered piles": _of_piles(lambda scene, bed: bed.packing == "disordered"),
     "poured beds": lambda scene: scene.is_poured,
-    "random beds and replicas": _of_piles(
-        lambda scene, bed: bed.packing in ("disordered", "poured") or bed.is_replica
-    ),
+    "random beds and replicas": _of_piles(lambda _, bed: bed.packing in RANDOM or bed.is_replica),
     "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
     "DEM": lambda scene: scene.protocol.method == "dem",
     "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method == "dem"),
@@ -97,6 +91,10 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
 
 def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
     info = next(each for each in declared.metadata if isinstance(each, Info))
+    meanings: Any = info.choices
+    if isinstance(meanings, list):
+        words = zip(get_args(declared.annotation), meanings, strict=True)
+        info = replace(info, choices=dict(words))
     meaning = " ".join((declared.description or "").split())
     read = attrgetter(f"{part}.{name}")
     return Quantity(f"{part}.{name}", info.column or name, info, meaning, read)
@@ -108,20 +106,21 @@ FIELDS: tuple[Quantity, ...] = tuple(
     for name, declared in model.model_fields.items()
 )
 """Every field of a study file, in the order of the file."""
-DERIVED: tuple[Quantity, ...] = (
-    Quantity(
-        *("", "z0_over_d", Info("roughness length", "z_0", "d"), "roughness length over diameter"),
-        # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
-        lambda scene: round(scene.bed.roughness / scene.grain.diameter, 9),
-    ),
-    Quantity(
-        *("", "regime", Info("regime")),
-        "forces that are valid at the threshold of a single grain of the scene, or transition",
-        regime_of,
-    ),
+_RATIO = Info("roughness length", "z_0", "d")
+_REGIME = "forces that are valid at the threshold of a single grain of the scene, or transition"
+
+
+def _ratio(scene: Scene) -> float:
+    # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
+    return round(scene.bed.roughness / scene.grain.diameter, 9)
+
+
+DERIVED = (
+    Quantity("", "z0_over_d", _RATIO, "roughness length over diameter", _ratio),
+    Quantity("", "regime", Info("regime"), _REGIME, regime_of),
 )
 COLUMNS: Mapping[str, Quantity] = {
-    each.column: each for each in (*FIELDS, *DERIVED) if each.column != NO_COLUMN
+    each.column: each for each in (*FIELDS, *DERIVED) if each.column != "-"
 }
 """By the columns of a table: what a scene asks for."""
 ANSWERS: Mapping[str, Quantity] = {

@@ -34,35 +34,25 @@ class Info:
     """The words for a field; its meaning is the text under its declaration."""
 
     label: str
-    symbol: str = ""
-    """As formulas write it, an index after an underscore; empty where there is none."""
+    symbol: str = ""  # as formulas write it, an index after an underscore
     unit: str = ""
-    column: str = ""
-    """Its column in tables, with the unit, where that is not its name; "-" for none."""
+    column: str = ""  # of tables, with the unit, where that is not its name; "-" for none
     scope: str = "every scene"
-    """The scenes on which it has an effect, a key of `fields.APPLIES`; for all others its column
-    is empty."""
+    """The scenes on which it has an effect, a key of `fields.APPLIES`."""
     about: Literal["question", "answer", "replica"] = "question"
     """A question to nature, a way to answer it, which alone a level of fidelity may change, or a
     choice among many alike."""
-    choices: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """For a field of words, the meaning of each."""
-    read: str = ""
-    """The property of a scene that has the value in use, where the field may be left open."""
+    choices: Mapping[str, str] = dataclasses.field(default_factory=dict)  # meanings of words
+    read: str = ""  # property of a scene with the value in use, where the field may be left open
 
 
 def field(label: str, default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
-    """Declare a field with its default, its words and its range.
+    """Declare a field: label, default (none: required), symbol, unit and column as of `Info`.
 
-    Parameters
-    ----------
-    label, default, *words
-        Label, default (none: required), then symbol, unit and column as of `Info`.
-    since
-        Whether the field came after the first studies: a scene that has its default leaves it out
-        of its digest, and keeps its id.
-    **settings
-        Further words of `Info`, and the rules of `pydantic.Field`, such as ``ge`` and ``le``.
+    `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge`` and ``le``;
+    `choices` may be a list of the meanings of a `Literal`, in its order.
+    A field that came after the first studies is `since`: a scene that has its default leaves it out
+    of its digest, and keeps its id.
     """
     about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
     about |= dict(zip(("symbol", "unit", "column"), words, strict=False))

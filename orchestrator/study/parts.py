@@ -15,15 +15,7 @@ from pydantic import Field, InstanceOf, PlainSerializer, field_validator, model_
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
 from orchestrator.study import sizes
-from orchestrator.study.part import (
-    Height,
-    Length,
-    List,
-    Part,
-    Roughness,
-    Viscosity,
-    field,
-)
+from orchestrator.study.part import Height, Length, List, Part, Roughness, Viscosity, field
 from orchestrator.study.part import UnfitError as UnfitError
 from orchestrator.study.profile import Profile
 from orchestrator.study.shapes import SHAPES, Shape
@@ -119,7 +111,7 @@ class Forces(Part):
     )
     """lift coefficient"""
     stress: Literal["wall", "eq10"] = _pile(
-        "stress", "wall", choices={"wall": "wall stress", "eq10": "stress of Eq. 10"}
+        "stress", "wall", choices=["wall stress", "stress of Eq. 10"]
     )
     """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
     # from far below a cell of any mesh to several piles
@@ -140,10 +132,10 @@ class Forces(Part):
         "exposure",
         "alike",
         since=True,
-        choices={
-            "alike": "every exposed grain stands z₀ above the bed, as in the paper",
-            "protrusion": "each stands at its own height over the local bed",
-        },
+        choices=[
+            "every exposed grain stands z₀ above the bed, as in the paper",
+            "each stands at its own height over the local bed",
+        ],
     )
     """height at which the flow meets a grain"""
 
@@ -160,10 +152,7 @@ class Protocol(Part):
     """How the threshold is found; by DEM the flow rises in load steps."""
 
     method: Literal["dem", "peeling", "pivot"] = field(
-        "threshold method",
-        "dem",
-        about="answer",
-        choices={"dem": "DEM", "peeling": "peeling", "pivot": "pivot"},
+        "threshold method", "dem", about="answer", choices=["DEM", "peeling", "pivot"]
     )
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
     another), or DEM"""
@@ -213,12 +202,12 @@ class Flow(Part):
         "solve",
         column="flow_model",
         about="answer",
-        choices={
-            "solve": "OpenFOAM",
-            "waves": "linear theory with A and B of each wavelength (Fourrière et al. 2010)",
-            "hill": "linear theory with A and B of one low hill (Kroy et al. 2002)",
-            "flat": "log law of a flat bed, u* = u*₀",
-        },
+        choices=[
+            "OpenFOAM",
+            "linear theory with A and B of each wavelength (Fourrière et al. 2010)",
+            "linear theory with A and B of one low hill (Kroy et al. 2002)",
+            "log law of a flat bed, u* = u*₀",
+        ],
     )
     """where the stress on a pile comes from"""
     speed: float = _solved(
@@ -256,14 +245,7 @@ class Flow(Part):
     """whether the flow is interpolated in ln z₀, face by face, between solves at fixed values of
     z₀/h, which beds of one form share"""
     turbulence_model: Turbulence = _solved(
-        "turbulence model",
-        "kEpsilon",
-        choices={
-            "kEpsilon": "k-ε",
-            "RNGkEpsilon": "RNG k-ε",
-            "realizableKE": "realizable k-ε",
-            "kOmegaSST": "k-ω SST",
-        },
+        "turbulence model", "kEpsilon", choices=["k-ε", "RNG k-ε", "realizable k-ε", "k-ω SST"]
     )
     """OpenFOAM's turbulence model"""
     convection_scheme: Convection = _solved("convection scheme", "linearUpwind")
@@ -273,11 +255,11 @@ class Flow(Part):
         "boundary layer",
         column="flow_top",
         since=True,
-        choices={
-            "open water": "a level surface without stress",
-            "closed channel": "a wall as rough as the bed",
-            "boundary layer": "the log layer goes on above",
-        },
+        choices=[
+            "a level surface without stress",
+            "a wall as rough as the bed",
+            "the log layer goes on above",
+        ],
     )
     """what the flow has above"""
     depth: Length | None = _pile("depth", None, "D", "m", "depth_m", since=True)
@@ -365,7 +347,7 @@ class PileBed(Bed):
         "straight",
         scope="dunes",
         since=True,
-        choices={"straight": "one slope", "curved": "half a wave of a cosine"},
+        choices=["one slope", "half a wave of a cosine"],
     )
     """windward side of a dune"""
     lee_slope_deg: float | None = _pile("lee slope", None, unit="°", since=True, gt=0, le=60)
@@ -400,12 +382,12 @@ class PileBed(Bed):
     packing: Packing = _pile(
         "packing",
         "aligned",
-        choices={
-            "aligned": "rows along the slope",
-            "horizontal": "level rows",
-            "disordered": "random gaps",
-            "poured": "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
-        },
+        choices=[
+            "rows along the slope",
+            "level rows",
+            "random gaps",
+            "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
+        ],
     )
     """pattern of the pile's grains; random gaps are between grains of rows along the slope"""
     disorder: float = field("disorder", 0.02, "", "d", scope="disordered piles", ge=1e-6, le=0.2)

@@ -12,17 +12,13 @@ import numpy as np
 
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
+from orchestrator.study.shapes import SHAPES
 from orchestrator.types import FloatArray, IntArray
 
-SHAPE_FIELDS = (
-    *("shape", "height", "slope_deg", "windward", "lee_slope_deg", "brink_radius"),
-    *("length", "forms", "spacing"),
-)
+SHAPE_FIELDS = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
 """Fields of a bed that a profile replaces."""
-LARGEST = 20 * 2**20
-"""Bytes of a file."""
-LARGEST_NUMBER = 1e5
-"""Largest coordinate, m."""
+LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5
+"""Bytes of a file, and largest coordinate, m."""
 MOST_CORNERS = 3000
 """Most corners of a bed line, each of which is a grid line of the flow's mesh."""
 GAP, DENSE = 20.0, 20
@@ -37,15 +33,11 @@ RESOLVED = 4
 class Profile:
     """A bed line of n points, x rising, that begins at the origin."""
 
-    name: str = field(compare=False)
-    """The file's name."""
-    x: tuple[float, ...]
-    """m, from the first point; so is z."""
+    name: str = field(compare=False)  # the file's
+    x: tuple[float, ...]  # m, from the first point; so is z
     z: tuple[float, ...]
-    text: str = field(compare=False, repr=False)
-    """The file itself."""
-    digest: str
-    """Digest of the corners: two profiles with one digest are one bed."""
+    text: str = field(compare=False, repr=False)  # the file itself
+    digest: str  # of the corners: two profiles with one digest are one bed
 
     def __hash__(self) -> int:
         return hash(self.digest)
@@ -68,12 +60,9 @@ class Profile:
 class Files:
     """The profiles and sieve tables of a study; a bad one is refused with an `InputError`."""
 
-    folder: Path
-    """Folder of the study file."""
-    texts: dict[str, Any]
-    """Text of each file by its name, at first of the study's own table ``profiles``."""
-    added: str = ""
-    """TOML with the texts that came from files: with it a study's text is whole without them."""
+    folder: Path  # of the study file
+    texts: dict[str, str]  # of each file by its name, at first the study's own table `profiles`
+    added: str = ""  # TOML with the texts of files: with it a study's text is whole without them
 
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
         """Fields of a bed that names a profile; `where` names the study file in messages."""
@@ -104,16 +93,14 @@ class Files:
             # a JSON string is a TOML string, but for the mark of deletion
             text = json.dumps(self.texts[name], ensure_ascii=False).replace("\x7f", "\\u007f")
             self.added += f"{head}{json.dumps(name)} = {text}\n"
-        return str(self.texts[name])
+        return self.texts[name]
 
 
 def read_text(path: Path, largest: int, where: str) -> str:
-    """The text of a file of the user, of so many bytes at most; `where` names it in messages.
+    """The text of a file of the user; `where` names it in messages.
 
-    Raises
-    ------
-    InputError
-        If it is missing, no regular file, too large, or no text in UTF-8.
+    An `InputError` refuses one that is missing, no regular file, larger than so many bytes, or no
+    text in UTF-8.
     """
     try:
         with opened(path) as stream:
@@ -135,15 +122,8 @@ def read_columns(
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Two columns of a CSV file with a header; blank lines and other columns are left out.
 
-    Returns
-    -------
-    tuple of ndarray
-        Numbers of the lines, and the values of both columns, all of shape (n,).
-
-    Raises
-    ------
-    InputError
-        Naming the file, the line and the remedy.
+    Returned are the numbers of the lines, and the values of both columns, all of shape (n,). An
+    `InputError` names the file, the line and the remedy.
     """
     rows = [(line, row) for line, row in enumerate(csv.reader(io.StringIO(text)), 1) if any(row)]
     header = [name.strip() for name in rows[0][1]] if rows else []
@@ -169,19 +149,9 @@ def read_columns(
 def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     """Read a profile and smooth it.
 
-    Parameters
-    ----------
-    text : str
-        CSV with the columns ``x_m`` and ``z_m``.
-    name, where : str
-        Its name in the study file, and its place in messages.
-    smoothing : float
-        Twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the line and the remedy.
+    The text is CSV with the columns ``x_m`` and ``z_m``; `where` names it in messages. `smoothing`
+    is twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none. An
+    `InputError` names the line and the remedy.
     """
     lines, x, z = read_columns(text, ("x_m", "z_m"), where)
 

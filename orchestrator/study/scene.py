@@ -39,8 +39,8 @@ NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
 a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
 ROUGHEST = 1 / 3
-"""Largest z0 over the diameter of the bed's grains. Sparse spheres have about 1/7, the largest
-ratio measured; above 1/3 a grain would lie where the mean flow of the log law is at rest."""
+"""Largest z0 over the diameter of the bed's grains; sparse spheres have about 1/7, the largest
+ratio measured."""
 POURED = 'bed.packing = "poured", or leave it out'
 
 
@@ -62,35 +62,30 @@ class Scene(Part):
             what = f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3"
             raise UnfitError("grain.density", what, "raise it, or lower fluid.density")
         bed_grains = d / bed.relative_size * extremes(grain.sizes, d)[1]
-        if z0 > ROUGHEST * bed_grains * (1 + 1e-9):
-            what = f"{z0:g} m is above a third of the bed's grains of {bed_grains:g} m"
+        if z0 > ROUGHEST * bed_grains * (1 + 1e-9) or z0 >= d:
+            what = f"{z0:g} m is above a third of the bed's grains of {bed_grains:g} m, or above d"
             raise UnfitError("bed.roughness", what, "typical: d/30")
         if law and law.turns and method != "pivot":
             what = f"{law.name} turns the grain about its centre, which {method} leaves out"
             raise UnfitError("forces.law", what, 'choose the method "pivot", or another law')
         if forces.exposure == "protrusion" and law and not law.protrudes:
             laws = ", ".join(name for name, each in LAWS.items() if each.protrudes)
-            what = f"{law.name} knows no height of a grain over the bed"
-            raise UnfitError("forces.exposure", what, f"laws that do: {laws}")
-        if not self.is_poured:
-            if grain.sizes is not None:
-                raise UnfitError("grain.sizes", "a mixture needs a poured bed", POURED)
-            if forces.exposure == "protrusion":
-                raise UnfitError("forces.exposure", "grains of a lattice stand alike", POURED)
-        elif method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS:
-            what = f"springs of {grain.stiffness:.3g} W/d throw them apart"
-            what = f"poured grains lie in one another by some 1e-3 d: {what}"
+            raise UnfitError("forces.exposure", f"{law.name} knows none", f"laws that do: {laws}")
+        if self.is_poured and method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS:
+            what = "poured grains lie in one another by some 1e-3 d: springs of"
+            what = f"{what} {grain.stiffness:.3g} W/d throw them apart"
             raise UnfitError("grain.stiffness", what, f"at most {MOST_POURED_STIFFNESS:g}")
+        if grain.sizes is not None and not self.is_poured:
+            raise UnfitError("grain.sizes", "a mixture needs a poured bed", POURED)
+        if forces.exposure == "protrusion" and not self.is_poured:
+            raise UnfitError("forces.exposure", "grains of a lattice stand alike", POURED)
         if isinstance(bed, PileBed):
             self._check_bed(bed)
             self._check_flow(bed)
-            return self
-        if z0 >= d:
-            raise UnfitError("bed.roughness", "it is not below the diameter", "typical: d/30")
-        if pocket_cosine(bed) >= 1:
+        elif pocket_cosine(bed) >= 1:
             what = f"a grain of {bed.relative_size:g} d falls between its neighbours"
             raise UnfitError("bed.relative_size", what, "raise it, or bed.entrainment_angle_deg")
-        if self.protocol.update:
+        elif self.protocol.update:
             raise UnfitError("protocol.update", "a single grain leaves no bed that changes")
         return self
 
@@ -100,8 +95,7 @@ class Scene(Part):
         if bed.width and bed.packing != "poured":
             raise UnfitError("bed.width", "a lattice is one layer in the plane of the flow", POURED)
         if bed.width and (self.protocol.method == "peeling" or self.protocol.update):
-            what = "peeling and protocol.update know one layer in the plane of the flow alone"
-            raise UnfitError("bed.width", what)
+            raise UnfitError("bed.width", "peeling and protocol.update know beds in a plane alone")
         if 0 < bed.width < least:
             what = f"{bed.width:g} d is less than {LEAST_WIDTH:g} of the largest grains"
             raise UnfitError("bed.width", what, f"at least {least:.4g}, or 0: a bed in the plane")
@@ -114,10 +108,9 @@ class Scene(Part):
             raise UnfitError("bed.profile", what, "are its columns in mm? or cut a part out of it")
         else:
             steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
-            near = int(np.argmin(steps))
-            cell = self.first_cell_height if self.flow.model == "solve" else 0.0
-            least = max(NARROWEST_OVER_D * d, NARROWEST_OVER_CELL * cell)
-            if steps[near] < least:
+            near, cell = int(np.argmin(steps)), self.first_cell_height
+            cells = NARROWEST_OVER_CELL * cell if self.flow.model == "solve" else 0.0
+            if steps[near] < (least := max(NARROWEST_OVER_D * d, cells)):
                 what = f"{profile.name}, x = {profile.x[near + 1]:.6g} m: {steps[near]:.2g} m from"
                 what = f"{what} the point before it, nearer than {least:.2g} m"
                 raise UnfitError("bed.profile", what, "leave out a point, or raise bed.smoothing")
@@ -130,37 +123,34 @@ class Scene(Part):
 
     def _check_flow(self, bed: PileBed) -> None:
         flow, height, cell = self.flow, bed.relief, self.first_cell_height
-        top = flow.depth or flow.lid * height
+        depth = flow.depth or flow.lid * height
+        if (flow.top == "boundary layer") == bool(flow.depth):
+            what = f"{flow.top} {'has none' if flow.depth else 'needs one, in m'}"
+            raise UnfitError("flow.depth", what, 'only "open water" and "closed channel" have one')
         for obstacle in bed.obstacles:
-            if top < LEAST_DEPTH * obstacle.height:
-                what = f"{obstacle} under a flow {top:g} m deep, less than {LEAST_DEPTH:g} heights"
+            if depth < LEAST_DEPTH * obstacle.height:
+                what = (
+                    f"{obstacle} under a flow {depth:g} m deep, less than {LEAST_DEPTH:g} heights"
+                )
                 raise UnfitError("bed.obstacles", what, "raise flow.depth or flow.lid")
-        if flow.top == "boundary layer":
-            if flow.depth:
-                remedy = 'leave it out, or choose flow.top = "open water"'
-                raise UnfitError("flow.depth", "a boundary layer has none", remedy)
-        elif not flow.depth:
-            raise UnfitError("flow.depth", f"the depth of {flow.top} is missing", "give it, in m")
-        elif flow.depth < LEAST_DEPTH * height:
-            what = f"{flow.depth:g} m is less than {LEAST_DEPTH:g} heights of the forms"
+        if depth < LEAST_DEPTH * height:
+            what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms"
             raise UnfitError("flow.depth", what, "raise it, or lower bed.height")
-        elif flow.model not in ("solve", "flat"):
-            what = f"the theory {flow.model} is of a flow without a top"
-            raise UnfitError("flow.model", what, 'choose "solve" or "flat"')
+        if flow.depth and flow.model not in ("solve", "flat"):
+            raise UnfitError("flow.model", "the theories have no top", 'choose "solve" or "flat"')
         if flow.model == "solve" and cell > height / 4:
             what = f"{cell:g} m is above a quarter of the pile's {height:g} m"
             raise UnfitError("flow.first_cell_height", what, "lower it, or raise bed.height")
-        if self.protocol.update:
-            if flow.nodes:
-                what = "a flow between nodes knows no bed that changes"
-                raise UnfitError("flow.nodes", what, "leave it out, or protocol.update")
-            if flow.model != "solve" or self.protocol.method == "pivot":
-                what = f'flow.model "{flow.model}" or the method "{self.protocol.method}"'
-                what = f"{what} knows no bed that changes"
-                raise UnfitError("protocol.update", what, '"solve" with "dem", or leave it out')
-            if cell > self.grain.diameter:
-                what = f"the first cell, {cell:g} m, is higher than a grain"
-                raise UnfitError("protocol.update", what, "lower flow.first_cell_height")
+        if not self.protocol.update:
+            return
+        if flow.nodes:
+            raise UnfitError("flow.nodes", "a flow between nodes knows no bed that changes")
+        if flow.model != "solve" or self.protocol.method == "pivot":
+            what = f'flow.model "{flow.model}" or the method "{self.protocol.method}" knows none'
+            raise UnfitError("protocol.update", what, '"solve" with "dem", or leave it out')
+        if cell > self.grain.diameter:
+            what = f"the first cell, {cell:g} m, is higher than a grain"
+            raise UnfitError("protocol.update", what, "lower flow.first_cell_height")
 
     @cached_property
     def id(self) -> str:

@@ -18,12 +18,10 @@ from orchestrator.types import FloatArray
 if TYPE_CHECKING:
     from orchestrator.study.parts import PileBed
 
-CHORDS = 40
-"""Chords of the windward side of a form that is a curve."""
+CHORDS, ARC_DEG = 40, 2.0
+"""Chords of a windward side that is a curve, and the bend between two of a rounded brink."""
 GAUSSIAN_END = 3.5
 """Where a Gaussian hill is cut, standard deviations: it is let down by 0.2 % of its height."""
-ARC_DEG = 2.0
-"""Bend of the bed between two chords of a rounded brink."""
 
 
 @dataclass(frozen=True)
@@ -32,18 +30,12 @@ class Shape:
 
     name: str
     meaning: str
-    corners: Callable[["PileBed"], FloatArray]
-    """Corners of one form of a bed."""
-    fields: tuple[str, ...] = ()
-    """Fields of the bed that not all shapes have, and this one has."""
-    rises: bool = True
-    """Whether it has a windward side, whose slope is the bed's."""
-    lee_slope_deg: float | None = None
-    """Slope of the lee side by default; None: that of the windward side."""
-    counted: Literal["windward", "all"] = "windward"
-    """Exposed grains that are counted by default."""
-    label: str = ""
-    """Its name in figures, where that is not its name."""
+    corners: Callable[["PileBed"], FloatArray]  # of one form of a bed
+    fields: tuple[str, ...] = ()  # of the bed that not all shapes have, and this one has
+    rises: bool = True  # whether it has a windward side, whose slope is the bed's
+    lee_slope_deg: float | None = None  # by default; None: that of the windward side
+    counted: Literal["windward", "all"] = "windward"  # exposed grains, by default
+    label: str = ""  # in figures, where that is not the name
 
 
 def _faces(bed: "PileBed") -> FloatArray:

@@ -1,7 +1,7 @@
 """Sizes of the grains of a mixture: a sieve table, or a log-normal distribution by mass."""
 
 from math import log
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +14,9 @@ from orchestrator.types import FloatArray
 LARGEST_RATIO = 10.0
 """Largest ratio of the largest to the smallest grain: the lists of neighbours in DEM reach as far
 as two of the largest, so that their length, and the time of a run, rise with its square."""
-SUM = 1e-6
-"""Largest difference of the sum of a sieve table's fractions from 1."""
-OFF_MEDIAN = 0.01
-"""Largest difference of a log-normal mixture's d50 from the diameter, relative: Shields numbers and
-a roughness length of d/30 take the diameter."""
+SUM, OFF_MEDIAN = 1e-6, 0.01
+"""Largest difference of the sum of a sieve table's fractions from 1, and of a log-normal mixture's
+d50 from the diameter, relative: Shields numbers and a roughness length of d/30 take the latter."""
 
 
 class LogNormal(BaseModel):
@@ -51,28 +49,16 @@ class LogNormal(BaseModel):
 _Number = Annotated[float, Field(gt=0, lt=100)]
 Sieve = tuple[Annotated[tuple[_Number, _Number], List], ...]
 """Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
-TABLE, FORMULA = "rows", "log-normal"
-
-
-def _kind(value: Any) -> str:
-    return FORMULA if isinstance(value, dict | LogNormal) else TABLE
-
-
 Sizes = Annotated[
-    Annotated[LogNormal, Tag(FORMULA)] | Annotated[Sieve, Field(min_length=1), List, Tag(TABLE)],
-    Discriminator(_kind),
+    Annotated[LogNormal, Tag("log-normal")]
+    | Annotated[Sieve, Field(min_length=1), List, Tag("rows")],
+    Discriminator(lambda value: "log-normal" if isinstance(value, dict | LogNormal) else "rows"),
 ]
 """In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 
 
 def check(sizes: Sizes, diameter: float) -> None:
-    """See that a mixture is one that can be poured, and that the diameter (m) is its median.
-
-    Raises
-    ------
-    UnfitError
-        If it is not.
-    """
+    """Refuse, by an `UnfitError`, a mixture that cannot be poured, or with another d50 (m)."""
     median = percentile(sizes, diameter, 0.5)
     if isinstance(sizes, LogNormal):
         if abs(median / diameter - 1) > OFF_MEDIAN:

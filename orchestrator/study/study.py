@@ -85,32 +85,23 @@ class Group:
     """Scenes of a study that belong together: the points of one experiment."""
 
     name: str
-    scenes: tuple[Scene, ...]
-    """In the file's order, each with its force law decided."""
-    where: str
-    """Its place in messages: the file, and which group of it."""
+    scenes: tuple[Scene, ...]  # in the file's order, each with its force law decided
+    where: str  # its place in messages: the file, and which group of it
 
 
 @dataclass(frozen=True)
 class Study:
     """The content of a study file."""
 
-    name: str
-    """The file's name without its ending."""
+    name: str  # the file's, without its ending
     title: str
-    """A line for the page."""
     groups: tuple[Group, ...]
-    """In the file's order."""
-    time_limit_s: float
-    """Wall time after which one solver run counts as hung, s."""
+    time_limit_s: float  # wall time after which one solver run counts as hung, s
     tolerance: float | None
     """Relative error that tau_c may have; 0: every scene as it is asked for; None: not given."""
-    cluster: dict[str, Any]
-    """Settings of the queue that runs the cases, if one does; `cluster.pool` knows them."""
-    text: str
-    """The file itself, and the profiles that it names."""
-    file: str = ""
-    """Absolute path of the file; empty if the text came from elsewhere."""
+    cluster: dict[str, Any]  # settings of the queue that runs the cases
+    text: str  # the file itself, and the profiles that it names
+    file: str = ""  # absolute path; empty if the text came from elsewhere
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -127,10 +118,7 @@ def presets(folders: Iterable[Path] = ()) -> dict[str, Path]:
 def load(source: str, folders: Iterable[Path] = ()) -> Study:
     """Read a study file by its path, or a preset, also of other folders, by its name.
 
-    Raises
-    ------
-    InputError
-        Naming the file, the field and the remedy.
+    What is wrong raises an `InputError` with the file, the field and the remedy.
     """
     brought = presets(folders)
     path = brought.get(source, Path(source))
@@ -148,13 +136,9 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
 def parse(text: str, *, name: str, where: str) -> Study:
     """Make a study of the text of a TOML file.
 
-    Only scenes that cannot be built are refused; a plan refuses those beyond the methods' limits.
-    `where` is the file's path, for messages; profiles are looked for in its folder.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the field and the remedy.
+    Only scenes that cannot be built are refused, by an `InputError` with the field and the remedy;
+    a plan refuses those beyond the methods' limits. `where` is the file's path, for messages;
+    profiles are looked for in its folder.
     """
     try:
         file = _File.model_validate(tomllib.loads(text))
@@ -166,26 +150,24 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise InputError(f"not TOML: {error}", where) from None
     files = Files(Path(where).parent, dict(file.profiles))
     groups, count = [], 0
-    for number, group in enumerate(file.group or [_Group()], 1):
+    for number, table in enumerate(file.group or [_Group()], 1):
         place = f"{where}: group {number}" if file.group else where
-        tables = {part: {**getattr(file, part), **getattr(group, part)} for part in PARTS}
-        axes = {**file.axes, **group.axes}
-        if seeds := file.seeds if group.seeds is None else group.seeds:
+        tables = {part: {**getattr(file, part), **getattr(table, part)} for part in PARTS}
+        axes = {**file.axes, **table.axes}
+        if seeds := file.seeds if table.seeds is None else table.seeds:
             axes["bed.seed"] = [*range(seeds)]
-        count += math.prod(map(len, axes.values()))
-        if count > MOST_SCENES:
+        if (count := count + math.prod(map(len, axes.values()))) > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
             raise InputError(what, f"{place}: axes", "shorten the lists")
         scenes = tuple(_scenes(tables, axes, place, files))
-        groups.append(Group(group.name or f"group {number}", scenes, place))
+        groups.append(Group(table.name or f"group {number}", scenes, place))
     # force laws are found for the scenes of all groups at once
     laws = resolved([scene for group in groups for scene in group.scenes])
-    under_laws = tuple(
-        replace(each, scenes=tuple(itertools.chain(*itertools.islice(laws, len(each.scenes)))))
-        for each in groups
-    )
+    for index, group in enumerate(groups):
+        scenes = tuple(itertools.chain(*itertools.islice(laws, len(group.scenes))))
+        groups[index] = replace(group, scenes=scenes)
     settings = (file.time_limit, file.tolerance, file.cluster, text + files.added)
-    return Study(name, file.title or name, under_laws, *settings)
+    return Study(name, file.title or name, tuple(groups), *settings)
 
 
 def check_tolerance(value: Any, where: str) -> None:
@@ -219,21 +201,10 @@ def _scenes(
 
 
 def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = None) -> Scene:
-    """Validate the tables of one scene.
+    """Validate the tables of one scene, by their names; `where` names the file in messages.
 
-    Parameters
-    ----------
-    parts : mapping
-        The tables by their names; d/30 of a diameter is filled in, and the d50 of a sieve table.
-    where : str
-        Names the file in messages.
-    files : Files, optional
-        The files that the tables may name.
-
-    Raises
-    ------
-    InputError
-        For the first thing wrong: the file, the field and the remedy.
+    A part of the diameter such as d/30 is worked out, and so is the d50 of a sieve table. `files`
+    are those that the tables may name. The first thing wrong raises an `InputError`.
     """
     bed, grain = {**BED, **parts["bed"]}, dict(parts["grain"])
     if files and bed["kind"] == "pile" and "profile" in bed:
@@ -287,11 +258,8 @@ def _explained(error: ValidationError, where: str) -> InputError:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
     here = str(path[0]) if path[1:] else ""
     known = [*PARTS[here].model_fields] if here else keys
-    others = [
-        (name, f"{part}.{name}")
-        for part, model in PARTS.items()
-        for name in model.model_fields
-        if part != here
+    elsewhere = [
+        *((n, f"{part}.{n}") for part in PARTS if part != here for n in PARTS[part].model_fields),
+        *((name, f"{name}, above the first table") for name in keys if name not in PARTS),
     ]
-    top = [(name, f"{name}, above the first table") for name in keys if name not in PARTS]
-    return unknown_key(key, known, place, others + top)
+    return unknown_key(key, known, place, elsewhere)

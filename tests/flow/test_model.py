@@ -124,10 +124,10 @@ def test_tables_have_the_discharge(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("flow", "what"),
     [
-        ("depth = 1.0", "flow.depth: a boundary layer has none"),
-        ('top = "open water"', "flow.depth: the depth of open water is missing"),
+        ("depth = 1.0", "flow.depth: boundary layer has none"),
+        ('top = "open water"', "flow.depth: open water needs one"),
         ('top = "open water"\ndepth = 0.05', "less than 3 heights of the forms"),
-        ('top = "open water"\ndepth = 1.0\nmodel = "hill"', "the theory hill is of a flow without"),
+        ('top = "open water"\ndepth = 1.0\nmodel = "hill"', "the theories have no top"),
     ],
 )
 def test_a_channel_has_a_depth_that_forms_do_not_fill(flow: str, what: str) -> None:

@@ -1,5 +1,6 @@
 """The registry: every field has its words and its range, tells scenes apart, is documented."""
 
+import runpy
 from pathlib import Path
 from typing import Any, get_args
 
@@ -8,12 +9,14 @@ import pytest
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import LEVELS, Level, changed
-from orchestrator.study import fields, reference, study
+from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal
 from orchestrator.tables import COLUMNS, scenes
 
+PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
+REFERENCE = runpy.run_path(str(PAGE.with_name("study_file.py")))
 PILE = """
 grain = { diameter = 1e-3 }
 bed = { kind = "pile", slope_deg = 15.0, packing = "disordered" }
@@ -67,7 +70,7 @@ def test_each_field_has_its_words_and_its_row_in_the_reference(one: Quantity) ->
     if one.name != "bed.kind" and words and one.info.choices:
         assert list(one.info.choices) == words
     part, _, name = one.name.partition(".")
-    section = reference.text().split(f"## `[{part}]`")[1].split("\n## ")[0]
+    section = REFERENCE["text"]().split(f"## `[{part}]`")[1].split("\n## ")[0]
     (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
     assert one.meaning.replace("*", r"\*") in row
     assert row.count(" | ") == 6
@@ -81,7 +84,7 @@ def test_columns_are_distinct_and_explained() -> None:
 
 @pytest.mark.parametrize("quantity", NUMERIC, ids=lambda each: each.name)
 def test_every_number_has_two_ends(quantity: Quantity) -> None:
-    low, high = reference.bounds(fields.declared(quantity))
+    low, high = REFERENCE["bounds"](fields.declared(quantity))
     assert (low[0], high[0]) in {(">", "<"), (">", "≤"), ("≥", "<"), ("≥", "≤")}
     part, _, name = quantity.name.partition(".")
     bed = {"kind": "pile", "slope_deg": 20.0}
@@ -148,9 +151,8 @@ def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> No
 
 
 def test_the_reference_of_study_files_is_written_from_the_registry() -> None:
-    page = Path(__file__).parents[2] / "docs" / "study-file.md"
-    assert page.read_text(encoding="utf-8") == reference.text()
-    rows = {line.split(" | ")[0]: line for line in reference.text().splitlines()}
+    assert PAGE.read_text(encoding="utf-8") == REFERENCE["text"]()
+    rows = {line.split(" | ")[0]: line for line in REFERENCE["text"]().splitlines()}
     assert "| ≥ 0, < 90 | `0.0` |" in rows["| `slope_deg`"]
     assert "| ≥ 1e-12, ≤ 10000 | worked out |" in rows["| `first_cell_height`"]
     assert "| ≥ 1e-07, ≤ 10 | none: required |" in rows["| `diameter`"]

@@ -1,6 +1,6 @@
 """The reference of study files, written from the registry.
 
-``python -m orchestrator.study.reference > docs/study-file.md`` writes it.
+``python docs/study_file.py > docs/study-file.md`` writes it.
 """
 
 from typing import get_args
@@ -93,11 +93,8 @@ def bounds(field: FieldInfo) -> list[str]:
     for inner in get_args(field.annotation):
         for rule in getattr(inner, "__metadata__", ()):
             rules += getattr(rule, "metadata", [rule])
-    return [
-        f"{SIGNS[type(rule)][1]} {getattr(rule, SIGNS[type(rule)][0]):g}"
-        for rule in rules
-        if type(rule) in SIGNS
-    ]
+    signs = [(SIGNS[type(rule)], rule) for rule in rules if type(rule) in SIGNS]
+    return [f"{sign} {getattr(rule, name):g}" for (name, sign), rule in signs]
 
 
 if __name__ == "__main__":
