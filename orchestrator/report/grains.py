@@ -1,12 +1,10 @@
 """Figures of single grains: closed form and DEM by entrainment angle, by slope and by force law."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
 from orchestrator.report import labels, shields, style, theory
@@ -48,27 +46,39 @@ def _dem(results: Results) -> pd.DataFrame:
 def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figure]:
     """The closed form and DEM on it, coloured by entrainment angle, slope or force law."""
     choices, scenes, variants = parted(scenes, *SHOWN, "z0_over_d")
-    points = _dem(results)
+    points, of_laws = _dem(results), by == "force_law"
     if len(points):
         points = points.merge(scenes[["scene_id", SHAPE]], on="scene_id")
     if points.empty:  # the closed form depends on nothing that is about its answer
         choices = [item for item in choices if fields.COLUMNS[item].info.about == "question"]
-    keys = ["beta_deg" if by == "force_law" else "z0_over_d", *choices]
+    keys = ["beta_deg" if of_laws else "z0_over_d", *choices]
     panels = [part for _, part in split(scenes, *keys)]
-    panels = panels if by == "force_law" else panels[::-1]
-    for name, _, chosen in style.pages(panels):
+    for ending, _, chosen in style.pages(panels if of_laws else panels[::-1]):
         every = pd.concat(chosen)
         shown = points[points["scene_id"].isin(every["scene_id"])] if len(points) else points
         figure, axes = style.grid(len(chosen), 2.4)
-        colours = {} if by == "force_law" else style.palette(by, results.values(by))
+        colours = {} if of_laws else style.palette(by, results.values(by))
         dashes = theory.dashes(every["force_law"])
         for ax, part in zip(axes, chosen, strict=True):
-            published = _panel(ax, part, shown, by, colours, dashes)
+            published: list[Artist] = []
+            for (value,), series in split(part, by):
+                colour = theory.look(str(value))[0] if of_laws else colours[float(str(value))]
+                for branch in theory.branches(series):
+                    look = theory.look(branch.law) if of_laws else (colour, dashes[branch.law])
+                    shields.draw_branch(ax, branch, *look)
+                if by == "alpha_deg":
+                    published = shields.draw_sloped_air(ax, series, colour)
+                if len(shown):
+                    group = shown[shown["scene_id"].isin(series["scene_id"])]
+                    shields.draw_points(ax, group, colour, DEM)
+            if by != "alpha_deg":
+                in_air = [] if of_laws else shields.draw_air(ax, part)
+                published = [*shields.draw_water(ax), *in_air]
             ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
         low, high = theory.span(every)
         shields.prepare(axes, chosen, (low / 2, high * 2))
         looks: list[Sample] = [*shields.within(axes, published)]
-        if by == "force_law":
+        if of_laws:
             for law in theory.drawn(every["force_law"]):
                 colour, dash = theory.look(law)
                 label = labels.value("force_law", law)
@@ -78,66 +88,30 @@ def _diagrams(results: Results, scenes: pd.DataFrame, by: str) -> Iterator[Figur
             looks += shields.line_entries(every, dashes)
         if len(shown):
             looks += shields.point_entries(shown, variants)
-        style.legends(figure, _colour_entries(every, by, colours), [*looks, *variants])
-        yield _named(every, shown, by, name, figure)
+        style.legends(figure, colour_entries(by, colours, every), [*looks, *variants])
+        ratio = labels.ratio_of(float(every["z0_over_d"].iloc[0]), "d")
+        lines = shields.references(every, sloped=by == "alpha_deg")
+        if of_laws:
+            name = f"shields-{ratio.replace('/', '')}"
+            title = f"Force laws on a horizontal bed, z₀ = {ratio}"
+            text = caption("compared", about=shields.about(shown), lines=lines)
+        else:
+            beta, dem = every["beta_deg"].iloc[0], "dem" if len(shown) else "closed-form"
+            name, bed, number = f"{dem}-horizontal", "horizontal bed", 5
+            if by == "alpha_deg":
+                name, bed, number = f"{dem}-slope-beta{beta:g}", f"slope, β = {beta:g}°", 7
+            title = f"One grain on a {bed}: closed form" + (" and DEM" if len(shown) else "")
+            text = caption("grain", about=shields.about(every), lines=lines, by=by, number=number)
+            if len(shown):
+                text += f" {caption('grain_dem', about=shields.about(shown), number=number + 1)}"
+        fold, cases = bool(ending) or by == "alpha_deg", case_names(shown)
+        yield Figure(f"{name}{ending}", title, text, cases, figure, fold=fold)
 
 
-def _named(
-    scenes: pd.DataFrame, points: pd.DataFrame, by: str, ending: str, canvas: Canvas
-) -> Figure:
-    """A diagram with its name, title and caption."""
-    ratio = labels.ratio_of(float(scenes["z0_over_d"].iloc[0]), "d")
-    beta, dem = scenes["beta_deg"].iloc[0], "dem" if len(points) else "closed-form"
-    name, bed = {
-        "force_law": (f"shields-{ratio.replace('/', '')}", ""),
-        "beta_deg": (f"{dem}-horizontal", "horizontal bed"),
-        "alpha_deg": (f"{dem}-slope-beta{beta:g}", f"slope, β = {beta:g}°"),
-    }[by]
-    about, lines = shields.about(scenes), shields.references(scenes, sloped=by == "alpha_deg")
-    if by == "force_law":
-        title = f"Force laws on a horizontal bed, z₀ = {ratio}"
-        text = caption("compared", about=shields.about(points), lines=lines)
-    else:
-        title = f"One grain on a {bed}: closed form" + (" and DEM" if len(points) else "")
-        figure = 5 if by == "beta_deg" else 7
-        text = caption("grain", about=about, lines=lines, by=by, number=figure)
-        if len(points):
-            about = shields.about(points)
-            text += f" {caption('grain_dem', about=about, number=figure + 1)}"
-    fold = bool(ending) or by == "alpha_deg"
-    return Figure(f"{name}{ending}", title, text, case_names(points), canvas, fold=fold)
-
-
-def _panel(
-    ax: Axes,
-    scenes: pd.DataFrame,
-    points: pd.DataFrame,
-    by: str,
-    colours: dict[float, str],
-    dashes: Mapping[str, theory.Dash],
-) -> list[Artist]:
-    """One panel; returns the legend's entries of the references."""
-    published: list[Artist] = []
-    for (value,), series in split(scenes, by):
-        law = by == "force_law"
-        colour = theory.look(str(value))[0] if law else colours[float(str(value))]
-        for branch in theory.branches(series):
-            shade, dash = theory.look(branch.law) if law else (colour, dashes[branch.law])
-            shields.draw_branch(ax, branch, shade, dash)
-        if by == "alpha_deg":
-            published = shields.draw_sloped_air(ax, series, colour)
-        group = points[points["scene_id"].isin(series["scene_id"])] if len(points) else points
-        if group.empty:
-            continue
-        shields.draw_points(ax, group, colour, DEM)
-    if by == "alpha_deg":
-        return published
-    return [*shields.draw_water(ax), *(shields.draw_air(ax, scenes) if by == "beta_deg" else [])]
-
-
-def _colour_entries(rows: pd.DataFrame, by: str, colours: dict[float, str]) -> list[Artist]:
-    used = set(rows[by])
-    return [style.entry(labels.plain(by, v), c) for v, c in colours.items() if v in used]
+def colour_entries(column: str, colours: dict[float, str], rows: pd.DataFrame) -> list[Artist]:
+    """Legend of the colours that some rows have."""
+    used = set(rows[column])
+    return [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
 
 
 def accuracy(results: Results) -> Iterator[Figure]:
@@ -170,18 +144,11 @@ def accuracy(results: Results) -> Iterator[Figure]:
         style.plain_ticks(ax.xaxis)
         shields.shade_transition(ax, rows)
     axes[-1].set_xlabel(labels.RE_AXIS)
-    entries = _colour_entries(rows, "alpha_deg", colours)
+    entries = colour_entries("alpha_deg", colours, rows)
     style.legends(figure, entries, [*shields.point_entries(rows, variants), *variants])
     far, holds = (rows["value"] - 1).abs(), valid(rows)
-    deviations = [
-        f"{far[chosen].max():.2%} {name}"
-        for chosen, name in ((holds, "where its law holds"), (~holds, "where it does not"))
-        if chosen.any()
-    ]
-    text = caption(
-        "accuracy",
-        about=shields.about(rows),
-        several=rows["load_increment"].nunique() > 1,
-        deviations=", ".join(deviations),
-    )
+    named = ((holds, "where its law holds"), (~holds, "where it does not"))
+    deviations = ", ".join(f"{far[rule].max():.2%} {name}" for rule, name in named if rule.any())
+    about, several = shields.about(rows), rows["load_increment"].nunique() > 1
+    text = caption("accuracy", about=about, several=several, deviations=deviations)
     yield Figure("accuracy", "DEM over closed form", text, case_names(rows), figure, fold=True)

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import measured
 from orchestrator.report import labels, shields, style, theory
+from orchestrator.report.grains import colour_entries
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, case_names, drawable, split
 from orchestrator.report.shields import SHAPE, parted
@@ -56,12 +57,6 @@ def _figures(
         yield name, title, figure, list(zip(axes, parts, strict=True)), pd.concat(parts)
 
 
-def _entries(column: str, colours: dict[float, str], rows: pd.DataFrame) -> list[Artist]:
-    """Legend of the colours that some rows have."""
-    used = set(rows[column])
-    return [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
-
-
 def fractions(results: Results) -> Iterator[Figure]:
     """Fig. 14: n/N against tau, figures of each slope."""
     curve = results.tables.get("pile_curve", pd.DataFrame())
@@ -94,7 +89,7 @@ def fractions(results: Results) -> Iterator[Figure]:
                 style.plain_ticks(ax.xaxis)
             shields.label_lowest(axes, labels.TAU_AXIS)
             looks = [*shields.point_entries(shown, variants), *variants]
-            style.legends(figure, _entries("d_m", colours, shown), looks)
+            style.legends(figure, colour_entries("d_m", colours, shown), looks)
             title = f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}{title}"
             text = caption("fractions", about=shields.about(shown))
             fold = bool(name) or alpha != scenes["alpha_deg"].min()
@@ -126,7 +121,7 @@ def extended(results: Results) -> Iterator[Figure]:
                 *variants,
                 *shields.within(axes, published),
             ]
-            style.legends(figure, _entries("fraction", colours, reached), looks)
+            style.legends(figure, colour_entries("fraction", colours, reached), looks)
             lines = shields.references(shown, sloped=True)
             text = caption("extended", about=shields.about(shown), lines=lines)
             title = f"Thresholds of piles by slope, z₀ = {written}{title}"
@@ -187,7 +182,7 @@ def wear(results: Results) -> Iterator[Figure]:
         shields.label_lowest(axes, "$n/N$")
         for ax in axes[::2]:
             ax.set_ylabel("Shields number $θ$")
-        style.legends(figure, _entries("d_m", colours, rows), looks)
+        style.legends(figure, colour_entries("d_m", colours, rows), looks)
         cases = tuple(results.plan.piles[i].runs[-1].name for i in shown["scene_id"].unique())
         heading = f"Frozen bed and bed that changes{title}"
         yield Figure(f"wear{name}", heading, caption("wear"), cases, figure)
@@ -297,5 +292,5 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         style.plain_ticks(ax.yaxis)
     axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
     looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in HIDING]
-    style.legends(figure, _entries("fraction", colours, rows), looks)
+    style.legends(figure, colour_entries("fraction", colours, rows), looks)
     return Figure("hiding", "Hiding and exposure of sizes", caption("hiding"), (), figure)
