@@ -116,9 +116,19 @@ def of(
     except InputError as error:
         place = f"{name}: {error.where}"
         raise InputError(error.what, where=place, remedy=error.remedy) from None
-    listed = {case.name: case for case in (*runs, *cells)}
+    listed: dict[str, Case] = {}
+    for run in (*runs, *cells):
+        _list(run, listed)
     first = {name: case for name, case in listed.items() if not case.needs}
     return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
+
+
+def _list(case: Case, listed: dict[str, Case]) -> None:
+    """Add a case behind all whose results it needs."""
+    if case.name not in listed:
+        for need in case.needs:
+            _list(need, listed)
+        listed[case.name] = case
 
 
 def settled(study: Study, directory: Path) -> Plan:

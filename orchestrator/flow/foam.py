@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
@@ -62,14 +63,16 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
 
     Returns
     -------
-    ndarray, shape (columns, cells of a column)
-        Height of the middles of the cells in their order, m: downstream, in a column upwards.
+    ndarray, shape (columns, cells of a column, 3)
+        Middles of the cells in their order, m: downstream, in a column upwards.
     """
     points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
     tags = mesh.cell_data_dict["gmsh:physical"]["quad"]
-    x, _, z = points[cells].mean(axis=1).T
-    columns = np.argsort(x).reshape(np.count_nonzero(tags == mesh.field_data["bed"][0]), -1)
-    columns = np.take_along_axis(columns, np.argsort(z[columns], axis=1), axis=1)
+    middles = points[cells].mean(axis=1)
+    columns = np.argsort(middles[:, 0])
+    columns = columns.reshape(np.count_nonzero(tags == mesh.field_data["bed"][0]), -1)
+    upwards = np.argsort(middles[columns, 2], axis=1)
+    columns = np.take_along_axis(columns, upwards, axis=1)
     faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4).astype(np.int64)
     owner = np.repeat(np.arange(len(cells)), len(SIDES))
 
@@ -103,12 +106,12 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     ):
         whole = f"{_HEAD.format(kind, name)}{text}\n{_END}\n"
         (directory / "constant/polyMesh" / name).write_text(whole, encoding="utf-8")
-    return np.asarray(z[columns])
+    return np.asarray(middles[columns])
 
 
 def start_from(path: Path, values: FloatArray) -> None:
     """Let a field in ``0/`` start from a value or a vector of each cell."""
-    vector = values.ndim > 1
+    vector = values.ndim > 1 and values.shape[1] > 1
     kind, item = ("vector", "(%.10g %.10g %.10g)") if vector else ("scalar", "%.10g")
     text = path.read_text(encoding="utf-8")
     field = f"internalField nonuniform List<{kind}>\n{listed(values, item)};"
@@ -128,6 +131,28 @@ class SolvedFlow:
     """
 
     directory: Path
+
+    def at(self, name: str, x: FloatArray, heights: FloatArray, bed: BedLine) -> FloatArray:
+        """A field of a study's case at the middles of the cells of another mesh over the same bed.
+
+        `x` has the shape (columns,) and the heights over the bed (columns, cells); both are in m.
+        The result has the shape (columns * cells, components). The field is linear along the rows
+        of cells, and in a column in the logarithm of the height.
+        """
+        middles, values = self.middles, self.field(name)
+        rows = int(np.argmax(np.diff(middles[:, 0]) > 1e-9 * bed.h)) + 1
+        places = middles[::rows, 0]
+        above = (middles[:, 2] - bed.height(middles[:, 0])).reshape(-1, rows)
+        old = np.dstack([np.log(above), values.reshape(len(places), rows, -1)])
+        after = np.clip(np.searchsorted(places, x), 1, len(places) - 1)
+        part = ((x - places[after - 1]) / np.diff(places)[after - 1])[:, None, None]
+        columns = (1 - part) * old[after - 1] + part * old[after]
+        return np.concatenate(
+            [
+                np.column_stack([np.interp(up, column[:, 0], c) for c in column[:, 1:].T])
+                for up, column in zip(np.log(heights), columns, strict=True)
+            ]
+        )
 
     def field(self, name: str, patch: str = "") -> FloatArray:
         """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""

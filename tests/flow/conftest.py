@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from orchestrator.flow.case import FlowCase
+from orchestrator.flow.case import FINE, FlowCase
 from orchestrator.runs import case, process
 from orchestrator.runs.case import templates
 from orchestrator.study.parts import Flow
@@ -32,7 +32,7 @@ def changed(flow: FlowCase, **settings: Any) -> FlowCase:
     return replace(flow, settings=flow.settings.model_copy(update=settings))
 
 
-SLOW = replace(changed(PILE, cells_per_face=80), slope_deg=30.0)
+SLOW = replace(changed(PILE, cells_per_face=FINE - 1), slope_deg=30.0)
 """A case that runs for many seconds: long enough to be interrupted."""
 OPEN = changed(PILE, top="open water", depth=6.0 * PILE.height_m)
 
@@ -55,6 +55,8 @@ def solve(shared: Shared) -> Solve:
     """Run a case to its end, once in a session."""
 
     def to_its_end(flow: FlowCase) -> Path:
+        for coarser in flow.needs:
+            to_its_end(coarser)
         with shared("flows") as cases:
             if not case.done_state(flow, cases):
                 directory = case.prepare(flow, cases)

@@ -15,10 +15,11 @@ import pytest
 
 from orchestrator.bed.line import between_flats
 from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.flow.case import DIAGNOSTICS, WALL_STRESS, FlowCase, set_values
+from orchestrator.flow.case import DIAGNOSTICS, FINE, WALL_STRESS, FlowCase, set_values
 from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import APPROACH_ERROR, WallStress, reattachment
 from orchestrator.runs import case, process
+from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
 from orchestrator.study.scene import default_first_cell_height
 from tests.flow.conftest import OPEN, PILE, SLOW, Solve, allrun, changed, edit
@@ -239,6 +240,18 @@ def test_the_windward_stress_under_other_settings(
     other = changed(PILE, **settings)
     over = windward_mean(solve(other), other) / windward_mean(solve(PILE), PILE)
     assert over == pytest.approx(ratio, rel=within)
+
+
+def test_a_fine_flow_starts_near_where_it_ends(solve: Solve) -> None:
+    fine = replace(changed(PILE, cells_per_face=FINE, lid=10.0), slope_deg=25.0)
+    (coarser,) = fine.needs
+    assert (coarser.settings.cells_per_face, coarser.needs) == (FINE // 2, ())
+    fine_, coarse = (solve(flow) for flow in (fine, coarser))
+    over = windward_mean(fine_, fine) / windward_mean(coarse, coarser)
+    assert over == pytest.approx(1, rel=0.02)
+    assert f"[{coarser.name!r}]" == str(read_json(fine_ / "case.json")["needs"])
+    iterations = [openfoam.check_log(directory) for directory in (fine_, coarse)]
+    assert iterations[0] < 1.2 * iterations[1]
 
 
 def test_the_stress_scales_with_the_size(solve: Solve) -> None:
