@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestrator.report import Addition
-
 if TYPE_CHECKING:
+    from markupsafe import Markup
+
     from orchestrator.study.study import Study
     from orchestrator.tables import Tables
 
@@ -17,7 +17,9 @@ PRESETS = Path(__file__).parent / "presets"
 CLAIMS = "claims.csv"
 
 
-def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Addition | None:
+def report_card(
+    study: "Study", tables: "Tables", figures: Sequence[str]
+) -> "tuple[Markup, dict[str, str]] | None":
     """The report card of a study of the paper; none for any other.
 
     The paper's studies are the presets of this package, word for word; `figures` are the names of
@@ -29,4 +31,4 @@ def report_card(study: "Study", tables: "Tables", figures: Sequence[str]) -> Add
 
     judged = claims.judge(tables)
     section = claims.section(judged, figures, bool(study.tolerance))
-    return Addition(section, {CLAIMS: claims.frame(judged).to_csv(index=False)})
+    return section, {CLAIMS: claims.frame(judged).to_csv(index=False)}

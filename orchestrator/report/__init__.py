@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from orchestrator.errors import OrchestratorError
@@ -23,19 +23,9 @@ PAGE = "report.html"
 FIGURES = "figures"
 
 
-@dataclass(frozen=True)
-class Addition:
-    """The part of a study's page that a guest adds: a section before the figures, and files.
-
-    `files` are the texts of files beside the page, by their names.
-    """
-
-    section: "Markup"
-    files: Mapping[str, str] = field(default_factory=dict)
-
-
-Guest = Callable[["Study", "Tables", Sequence[str]], Addition | None]
-"""Given a study, its tables and the names of its figures in their order: its addition, if any."""
+Guest = Callable[["Study", "Tables", Sequence[str]], tuple["Markup", Mapping[str, str]] | None]
+"""Given a study, its tables and the names of its figures in their order, the part of the page that
+a guest adds, if any: a section, and the texts of files beside the page by their names."""
 
 
 def write(
@@ -47,18 +37,7 @@ def write(
 ) -> None:
     """Draw the figures of a study and write its page into its directory.
 
-    Parameters
-    ----------
-    results : Results
-        The study with its plan, tables and cases.
-    timings : DataFrame
-        Wall times of the finished cases.
-    failures : mapping of str to str
-        The cases that failed, with why.
-    folder : Folder
-        The study's directory.
-    guests : sequence of callable
-        Guests that may add to the page.
+    `timings` are the wall times of the finished cases, `failures` the cases that failed, with why.
     """
     from orchestrator.report import page, settings, words
 
@@ -70,10 +49,10 @@ def write(
     figures.sort(key=lambda figure: (not figure.first, not figure.leads))
     names = [figure.name for figure in figures]
     added = [part for guest in guests if (part := guest(results.study, results.tables, names))]
-    for name, text in (item for part in added for item in part.files.items()):
+    for name, text in (item for _, files in added for item in files.items()):
         folder.put(name, text)
     parts = {**words.contents(results, timings, failures), "faults": faults}
-    parts["sections"] = [part.section for part in added]
+    parts["sections"] = [section for section, _ in added]
     entries = [{**page.entry(figure), "number": n} for n, figure in enumerate(figures, 1)]
     terminal.check()
     folder.put(PAGE, page.fill("page.html.j2", **parts, figures=entries))

@@ -16,18 +16,10 @@ LONG = 60
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page.
+    """A part of the page: its heading, its text in paragraphs, its figures and tables.
 
-    Attributes
-    ----------
-    title, text : str
-        Its heading and its text; an empty line parts paragraphs.
-    figures : sequence of Figure
-        With canvases that were made under `settings.own`.
-    tables : sequence of DataFrame
-        As `sheet` makes them.
-    limits : sequence of str
-        What a reader must not conclude.
+    The canvases of the figures are made under `settings.own`, the tables by `sheet`; `limits` say
+    what a reader must not conclude.
     """
 
     title: str
@@ -40,20 +32,10 @@ class Section:
 def write(
     title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
 ) -> None:
-    """Put the page of an experiment into a directory, and its figures as PNG and SVG.
+    """Put the page of an experiment into a directory as a file `name`, and its figures beside it.
 
-    Parameters
-    ----------
-    title : str
-        Title of the page.
-    sections : sequence of Section
-        Its parts, in their order.
-    folder : Folder
-        The directory; the figures go into its ``figures``.
-    name : str
-        Name of the page's file.
-    solvers : mapping of str to str
-        The programs that ran, with their versions.
+    The figures are written as PNG and SVG; `solvers` are the programs that ran, with their
+    versions.
     """
     parts: list[dict[str, Any]] = []
     for section in sections:
@@ -63,11 +45,8 @@ def write(
             image = style.save(figure.canvas, folder, figure.name)
             figures.append(page.entry(replace(figure, canvas=None, image=image)))
         parts.append({**vars(section), "figures": figures})
-    programs = words.versions(solvers)
-    html = page.fill(
-        "document.html.j2", title=title, sections=parts, long=LONG, programs=programs, links={}
-    )
-    folder.put(name, html)
+    values = {"sections": parts, "long": LONG, "programs": words.versions(solvers), "links": {}}
+    folder.put(name, page.fill("document.html.j2", title=title, **values))
 
 
 def sheet(table: pd.DataFrame) -> pd.DataFrame:

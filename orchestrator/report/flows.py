@@ -68,7 +68,7 @@ def _kinds(results: Results) -> list[list[Pile]]:
     """Piles with flows, of each slope, height and value of the fields that vary, by rising z0."""
     kinds: dict[tuple[float, float, str], list[Pile]] = {}
     for pile in sorted(results.flows.values(), key=lambda pile: pile.bed.roughness):
-        varied = " ".join(str(results.asked(pile)[column]) for column in _varied(results))
+        varied = " ".join(map(str, _used(pile, _varied(results))))
         kinds.setdefault((pile.bed.slope_deg, pile.bed.height, varied), []).append(pile)
     return [alike for _, alike in sorted(kinds.items(), key=lambda item: item[0])]
 
@@ -87,10 +87,18 @@ def _varied(results: Results) -> list[str]:
 
 def _title(results: Results, pile: Pile) -> str:
     """Heading of a panel with one flow."""
-    row, ratio = results.asked(pile), pile.bed.height / pile.bed.roughness
-    varied = labels.panel(row, _varied(results))
-    parts = labels.panel(row, ["alpha_deg", "h_m"]), f"$z_0$ = h/{ratio:.0f}", varied
-    return ", ".join(text for text in parts if text)
+    ratio, columns = pile.bed.height / pile.bed.roughness, ["alpha_deg", "h_m"]
+    form, varied = (
+        labels.panel(_used(pile, names), names) for names in (columns, _varied(results))
+    )
+    return ", ".join(text for text in (form, f"$z_0$ = h/{ratio:.0f}", varied) if text)
+
+
+def _used(pile: Pile, columns: list[str]) -> pd.Series:
+    """The values of some fields that a pile is answered with."""
+    return pd.Series(
+        {name: fields.COLUMNS[name].used(pile.scene) for name in columns}, dtype=object
+    )
 
 
 def _x_label(pile: Pile) -> str:

@@ -34,7 +34,12 @@ NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
 DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
 """Decades of Re* in which there are measurements."""
 HEAD = (
-    *("force law", "β", "z₀", "Re* where it is within the measured 10 to 90 %"),
+    *(
+        "force law",
+        "entrainment angle",
+        "roughness",
+        "Re* where it is within the measured 10 to 90 %",
+    ),
     *(f"decades, of {DECADES:.1f}", "factor from the medians: median", "worst"),
 )
 
@@ -54,29 +59,25 @@ class Fit:
     @property
     def name(self) -> str:
         """The combination in words."""
-        beta, ratio = self.bed.entrainment_angle_deg, self.bed.roughness_ratio
-        law = labels.value("force_law", self.law)
-        return f"{law}, β = {beta:g}°, z₀ = {labels.ratio_of(ratio, 'd')}"
+        return ", ".join((labels.value("force_law", self.law), *self.bed_words))
 
-    def law_line(self, reynolds: FloatArray) -> FloatArray:
-        """Tau at some Re*; NaN where the law does not hold."""
-        holds = theory.law_holds(self.law, reynolds, self.bed)
-        return np.where(holds, theory.shields(self.law, reynolds, self.bed), np.nan)
+    @property
+    def bed_words(self) -> tuple[str, str]:
+        """The bed in words."""
+        ratio = labels.ratio_of(self.bed.roughness_ratio, "d")
+        return f"β = {self.bed.entrainment_angle_deg:g}°", f"z₀ = {ratio}"
 
-    def line(self, reynolds: FloatArray) -> FloatArray:
-        """The same, NaN also where the study has no grains."""
-        answers = (reynolds >= self.first) & (reynolds <= self.last)
-        return np.where(answers, self.law_line(reynolds), np.nan)
-
-    @cached_property
-    def on_grid(self) -> FloatArray:
-        """Tau on the grid."""
-        return self.line(GRID)
+    def line(self, reynolds: FloatArray, *, beyond: bool = False) -> FloatArray:
+        """Tau at some Re*; NaN where the law does not hold and, but for `beyond`, no grains are."""
+        answers = theory.law_holds(self.law, reynolds, self.bed)
+        answers &= beyond | ((reynolds >= self.first) & (reynolds <= self.last))
+        return np.where(answers, theory.shields(self.law, reynolds, self.bed), np.nan)
 
     @cached_property
     def met(self) -> BoolArray:
         """Where on the grid it is from the tenth to the ninetieth percentile."""
-        return (self.on_grid >= TENTHS) & (self.on_grid <= NINETIETHS)
+        tau = self.line(GRID)
+        return (tau >= TENTHS) & (tau <= NINETIETHS)
 
     @property
     def decades(self) -> float:
@@ -86,7 +87,8 @@ class Fit:
     @cached_property
     def factors(self) -> FloatArray:
         """Factor from the median of each range of Re*, above or below; NaN without an answer."""
-        return np.where(MIDDLES >= FACTORS_FROM, _factor(self.line(MIDDLES), MEDIANS), np.nan)
+        ratio = self.line(MIDDLES) / MEDIANS
+        return np.where(MIDDLES >= FACTORS_FROM, np.maximum(ratio, 1 / ratio), np.nan)
 
     @property
     def median_factor(self) -> float:
@@ -97,14 +99,9 @@ class Fit:
     @property
     def worst(self) -> tuple[float, float]:
         """The largest factor and its Re*; infinite if there are none."""
-        if not np.isfinite(self.factors).any():
-            return np.inf, np.nan
-        at = int(np.nanargmax(self.factors))
-        return float(self.factors[at]), float(MIDDLES[at])
-
-
-def _factor(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.maximum(a / b, b / a)
+        at = int(np.argmax(np.nan_to_num(self.factors)))
+        factor = float(self.factors[at])
+        return (factor, float(MIDDLES[at])) if np.isfinite(factor) else (np.inf, np.nan)
 
 
 def fits(results: Results) -> list[Fit]:
@@ -128,7 +125,7 @@ def best(ranked: Sequence[Fit]) -> list[Fit]:
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
-    """The ranges of the grid that are chosen."""
+    """The ranges of Re* of the chosen points of the grid."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     return [(float(EDGES[a]), float(EDGES[b])) for a, b in edges.reshape(-1, 2)]
 
@@ -160,14 +157,12 @@ def sheet(listed: Iterable[Fit]) -> pd.DataFrame:
     """A row for each combination of law, entrainment angle and z0/d."""
     rows = []
     for fit in listed:
-        law, ratio = (
-            labels.value("force_law", fit.law),
-            labels.ratio_of(fit.bed.roughness_ratio, "d"),
-        )
-        row = (law, f"{fit.bed.entrainment_angle_deg:g}°", ratio, _ranges(fit.met) or "nowhere")
-        worst, at = fit.worst
+        law, (worst, at) = labels.value("force_law", fit.law), fit.worst
         factors = (f"{fit.median_factor:.2f}", f"{worst:.2f} at Re* = {number(at)}")
-        rows.append((*row, f"{fit.decades:.1f}", *(factors if worst < np.inf else ("—", "—"))))
+        factors = factors if worst < np.inf else ("—", "—")
+        rows.append(
+            (law, *fit.bed_words, _ranges(fit.met) or "nowhere", f"{fit.decades:.1f}", *factors)
+        )
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
@@ -177,14 +172,14 @@ def sentences(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
     if np.isfinite(worst) and first.decades:
         facts = {"count": len(ranked), "decades": DECADES, "start": FACTORS_FROM}
         yield caption("best_law", fit=first, at=number(at), **facts)
-    unmet = np.any([np.isfinite(fit.on_grid) for fit in ranked], axis=0)
+    unmet = np.any([np.isfinite(fit.line(GRID)) for fit in ranked], axis=0)
     unmet &= ~np.any([fit.met for fit in ranked], axis=0)
     if unmet.any():
         yield caption("unmet", ranges=_ranges(unmet))
     # up to which Re* the published curves for water lie above every law
     grid = np.geomspace(min(fit.first for fit in ranked), BINS[-1].high, 1000)
     low, _ = theory.water_band(grid)
-    lines = np.array([fit.law_line(grid) for fit in ranked])
+    lines = np.array([fit.line(grid, beyond=True) for fit in ranked])
     highest = np.where(np.isfinite(lines), lines, -np.inf).max(axis=0)
     above = np.isfinite(highest) & (low > highest)
     if above[grid < 1].any():
@@ -192,30 +187,15 @@ def sentences(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
         ends = [start, start + int((~np.append(above[start:], False)).argmax()) - 1]
         curve, law, numbers = low[ends], highest[ends], [number(at) for at in grid[ends]]
         yield caption("small_reynolds", ends=numbers, curve=curve, law=law, begin=BINS[0].low)
-    yield from _air(grains, ranked)
-
-
-def _air(grains: pd.DataFrame, ranked: Sequence[Fit]) -> Iterator[str]:
-    """Published curves for air against the medians for water at the same Re*."""
+    # published curves for air against the medians for water at the same Re*
     read = []
     for x, y in theory.air_lines(grains).values():
-        order, ends = np.argsort(x, kind="stable"), {"left": np.nan, "right": np.nan}
-        read.append(np.interp(np.log(MIDDLES), np.log(x[order]), np.log(y[order]), **ends))
+        at_x, log_x, log_y = np.argsort(x, kind="stable"), np.log(x), np.log(y)
+        values = np.interp(np.log(MIDDLES), log_x[at_x], log_y[at_x], left=np.nan, right=np.nan)
+        read.append(values)
     covered = np.isfinite(read).any(axis=0) if read else np.array([False])
-    if not covered.any():
-        return
-    at, water = MIDDLES[covered], MEDIANS[covered]
-    air = np.exp(np.nanmean(np.array(read)[:, covered], axis=0))
-    # a law that answers at less than half of the places cannot be compared
-    lines = {fit: fit.line(at) for fit in ranked}
-    judged = {fit: y for fit, y in lines.items() if 2 * np.isfinite(y).sum() >= len(at)}
-    off = {fit: [np.nanmedian(_factor(y, to)) for to in (air, water)] for fit, y in judged.items()}
-    nearest = min(off, key=lambda fit: off[fit][0]) if off else None
-    ratio = air / water
-    yield caption(
-        "air",
-        ratio=(ratio.min(), np.median(ratio), ratio.max()),
-        span=f"{number(at[0])} … {number(at[-1])}",
-        nearest=nearest,
-        off=off[nearest] if nearest else None,
-    )
+    if covered.any():
+        reynolds = MIDDLES[covered]
+        ratio = np.exp(np.nanmean(np.array(read)[:, covered], axis=0)) / MEDIANS[covered]
+        span = f"{number(reynolds[0])} … {number(reynolds[-1])}"
+        yield caption("air", ratio=(ratio.min(), np.median(ratio), ratio.max()), span=span)

@@ -61,16 +61,14 @@ def _json(data: Any) -> Markup:
 def entry(figure: "Figure") -> dict[str, Any]:
     """The values of a figure for the templates, with its image; an interactive one is inline."""
     names = ("name", "title", "caption", "cases", "data", "fold", "leads")
+    values = {name: getattr(figure, name) for name in names}
     is_svg = figure.image.lstrip().startswith((b"<svg", b"<?xml"))
-    svg = ""
-    if figure.data is not None:  # a part of the page: without prolog and metadata, with a title
-        text = figure.image.decode("utf-8")
-        svg = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-        label = f'<svg role="img" aria-label="{escape(figure.title)}"'
-        svg = svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1)
-    return {
-        **{name: getattr(figure, name) for name in names},
-        "type": "svg+xml" if is_svg else "png",
-        "base64": base64.b64encode(figure.image).decode("ascii"),
-        "svg": Markup(svg),
-    }
+    values["type"] = "svg+xml" if is_svg else "png"
+    if figure.data is None:
+        return {**values, "base64": base64.b64encode(figure.image).decode("ascii")}
+    # a part of the page: without prolog and metadata, with a title
+    text = figure.image.decode("utf-8")
+    svg = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    label = f'<svg role="img" aria-label="{escape(figure.title)}"'
+    svg = svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1)
+    return {**values, "svg": Markup(svg)}

@@ -65,8 +65,7 @@ class Results:
     def exemplars(self) -> pd.DataFrame:
         """The piles of each slope at the fraction of the sentences, those that stand for it first.
 
-        Usable thresholds come first, then the largest grains, answers by DEM, a bed that changes,
-        and the least z0. Sentences and pictures are of the same scene.
+        Usable thresholds, the largest grains, DEM, beds that change and the least z0 come first.
         """
         piles = self.joined("pile_threshold")
         if piles.empty:
@@ -82,11 +81,6 @@ class Results:
         """The pile that shows how a scene's grains move: the check by DEM, where one has run."""
         check = self.plan.checks.get(scene_id)
         return check if check and self.has_files(check) else self.plan.piles[scene_id]
-
-    def asked(self, pile: Pile) -> pd.Series:
-        """The row of a pile's scene in the table of scenes; of scenes that share it, the first."""
-        scene_id = next(asked for asked, item in self.plan.piles.items() if item is pile)
-        return self.scenes[self.scenes["scene_id"] == scene_id].iloc[0]
 
     def has_files(self, pile: Pile) -> bool:
         """Whether the runs of a pile still have the files that pictures are drawn from."""

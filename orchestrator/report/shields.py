@@ -184,22 +184,24 @@ def draw_branch(ax: Axes, branch: theory.Branch, colour: str, dash: theory.Dash)
 
 
 def draw_points(
-    ax: Axes, rows: pd.DataFrame, colour: str, columns: tuple[str, str, str, str]
-) -> None:
+    ax: Axes, rows: pd.DataFrame, colour: str, columns: tuple[str, str, str, str], size: float = 4.2
+) -> list[tuple[Line2D, pd.DataFrame]]:
     """Intervals and the rows' own markers, by the columns of x, y and its ends.
 
-    Hollow where a threshold is not usable.
+    Hollow where a threshold is not usable. Returns the rows of each group of markers.
     """
     rows = rows[rows[columns[1]].notna()]
     x, low, high = (rows[columns[at]].to_numpy(float) for at in (0, 2, 3))
     # as one line with gaps: bars and caps by themselves take three times as long
     ends = np.column_stack([low, high, np.full_like(low, np.nan)]).ravel()
     look: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "gid": "intervals"}
-    ax.plot(np.repeat(x, 3), ends, marker="_", ms=5, mew=0.7, zorder=2.5, **look)
+    ax.plot(np.repeat(x, 3), ends, marker="_", ms=size + 0.8, mew=0.7, zorder=2.5, **look)
+    drawn = []
     for (marker, solid), group in split(rows.assign(solid=valid(rows)), SHAPE, "solid"):
-        face, gid = (colour, RESULT[1]) if solid else ("white", RESULT[2])
-        look = {"marker": marker, "mfc": face, "mec": colour, "mew": 0.8, "zorder": 3, "gid": gid}
-        ax.plot(group[columns[0]], group[columns[1]], ls="", **look)
+        look = {"ls": "", "marker": marker, "ms": size, "mec": colour, "mew": 0.8, "zorder": 3}
+        look |= {"mfc": colour, "gid": RESULT[1]} if solid else {"mfc": "white", "gid": RESULT[2]}
+        drawn.append((ax.plot(group[columns[0]], group[columns[1]], **look)[0], group))
+    return drawn
 
 
 def draw_water(ax: Axes) -> list[Artist]:
@@ -280,8 +282,8 @@ def point_entries(rows: pd.DataFrame, variants: Sequence[Sample] = ()) -> list[S
     return entries
 
 
-def _mark(shape: str, face: str, label: str) -> Line2D:
-    return Line2D([], [], ls="", marker=shape, mec="0.2", mfc=face, mew=0.8, label=label)
+def _mark(shape: str, face: str, label: str, edge: str = "0.2") -> Line2D:
+    return Line2D([], [], ls="", marker=shape, mec=edge, mfc=face, mew=0.8, label=label)
 
 
 def within(axes: Sequence[Axes], entries: Sequence[Artist]) -> list[Artist]:
@@ -302,15 +304,14 @@ def draw(results: Results) -> Iterator[Figure]:
     scenes, figure = results.scenes, style.canvas(4.4)
     ax = figure.subplots()
     published = [*draw_water(ax), *draw_air(ax, scenes)]
-    groups: dict[str, list[list[str]]] = {}
     shades = style.palette("alpha_deg", results.values("alpha_deg"))
     entries: list[Artist] = []
-    reach, taus = [*theory.span(scenes)], []
+    points: list[tuple[Line2D, list[list[str]]]] = []
+    reach = [*theory.span(scenes)]
     for rows, name, column in ((grains, "single grain", "shields_dem"), (piles, "pile", "shields")):
         if len(rows):
-            entries += _points(ax, groups, rows, name, column, shades)
+            entries += _points(ax, points, rows, name, column, shades)
             reach += rows["reynolds"].tolist()
-            taus += rows[column].tolist()
     low, high = min(reach) / 1.6, max(reach) * 1.6
     reynolds = np.geomspace(low / 2, high * 2, theory.POINTS)
     for at, fit in enumerate(lines):
@@ -325,9 +326,9 @@ def draw(results: Results) -> Iterator[Figure]:
             ax.plot(reynolds, np.where(holds, np.nan, tau), ls=":", lw=0.9, **look)
         entries.append(Line2D([], [], ls=dash, lw=width, label=fit.name, **look))
     prepare([ax], [scenes], (low, high))
-    bottom, top = ax.get_ylim()
-    ax.set_ylim(min([bottom, *(t / 1.4 for t in taus)]), max([top, *(1.4 * t for t in taus)]))
-    style.plain_ticks(ax.yaxis)
+    groups = {f"{NAME}-{number}": texts for number, (_, texts) in enumerate(points)}
+    for gid, (line, _) in zip(groups, points, strict=True):
+        line.set_gid(gid)  # by which the page's script finds the points
     style.legends(figure, [], [*entries, *within([ax], published)])
     text = caption(
         "overview",
@@ -389,32 +390,27 @@ def _lines(results: Results) -> list[Fit]:
 
 def _points(
     ax: Axes,
-    groups: dict[str, list[list[str]]],
+    points: list[tuple[Line2D, list[list[str]]]],
     rows: pd.DataFrame,
     name: str,
     column: str,
     shades: Mapping[float, str],
 ) -> list[Artist]:
-    """Points with intervals: colours are slopes, hollow is not usable.
+    """Points with intervals: colours are slopes, hollow is not usable; the entries of a legend.
 
-    `groups` gets, by the mark of each group of points, the texts of each point: its scene, its
-    threshold with the interval, why it is not usable, its case. Returns the entries of a legend.
+    `points` gets each group of points with their texts: the scene of a point, its threshold with
+    the interval, why it is not usable, its case.
     """
     shape, size = ("o", 2.4) if name == "single grain" else (SHAPES[1], 3.6)
     telling = (*TOLD, *labels.varying(rows, *TOLD, *({"fraction"} & set(rows))))
-    for (alpha, usable), group in split(rows, "alpha_deg", "usable"):
-        colour, gid = shades[float(str(alpha))], f"{NAME}-{len(groups)}"
-        x, y = group["reynolds"], group[column]
-        ax.vlines(x, group[f"{column}_low"], group[f"{column}_high"], colour, lw=0.6, zorder=2.5)
-        face = colour if usable else "white"
-        look: Look = {"marker": shape, "ms": size, "mec": colour, "mew": 0.6, "mfc": face}
-        ax.plot(x, y, ls="", zorder=3, gid=gid, **look)
-        groups[gid] = [_texts(row, column, telling) for _, row in group.iterrows()]
+    for (alpha,), part in split(rows.assign(**{SHAPE: shape}), "alpha_deg"):
+        columns = ("reynolds", column, f"{column}_low", f"{column}_high")
+        for line, group in draw_points(ax, part, shades[float(str(alpha))], columns, size):
+            points.append((line, [_texts(row, column, telling) for _, row in group.iterrows()]))
     if name == "pile" and rows["fraction"].nunique() == 1:
         name += f" at n/N = {rows['fraction'].iloc[0]:.0%}"
-    look = {"ls": "", "marker": shape, "ms": 4}
     entries: list[Artist] = [
-        Line2D([], [], color=colour, label=f"{name}, {labels.plain('alpha_deg', alpha)}", **look)
+        _mark(shape, colour, f"{name}, {labels.plain('alpha_deg', alpha)}", colour)
         for alpha, colour in shades.items()
         if (rows["alpha_deg"] == alpha).any()
     ]

@@ -224,15 +224,15 @@ def single_grains(results: Results) -> pd.DataFrame | None:
     if rows.empty:
         return None
     exact = rows["ustar_closed_form_m_s"]
-    rows = rows.assign(
-        **{"force law": [labels.value("force_law", law) for law in rows["force_law"]]},
-        **{"law holds": np.where(valid(rows), "yes", "no")},
-        protocol=np.where(held(rows), "holds", "ramps"),
-        off=rows["ustar_m_s"] / exact - 1,
-        size=(rows["ustar_m_s"] / exact - 1).abs(),
-        width=(rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2,
-    )
-    groups = rows.groupby(["force law", "law holds", "protocol"])
+    off = rows["ustar_m_s"] / exact - 1
+    width = (rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2
+    keys = {
+        "force law": [labels.value("force_law", name) for name in rows["force_law"]],
+        "law holds": np.where(valid(rows), "yes", "no"),
+        "protocol": np.where(held(rows), "holds", "ramps"),
+    }
+    values = {"off": off, "size": off.abs(), "width": width}
+    groups = pd.DataFrame({**keys, **values}).groupby([*keys])
     table = {
         "grains": groups.size().map(str),
         "never moved": (groups.size() - groups["off"].count()).map(str),
