@@ -237,8 +237,8 @@ def finished(source: str, out: Path | None, tolerance: float | None) -> tuple[st
         texts = {name: (file.parent / name).read_bytes().decode("utf-8-sig") for name in profiles}
         if tolerance is None:
             tolerance = tomllib.loads(text).get("tolerance")
-        asked = (text, texts, tolerance, os.path.relpath(file, space.root), [*ids])
-        was = (study[: len(text)], profiles, about["tolerance"], about["file"], about["cases"])
+        asked = (text, texts, tolerance, os.path.relpath(file, space.root), {*ids})
+        was = (study[: len(text)], profiles, about["tolerance"], about["file"], {*about["cases"]})
         _check(space, STUDY, file.stem)
         if asked != was or space.is_held() or (answer := space.answer(ids)) is None:
             return None
