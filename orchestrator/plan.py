@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, limits
-from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, by_default, decide
+from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure
@@ -76,14 +76,11 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         the field.
     """
     limits.check_study(study)
-    decisions = {}
-    for scene in study.scenes:
-        bound = (above or {}).get(scene.id, NO_BOUND)
-        has_tolerance = study.tolerance is not None
-        chosen = (
-            decide(scene, study.tolerance, bound) if has_tolerance else by_default(scene, bound)
-        )
-        decisions[scene.id] = chosen
+    bounds = above or {}
+    if study.tolerance is None:
+        decisions = by_default(study.scenes, bounds)
+    else:
+        decisions = decide(study.scenes, study.tolerance, bounds)
     return of(decisions, study.name, study.tolerance, cases)
 
 

@@ -7,7 +7,8 @@ by DEM as well; where the two differ by more than the tolerance, all of them go 
 
 import itertools
 import math
-from collections.abc import Container, Iterator, Mapping
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -88,63 +89,181 @@ class Bound(NamedTuple):
 
 
 NO_BOUND = Bound()
+NO_BOUNDS: Mapping[str, Bound] = {}
+ROUNDS = 4
 THEORY = level("flow", "waves")
 """Above it the flow is solved."""
 CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
 """Above it are the levels that check an answer without DEM."""
+WITHIN = "cheapest within the tolerance"
+SPREAD = "within the model's own spread of"
 NONE_WITHIN = "cheapest whose error is below the uncertainty of the reference: none is"
 """How the reason begins where no levels meet the tolerance."""
 
 
-def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> Decision:
-    """Choose the cheapest levels that are known to be within a tolerance of the best ones.
+def decide(
+    scenes: Iterable[Scene], tolerance: float | None, above: Mapping[str, Bound] = NO_BOUNDS
+) -> dict[str, Decision]:
+    """Choose the levels that are known to be within a tolerance of the best ones, at least cost.
+
+    A flow that several piles share is run once, and a run of DEM costs what it takes for that pile.
 
     Parameters
     ----------
-    scene : Scene
-        Resolved.
+    scenes : iterable of Scene
+        Resolved; those of a study.
     tolerance : float or None
         Relative error of tau_c at the scene's fractions, the uncertainty of the reference
-        included; None or 0: the scene as it is asked.
-    above : Bound, optional
-        Levels that turned out to be not good enough.
+        included; None or 0: the scenes as they are asked.
+    above : mapping of str to Bound, optional
+        Levels that turned out to be not good enough, by the id of the scene.
 
     Returns
     -------
-    Decision
-        Where no levels are within the tolerance, on the cheapest whose error is below the
-        uncertainty of their reference; as asked where nothing is known, or where the way to the
-        answer is a part of what is asked.
+    dict of str to Decision
+        By the id of the scene. Where no levels are within the tolerance, on the cheapest whose
+        error is below the uncertainty of their reference; as asked where nothing is known, or where
+        the way to the answer is a part of what is asked.
     """
+    decided, offered = {}, {}
+    for scene in scenes:
+        pairs, why = _offered(scene, tolerance, above.get(scene.id, NO_BOUND))
+        if pairs:
+            offered[scene.id] = [_Option.of(scene, pair, why) for pair in pairs]
+        elif not why and not isinstance(scene.bed, PileBed):
+            exact = changed(scene, {"protocol.method": "pivot"})
+            why = "the closed form is exact for a single grain in a held flow"
+            decided[scene.id] = Decision(scene, exact, None, UNKNOWN, why)
+            continue
+        decided[scene.id] = as_asked(scene, why)
+    return decided | _cheapest(offered)
+
+
+def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Sequence[Pair], str]:
+    """The pairs of levels that are good enough for a scene, and why it is answered as it is."""
     if not tolerance:
-        return as_asked(scene)
+        return (), "as the study asks"
     # the levels approximate DEM in a held, solved flow
     rules, model, bed = scene.protocol, scene.flow.model, scene.bed
     if rules.method != "dem":
-        return as_asked(scene, f"the study asks for the method {rules.method}")
+        return (), f"the study asks for the method {rules.method}"
     if model not in ("solve", _best_model(scene)):
-        return as_asked(scene, f"the study asks for the flow model {model}")
+        return (), f"the study asks for the flow model {model}"
     if rules.update:
-        why = "the study asks for a bed that changes, for which no error is known"
-        return as_asked(scene, why)
+        return (), "the study asks for a bed that changes, for which no error is known"
     if rules.waiting_time < LEAST_HELD:
-        return as_asked(scene, "the study asks for a ramp of the flow")
+        return (), "the study asks for a ramp of the flow"
     if not isinstance(bed, PileBed):
-        if bed.slope_deg > bed.entrainment_angle_deg:
-            return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
-        exact = changed(scene, {"protocol.method": "pivot"})
-        why = "the closed form is exact for a single grain in a held flow"
-        return Decision(scene, exact, None, UNKNOWN, why)
+        beyond = bed.slope_deg > bed.entrainment_angle_deg
+        return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
     if name := calibration.unmeasured(scene):
-        return as_asked(scene, f"no error is known for {name}: as the study asks")
-    offered = (tuple(level for level in part if level.takes(scene)) for part in (FLOW, GRAINS))
-    pair, why = _cheapest(*offered, *calibration.scene_classes(scene), above, tolerance)
-    why = f"{why}; {above.because}" if above.because else why
-    return on_levels(scene, pair, why) if pair else as_asked(scene, why)
+        return (), f"no error is known for {name}: as the study asks"
+    levels = (tuple(level for level in part if level.takes(scene)) for part in (FLOW, GRAINS))
+    pairs, why = _good_enough(*levels, *calibration.scene_classes(scene), above, tolerance)
+    return pairs, f"{why}; {above.because}" if above.because else why
 
 
-def by_default(scene: Scene, above: Bound = NO_BOUND) -> Decision:
-    """The decision on a scene of a study that says nothing about how to answer.
+@cache  # a study has thousands of scenes of a few classes
+def _good_enough(
+    flow: tuple[Level, ...],
+    grains: tuple[Level, ...],
+    flow_classes: tuple[str, ...],
+    grain_classes: tuple[str, ...],
+    above: Bound,
+    tolerance: float,
+) -> tuple[Sequence[Pair], str]:
+    """Pairs of some levels that are good enough, of which any may be the cheapest, and why."""
+    offered = []
+    for levels, bound in ((flow, above.flow), (grains, above.grains)):
+        start = levels.index(bound) + 1 if bound in levels else 0
+        offered.append([level for level in levels[start:] if level.same_model])
+    if flow_classes == (calibration.LEVEL_BED,):
+        offered[0] = [FLAT]
+    known = {
+        Pair(*pair): calibration.known_of_classes(*pair, flow_classes, grain_classes)
+        for pair in itertools.product(*offered)
+    }
+    pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
+    within, why = [pair for pair in pairs if known[pair].total <= tolerance], WITHIN
+    if not within:
+        best = min((error.total for error in known.values()), default=math.inf)
+        if math.isinf(best):
+            return (), "no error is known: as the study asks"
+        # errors below the uncertainty of the reference cannot be ranked
+        within = [pair for pair in pairs if known[pair].error <= best]
+        why = f"{NONE_WITHIN} within the tolerance"
+    kept: list[Pair] = []
+    for pair in within:
+        cost = known[pair]
+        if not any(
+            known[other].flow_s <= cost.flow_s
+            and known[other].grains_s <= cost.grains_s
+            and (known[other].flow_s == 0 or other.flow.is_shared == pair.flow.is_shared)
+            for other in kept
+        ):
+            kept.append(pair)
+    return kept, why
+
+
+@cache  # a plan is made several times
+def _times(scene: Scene, pair: Pair) -> tuple[Scene, Mapping[str, float], float]:
+    """A scene on a pair of levels; expected times of its flows, by name, and of other runs, s."""
+    pile = Pile(pair.answer(scene))
+    flows_s = {run.name: run.cost_s for run in pile.model.cases}
+    return pile.scene, flows_s, sum(run.cost_s for run in pile.method.cases)
+
+
+class _Option(NamedTuple):
+    """A decision that is good enough, and the expected times of its flows, by name, and grains."""
+
+    decision: Decision
+    flows_s: Mapping[str, float]
+    grains_s: float
+
+    @classmethod
+    def of(cls, scene: Scene, pair: Pair, why: str) -> "_Option":
+        """The option to answer a scene on a pair of levels."""
+        answered, flows_s, runs_s = _times(scene, pair)
+        known = calibration.known(pair, scene)
+        return cls(Decision(scene, answered, pair, known, why), flows_s, runs_s or known.grains_s)
+
+    def time_s(self, users: Mapping[str, int], mine: Container[str]) -> float:
+        """Its time, with each flow divided by its users; it would be one more of those not mine."""
+        flows = self.flows_s.items()
+        shares = (time / (users.get(name, 0) + (name not in mine)) for name, time in flows)
+        return self.grains_s + sum(shares)
+
+
+def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
+    """One option for each scene, such that all runs together take the least time that is found.
+
+    In each round every scene takes the option with the least time, where a flow is shared by those
+    who took it in the round before: in the first by all who could, and once more by none.
+    """
+    names = [
+        {name for option in options for name in option.flows_s} for options in offered.values()
+    ]
+    best, least = dict[str, _Option](), math.inf
+    for users in (Counter(itertools.chain(*names)), Counter[str]()):
+        mine: dict[str, Mapping[str, float]] = dict.fromkeys(offered, users)
+        for _ in range(ROUNDS):
+            chosen = {
+                key: min(options, key=lambda option: option.time_s(users, mine[key]))
+                for key, options in offered.items()
+            }
+            mine = {key: option.flows_s for key, option in chosen.items()}
+            users = Counter(itertools.chain(*mine.values()))
+            flows = {name: s for one in chosen.values() for name, s in one.flows_s.items()}
+            total = sum(flows.values()) + sum(option.grains_s for option in chosen.values())
+            if total < least:
+                best, least = chosen, total
+    return {key: option.decision for key, option in best.items()}
+
+
+def by_default(
+    scenes: Iterable[Scene], above: Mapping[str, Bound] = NO_BOUNDS
+) -> dict[str, Decision]:
+    """The decisions on the scenes of a study that says nothing about how to answer.
 
     A pile whose file sets no field about the answer is answered on the cheapest levels whose known
     error is below the model's own spread. The flow is solved: a theory of it needs a tolerance. The
@@ -152,20 +271,25 @@ def by_default(scene: Scene, above: Bound = NO_BOUND) -> Decision:
     alike. Single grains, poured beds, classes without a measured spread, and all that sets a field
     about the answer are answered as asked.
     """
-    names = (q.name.partition(".") for q in fields.FIELDS if q.info.about == "answer")
-    is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in names)
-    if is_set or scene.is_poured or not isinstance(scene.bed, PileBed):
-        return as_asked(scene)
-    if math.isnan(calibration.floor(calibration.model_class(scene))):
-        return as_asked(scene)
-    floor = calibration.lowest_floor()
-    chosen = decide(scene, floor, above._replace(flow=above.flow or THEORY))
-    if chosen.is_as_asked or not chosen.levels:
-        return chosen
-    which = "cheapest" if chosen.known.total <= floor else NONE_WITHIN
-    why = f"chosen by default: {which} within the model's own spread of {floor:.0%}"
-    because = f"; {above.because}" if above.because else ""
-    return replace(chosen, why=why + because, by_default=True)
+    names = [q.name.partition(".") for q in fields.FIELDS if q.info.about == "answer"]
+
+    def is_open(scene: Scene) -> bool:
+        is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in names)
+        if is_set or scene.is_poured or not isinstance(scene.bed, PileBed):
+            return False
+        return not math.isnan(calibration.floor(calibration.model_class(scene)))
+
+    listed, floor = list(scenes), calibration.lowest_floor()
+    bounds = {scene.id: above.get(scene.id, NO_BOUND) for scene in listed}
+    bounds = {key: bound._replace(flow=bound.flow or THEORY) for key, bound in bounds.items()}
+    decided = decide((scene for scene in listed if is_open(scene)), floor, bounds)
+    for key, chosen in decided.items():
+        if not chosen.is_as_asked and chosen.levels:
+            why = chosen.why.replace(WITHIN, f"cheapest {SPREAD} {floor:.0%}")
+            why = why.replace("within the tolerance", f"{SPREAD} {floor:.0%}")
+            why = f"chosen by default: {why}"
+            decided[key] = replace(chosen, why=why, by_default=True)
+    return {scene.id: decided.get(scene.id) or as_asked(scene) for scene in listed}
 
 
 def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:
@@ -188,38 +312,6 @@ def _best_model(scene: Scene) -> str:
     return "flat" if isinstance(scene.bed, PileBed) and scene.bed.is_level else "solve"
 
 
-@cache  # a study has thousands of scenes of a few classes
-def _cheapest(
-    flow: tuple[Level, ...],
-    grains: tuple[Level, ...],
-    flow_classes: tuple[str, ...],
-    grain_classes: tuple[str, ...],
-    above: Bound,
-    tolerance: float,
-) -> tuple[Pair | None, str]:
-    """The cheapest pair of some levels, and why; None where nothing is known."""
-    offered = []
-    for levels, bound in ((flow, above.flow), (grains, above.grains)):
-        start = levels.index(bound) + 1 if bound in levels else 0
-        offered.append([level for level in levels[start:] if level.same_model])
-    if flow_classes == (calibration.LEVEL_BED,):
-        offered[0] = [FLAT]
-    known = {
-        Pair(*pair): calibration.known_of_classes(*pair, flow_classes, grain_classes)
-        for pair in itertools.product(*offered)
-    }
-    pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
-    for pair in pairs:
-        if known[pair].total <= tolerance:
-            return pair, "cheapest within the tolerance"
-    best = min((error.total for error in known.values()), default=math.inf)
-    if math.isinf(best):
-        return None, "no error is known: as the study asks"
-    # errors below the uncertainty of the reference cannot be ranked
-    enough = next(pair for pair in pairs if known[pair].error <= best)
-    return enough, f"{NONE_WITHIN} within the tolerance"
-
-
 def _check_group(scene: Scene) -> tuple[float, str, str]:
     """The key that the piles of one check share."""
     assert isinstance(scene.bed, PileBed)
@@ -236,7 +328,7 @@ def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decis
         if answer.is_unchecked:
             scene = answer.scene
             dem = changed(scene, {"protocol.method": "dem", "flow.model": _best_model(scene)})
-            check = decide(dem, tolerance, CHECK)
+            (check,) = decide([dem], tolerance, {dem.id: CHECK}).values()
             member = (Pile(check.scene).case.cost_s, asked, check)
             groups.setdefault(_check_group(scene), []).append(member)
     cheapest = (min(members, key=lambda member: member[:2]) for members in groups.values())

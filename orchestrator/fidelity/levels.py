@@ -66,6 +66,11 @@ class Level:
     most_grains: float = math.inf
     not_on: Sequence[str] = ()
 
+    @property
+    def is_shared(self) -> bool:
+        """Whether beds of one form share its flows whatever their roughness."""
+        return bool(self.sets.get("flow.nodes"))
+
     def takes(self, scene: Scene) -> bool:
         """Whether the level can answer a pile.
 

@@ -79,7 +79,7 @@ def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
     }
     wrong |= {(part, name, f"{like}, limiting slope"): v for (part, name, like), v in wrong.items()}
     monkeypatch.setattr(calibration, "measured", lambda: wrong)
-    for cached in (calibration.known_of_classes, decision._cheapest):
+    for cached in (calibration.known_of_classes, decision._good_enough):
         monkeypatch.setattr(cached.__module__ + "." + cached.__name__, cached.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     found = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])

@@ -51,15 +51,21 @@ STATED = ("packing", "roughness length", "entrainment angle", "friction angle", 
 
 
 class Known(NamedTuple):
-    """Known relative error of tau_c against the reference, of a level or of a pair of levels.
+    """Known relative error of tau_c against the reference, of a pair of levels.
 
-    The uncertainty is how far the reference itself moved when its numbers were changed, the cost
-    the mean time of a scene on one core, s.
+    The uncertainty is how far the reference itself moved when its numbers were changed, the times
+    are the measured means of a scene on one core, s.
     """
 
     error: float
     uncertainty: float
-    cost_core_s: float
+    flow_s: float
+    grains_s: float
+
+    @property
+    def cost_core_s(self) -> float:
+        """Mean time of a scene that shares its flow with no other, s."""
+        return self.flow_s + self.grains_s
 
     @property
     def total(self) -> float:
@@ -67,7 +73,7 @@ class Known(NamedTuple):
         return math.hypot(self.error, self.uncertainty)
 
 
-UNKNOWN = Known(math.inf, 0.0, math.inf)
+UNKNOWN = Known(math.inf, 0.0, math.inf, 0.0)
 
 
 class Spread(NamedTuple):
@@ -189,8 +195,8 @@ def known_of_classes(
     parts = [np.max([table[key] for key in part], axis=0) for part in keys]
     error, uncertainty = (np.sqrt(sum(part[row] ** 2 for part in parts)) for row in (0, 1))
     worst = int(np.argmax(np.hypot(error, uncertainty)))
-    cost = sum(float(part[2, 0]) for part in parts)
-    return Known(float(error[worst]), float(uncertainty[worst]), cost)
+    costs = [0.0] * exact + [float(part[2, 0]) for part in parts]
+    return Known(float(error[worst]), float(uncertainty[worst]), *costs)
 
 
 @cache
