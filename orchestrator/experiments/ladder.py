@@ -174,7 +174,7 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "grain_level": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
             "model_floor": calibration.floor(calibration.model_class(scene)),
-            "flow_s": runs.cpu_s(pile.model.cases),
+            "flow_s": runs.cpu_s([run for flow in pile.model.cases for run in (*flow.needs, flow)]),
             "grains_s": here_s + runs.cpu_s(pile.method.cases),
         }
         taus = {name: of_pile(motion, speed, at, density).tau for name, at in names.items()}

@@ -209,7 +209,7 @@ def _good_enough(
 def _times(scene: Scene, pair: Pair) -> tuple[Scene, Mapping[str, float], float]:
     """A scene on a pair of levels; expected times of its flows, by name, and of other runs, s."""
     pile = Pile(pair.answer(scene))
-    flows_s = {run.name: run.cost_s for run in pile.model.cases}
+    flows_s = {run.name: run.cost_s for flow in pile.model.cases for run in (*flow.needs, flow)}
     return pile.scene, flows_s, sum(run.cost_s for run in pile.method.cases)
 
 
