@@ -95,6 +95,7 @@ def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
     if isinstance(meanings, list):
         words = zip(get_args(declared.annotation), meanings, strict=True)
         info = replace(info, choices=dict(words))
+    info = replace(info, label=info.label or name.removesuffix("_deg").replace("_", " "))
     meaning = " ".join((declared.description or "").split())
     read = attrgetter(f"{part}.{name}")
     return Quantity(f"{part}.{name}", info.column or name, info, meaning, read)

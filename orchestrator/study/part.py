@@ -33,7 +33,7 @@ class UnfitError(ValueError):
 class Info:
     """The words for a field; its meaning is the text under its declaration."""
 
-    label: str
+    label: str = ""
     symbol: str = ""  # as formulas write it, an index after an underscore
     unit: str = ""
     column: str = ""  # of tables, with the unit, where that is not its name; "-" for none
@@ -46,12 +46,12 @@ class Info:
     read: str = ""  # property of a scene with the value in use, where the field may be left open
 
 
-def field(label: str, default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
-    """Declare a field: label, default (none: required), symbol, unit and column as of `Info`.
+def field(default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
+    """Declare a field: default (none: required), symbol, unit and column as of `Info`.
 
     `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge`` and ``le``;
-    `choices` may be a list of the meanings of a `Literal`, in its order.
-    A field that came after the first studies is `since`: a scene that has its default leaves it out
+    without a label it is the name, and `choices` may be a list of the meanings of a `Literal`. A
+    field that came after the first studies is `since`: a scene that has its default leaves it out
     of its digest, and keeps its id.
     """
     about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
@@ -59,7 +59,7 @@ def field(label: str, default: Any = ..., *words: str, since: bool = False, **se
     if since:
         settings["exclude_if"] = lambda value: value == default
     declared: FieldInfo = Field(default, **settings)
-    declared.metadata.append(Info(label, **about))
+    declared.metadata.append(Info(**about))
     return declared
 
 

@@ -27,18 +27,6 @@ def test_every_point_and_law_is_the_closed_form_of_it() -> None:
         assert rows["why_not"].tolist() == why
 
 
-def test_gases_and_liquids_in_one_table() -> None:
-    points = pd.DataFrame(
-        {"diameter": 1e-3, "fluid_density": [1.0, 1000.0], "viscosity": [1e-5, 1e-6], "depth": 1.0}
-    )
-    air, water = (one for _, one in thresholds(points, "profile").query("answer").iterrows())
-    assert air["law"] == water["law"] == "profile"
-    assert np.isnan(air["mean_velocity_m_s"])
-    assert np.isnan(water["wind_10m_m_s"])
-    assert water["mean_velocity_m_s"] > 10 * water["ustar_m_s"]
-    assert air["wind_10m_m_s"] > air["wind_1m_m_s"] > 10 * air["ustar_m_s"]
-
-
 def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> None:
     fields = {one.name: one for one in FIELDS}
     for name, parameter in PARAMETERS.items():
@@ -59,11 +47,3 @@ def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:
     z0 = 0.11 * 5.5e-4 / ustar
     assert mars["wind_1m_m_s"] == pytest.approx(ustar / 0.41 * np.log(1 + 1 / z0))
     assert mars["wind_1m_m_s"] == pytest.approx(44.8, abs=0.1)
-
-
-@pytest.mark.parametrize("depth", [0.02, 2.0])
-def test_laminar_water_has_no_mean_velocity_by_the_log_law(depth: float) -> None:
-    """A film of light oil runs at a third of what the log law says."""
-    oil = {"diameter": 1e-3, "density": 2650.0, "fluid_density": 870.0, "viscosity": 5e-5}
-    row = thresholds(pd.DataFrame([{**oil, "depth": depth}])).query("answer").iloc[0]
-    assert np.isnan(row["mean_velocity_m_s"]) == (depth < 1)

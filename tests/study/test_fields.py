@@ -23,12 +23,6 @@ bed = { kind = "pile", slope_deg = 15.0, packing = "disordered" }
 forces = { law = "high" }
 """
 UNCHANGEABLE = ("bed.kind", "protocol.fractions", "bed.profile", "bed.smoothing", "bed.obstacles")
-CHANGEABLE = [one for one in fields.FIELDS if one.name not in UNCHANGEABLE]
-NUMERIC = [
-    one
-    for one in fields.FIELDS
-    if {float, int}.intersection((kind := fields.declared(one).annotation, *get_args(kind)))
-]
 NEEDED: dict[str, dict[str, Any]] = {
     "bed.windward": {"bed.shape": "dune"},
     "bed.brink_radius": {"bed.shape": "dune"},
@@ -49,84 +43,83 @@ def scene() -> Scene:
     return study.parse(PILE, name="test", where="test").scenes[0]
 
 
-def other_value(one: Quantity, scene: Scene) -> Any:
-    value = one.used(scene)
-    if one.name == "grain.sizes":
+def other_value(quantity: Quantity, scene: Scene) -> Any:
+    value = quantity.used(scene)
+    if quantity.name == "grain.sizes":
         return LogNormal(sigma_g=1.3)
     if isinstance(value, str):
-        words = one.info.choices or get_args(fields.declared(one).annotation)
+        words = quantity.info.choices or get_args(fields.declared(quantity).annotation)
         return next(word for word in words if word not in (value, "paper"))
     if isinstance(value, bool):
         return not value
     return value + 1 if isinstance(value, int) else 0.95 * value or 0.5
 
 
-@pytest.mark.parametrize("one", fields.FIELDS, ids=lambda one: one.name)
-def test_each_field_has_its_words_and_its_row_in_the_reference(one: Quantity) -> None:
-    assert one.info.label
-    assert one.meaning
-    assert not one.meaning.endswith(".")
-    words = [word for word in get_args(fields.declared(one).annotation) if isinstance(word, str)]
-    if one.name != "bed.kind" and words and one.info.choices:
-        assert list(one.info.choices) == words
-    part, _, name = one.name.partition(".")
-    section = REFERENCE["text"]().split(f"## `[{part}]`")[1].split("\n## ")[0]
-    (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
-    assert one.meaning.replace("*", r"\*") in row
-    assert row.count(" | ") == 6
+def in_tables(scenes: tuple[Scene, ...], *but: str) -> list[list[Any]]:
+    """The columns of scenes in the tables but for those that follow from others."""
+    rows = [{**fields.asked(each), **fields.answered(each)} for each in scenes]
+    return [[row[column] for column in fields.others(row, *but)] for row in rows]
 
 
 def test_columns_are_distinct_and_explained() -> None:
-    columns = [one.column for one in (*fields.FIELDS, *fields.DERIVED)]
+    columns = [quantity.column for quantity in (*fields.FIELDS, *fields.DERIVED)]
     assert len(set(columns)) == len(columns)
     assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
 
 
-@pytest.mark.parametrize("quantity", NUMERIC, ids=lambda each: each.name)
-def test_every_number_has_two_ends(quantity: Quantity) -> None:
-    low, high = REFERENCE["bounds"](fields.declared(quantity))
-    assert (low[0], high[0]) in {(">", "<"), (">", "≤"), ("≥", "<"), ("≥", "≤")}
+@pytest.mark.parametrize("quantity", fields.FIELDS, ids=lambda quantity: quantity.name)
+def test_each_field_has_its_words_its_range_and_its_row_in_the_reference(
+    quantity: Quantity,
+) -> None:
+    assert quantity.info.label
+    assert not quantity.meaning.endswith(".")
+    declared = fields.declared(quantity)
     part, _, name = quantity.name.partition(".")
+    section = REFERENCE["text"]().split(f"## `[{part}]`")[1].split("\n## ")[0]
+    (row,) = [line for line in section.splitlines() if line.startswith(f"| `{name}` |")]
+    assert quantity.meaning.replace("*", r"\*") in row
+    assert row.count(" | ") == 6
+    if not {float, int}.intersection((declared.annotation, *get_args(declared.annotation))):
+        return
+    low, high = REFERENCE["bounds"](declared)
+    assert (low[0], high[0]) in {(">", "<"), (">", "≤"), ("≥", "<"), ("≥", "≤")}
     bed = {"kind": "pile", "slope_deg": 20.0}
     base: dict[str, dict[str, Any]] = {"grain": {"diameter": 1e-3}, "bed": bed}
-    integer = fields.declared(quantity).annotation is int
-    for value in (-1, 10**18) if integer else (-1e-320, 1e308):
+    for value in (-1, 10**18) if declared.annotation is int else (-1e-320, 1e308):
         parts = {key: {**base.get(key, {})} for key in fields.PARTS}
         parts[part][name] = value
         with pytest.raises(InputError, match=rf"test: {quantity.name}: .* is not accepted"):
             study.make_scene(parts, "test")
 
 
-@pytest.mark.parametrize("one", CHANGEABLE, ids=lambda one: one.name)
+@pytest.mark.parametrize("quantity", fields.FIELDS, ids=lambda quantity: quantity.name)
 def test_scenes_that_differ_in_a_field_are_not_equal_in_all_else(
-    one: Quantity, scene: Scene
+    quantity: Quantity, scene: Scene
 ) -> None:
-    if one.name in NEEDED:
-        scene = changed(scene, NEEDED[one.name])
-    if one.info.scope == "single grains":
+    if quantity.name in UNCHANGEABLE:
+        return
+    scene = changed(scene, NEEDED.get(quantity.name, {}))
+    if quantity.info.scope == "single grains":
         scene = study.parse("grain = { diameter = 1e-3 }", name="test", where="test").scenes[0]
-    if one.info.scope == "poured beds":
+    if quantity.info.scope == "poured beds":
         scene = changed(scene, {"bed.packing": "poured"})
-    other = changed(scene, {one.name: other_value(one, scene)})
-    rows = [{**fields.asked(each), **fields.answered(each)} for each in (scene, other)]
-    columns = fields.others(rows[0])
-    assert [rows[0][c] for c in columns] != [rows[1][c] for c in columns]
+    other = changed(scene, {quantity.name: other_value(quantity, scene)})
+    row, other_row = in_tables((scene, other))
+    assert row != other_row
 
 
 def test_beds_alike_but_for_the_size_of_their_grains_are_equal(scene: Scene) -> None:
-    sizes = (5e-4, 1e-3)
-    beds = [changed(scene, {"grain.diameter": d, "bed.roughness": d / 30}) for d in sizes]
-    rows = [{**fields.asked(each), **fields.answered(each)} for each in beds]
-    columns = fields.others(rows[0], "d_m")
-    assert [rows[0][c] for c in columns] == [rows[1][c] for c in columns]
+    other = changed(scene, {"grain.diameter": 5e-4, "bed.roughness": 5e-4 / 30})
+    row, other_row = in_tables((scene, other), "d_m")
+    assert row == other_row
 
 
 @pytest.mark.parametrize(
-    "one", [one for part in LEVELS.values() for one in part], ids=lambda one: one.name
+    "level", [level for part in LEVELS.values() for level in part], ids=lambda level: level.name
 )
-def test_a_level_changes_fields_of_the_answer_alone(one: Level, scene: Scene) -> None:
+def test_a_level_changes_fields_of_the_answer_alone(level: Level, scene: Scene) -> None:
     about = {field.name: field.info.about for field in fields.FIELDS}
-    assert {about[name] for name in one.fields(scene)} == {"answer"}
+    assert {about[name] for name in level.fields(scene)} == {"answer"}
 
 
 def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(scene: Scene) -> None:
@@ -142,12 +135,11 @@ def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(scene: 
 def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> None:
     asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
-    (row,), (one,) = scenes.rows(asked, planned), asked.scenes
-    assert row["scene_id"] == one.id
-    assert fields.asked(one).items() <= row.items()
-    assert fields.answered(planned.decisions[one.id].scene).items() <= row.items()
-    assert row["method"] == "dem"
-    assert row["answered_method"] != "dem"
+    (row,), (scene,) = scenes.rows(asked, planned), asked.scenes
+    assert row["scene_id"] == scene.id
+    assert fields.asked(scene).items() <= row.items()
+    assert fields.answered(planned.decisions[scene.id].scene).items() <= row.items()
+    assert (row["method"], row["answered_method"] == "dem") == ("dem", False)
 
 
 def test_the_reference_of_study_files_is_written_from_the_registry() -> None:

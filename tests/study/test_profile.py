@@ -10,6 +10,7 @@ from orchestrator.bed.line import of_bed
 from orchestrator.errors import InputError
 from orchestrator.study import profile, study
 from orchestrator.study.parts import PileBed
+from orchestrator.study.scene import Scene
 
 GOOD = "x_m,z_m\n0,0\n0.05,0.01\n\n0.1,0.02\n0.14,0\n\n"
 STUDY = """
@@ -19,10 +20,9 @@ flow = { model = "flat" }
 """
 
 
-def bed_of(folder: Path, text: str = STUDY) -> PileBed:
-    found = study.parse(text, name="scan", where=str(folder / "study.toml")).scenes[0].bed
-    assert isinstance(found, PileBed)
-    return found
+def scene_of(folder: Path, content: str | bytes, text: str = STUDY) -> Scene:
+    (folder / "scan.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
+    return study.parse(text, name="scan", where=str(folder / "study.toml")).scenes[0]
 
 
 def points(*rows: str) -> str:
@@ -39,24 +39,17 @@ def long(*changed: tuple[int, str]) -> str:
 BAD: dict[str, tuple[str | bytes, str]] = {
     "empty": ("", "line 1: no column x_m"),
     "header alone": ("x_m,z_m\n", "0 points make no bed"),
-    "no header": ("0,0\n1,0.1\n2,0\n", "line 1: no column x_m"),
     "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", "line 1: no column z_m"),
     "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: no column x_m, or two"),
-    "unsorted": (
-        points("0,0", "2,0.1", "1,0.2", "3,0"),
-        "line 4: x does not rise to 1 m",
-    ),
+    "semicolons": ("x_m;z_m\n0;0\n1;1\n", "line 1: no column x_m"),
+    "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), "line 4: x does not rise to 1 m"),
     "overhang": (long((30, "0.14,0.02")), "line 32: x does not rise to 0.14 m"),
     "upstream": (points("3,0", "2,0.1", "1,0"), "line 3: x does not rise to 2 m"),
     "duplicate": (points("0,0", "1,0.1", "1,0.2", "2,0"), "line 4: x does not rise to 1 m"),
     "too few values": (points("0,0", "1", "2,0"), "line 3: 1 values"),
     "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: 4 values"),
-    "semicolons": ("x_m;z_m\n0;0\n1;1\n", "line 1: no column x_m"),
     **{
-        f"not a number: {cell}": (
-            points("0,0", f"1,{cell}", "2,0"),
-            "line 3: (a number|could not)",
-        )
+        f"not a number: {cell}": (points("0,0", f"1,{cell}", "2,0"), "line 3: (a number|could not)")
         for cell in ("nan", "inf", "1e6", "high", "")
     },
     "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), "a gap"),
@@ -67,63 +60,47 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "binary": (b"\x7fELF\0\0\x01\0", "binary, not text"),
     "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, "larger than 20 MiB"),
 }
+UNFIT = [
+    ('"scan.csv", height = 0.1', r"bed.profile: it has its own height \(leave out bed.height"),
+    ('"scan.csv", shape = "dune"', "it has its own shape"),
+    ('"scan.csv", smoothing = -1.0', "bed.smoothing: -1.0 is not accepted"),
+    ('"scan.csv", smoothing = 0.1', r"smoothing over 0.1 m leaves nothing of 0.14 m"),
+    ('"scan.csv", smoothing = 1e-300', r"more than the 3000 .*raise bed.smoothing"),
+    ('"none.csv"', "none.csv: not a readable text file"),
+    ('"."', "not a readable text file"),
+    ('"pipe"', "not a readable text file"),
+    (f'"{"x" * 5000}"', "not a readable text file"),
+    ("3", r"bed.profile: 3 is not accepted"),
+]
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
-    text, says = BAD[name]
-    (tmp_path / "scan.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(InputError, match=says) as caught:
-        bed_of(tmp_path)
-    said = str(caught.value)
-    assert str(tmp_path / "scan.csv") in said
-    assert "\n" not in said
+    content, message = BAD[name]
+    with pytest.raises(InputError, match=message) as caught:
+        scene_of(tmp_path, content)
+    assert str(tmp_path / "scan.csv") in str(caught.value)
+    assert "\n" not in str(caught.value)
     assert caught.value.remedy
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "scan.csv"
-    with pytest.raises(InputError, match=rf"{path}: not a readable text file"):
-        bed_of(tmp_path)
-    path.mkdir()
-    with pytest.raises(InputError, match=rf"{path}: not a readable text file"):
-        bed_of(tmp_path)
-    path.rmdir()
-    os.mkfifo(path)
-    with pytest.raises(InputError, match=rf"{path}: not a readable text file"):
-        bed_of(tmp_path)
-    with pytest.raises(InputError, match="not a readable text file"):
-        bed_of(tmp_path, STUDY.replace("scan.csv", "x" * 5000))
-    with pytest.raises(InputError, match=r"bed.profile: 3 is not accepted"):
-        bed_of(tmp_path, STUDY.replace('"scan.csv"', "3"))
-
-
-@pytest.mark.parametrize(
-    ("fields", "says"),
-    [
-        ("height = 0.1", r"bed.profile: it has its own height \(leave out bed.height"),
-        ('shape = "dune"', "it has its own shape"),
-        ("smoothing = -1.0", "bed.smoothing: -1.0 is not accepted"),
-        ("smoothing = 0.1", r"smoothing over 0.1 m leaves nothing of 0.14 m"),
-        ("smoothing = 1e-300", r"more than the 3000 .*raise bed.smoothing"),
-        ("smoothing = 1e-9", r"more than the 3000 .*raise bed.smoothing"),
-    ],
-)
-def test_what_does_not_go_with_a_profile_is_refused(fields: str, says: str, tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD)
-    with pytest.raises(InputError, match=says):
-        bed_of(tmp_path, STUDY.replace('"scan.csv"', f'"scan.csv", {fields}'))
+@pytest.mark.parametrize(("fields", "message"), UNFIT)
+def test_what_does_not_go_with_a_profile_is_refused(
+    fields: str, message: str, tmp_path: Path
+) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match=message):
+        scene_of(tmp_path, GOOD, STUDY.replace('"scan.csv"', fields))
 
 
 def test_a_profile_that_may_be_in_millimetres_is_asked_about(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(points("0,0", "70,20", "140,0"))
     with pytest.raises(InputError, match=r"bed.profile: 140 m are 140000 grains .*in mm"):
-        bed_of(tmp_path)
+        scene_of(tmp_path, points("0,0", "70,20", "140,0"))
 
 
 def test_a_profile_begins_at_the_origin_between_flat_beds(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD.replace("0,0\n", "0,0.0\n"))
-    bed = bed_of(tmp_path)
+    bed = scene_of(tmp_path, GOOD).bed
+    assert isinstance(bed, PileBed)
     line = of_bed(bed)
     assert bed.height == pytest.approx(0.02)
     assert bed.slope_deg == pytest.approx(np.degrees(np.arctan(0.2)), abs=0.005)
@@ -131,43 +108,31 @@ def test_a_profile_begins_at_the_origin_between_flat_beds(tmp_path: Path) -> Non
     assert line.x[0] == pytest.approx(-0.2)
 
 
-def test_a_scene_is_what_a_profile_says_not_its_name(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD)
+def test_a_scene_is_what_a_profile_holds_and_a_study_is_whole_without_the_file(
+    tmp_path: Path,
+) -> None:
+    scene = scene_of(tmp_path, GOOD)
     shifted = "\n".join(["note,x_m,z_m", "a,1,5", "b,1.05,5.01", "c,1.1,5.02", "d,1.14,5"])
-    (tmp_path / "other.csv").write_text(shifted)
-    one = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
-    text = STUDY.replace("scan", "other")
-    other = study.parse(text, name="a", where=str(tmp_path / "a.toml"))
-    np.testing.assert_allclose(of_bed(one.scenes[0].bed).x, of_bed(other.scenes[0].bed).x)
-    (tmp_path / "scan.csv").write_text(GOOD.replace("0.02", "0.021"))
-    changed = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
-    assert changed.scenes[0].id != one.scenes[0].id
-    (tmp_path / "same.csv").write_text(GOOD.replace("\n", "\r\n"))
-    again = study.parse(STUDY.replace("scan", "same"), name="a", where=str(tmp_path / "a.toml"))
-    assert again.scenes[0].id == one.scenes[0].id
-
-
-def test_a_study_is_whole_without_the_file(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text(GOOD)
+    np.testing.assert_allclose(of_bed(scene_of(tmp_path, shifted).bed).x, of_bed(scene.bed).x)
+    assert scene_of(tmp_path, GOOD.replace("0.02", "0.021")).id != scene.id
+    assert scene_of(tmp_path, GOOD.replace("\n", "\r\n")).id == scene.id
     asked = study.parse(STUDY, name="a", where=str(tmp_path / "a.toml"))
     (tmp_path / "scan.csv").unlink()
     again = study.parse(asked.text, name="a", where="elsewhere")
-    assert again.scenes[0].id == asked.scenes[0].id
+    assert again.scenes[0].id == scene.id
     assert again.text == asked.text
 
 
-def test_noise_is_smoothed_and_the_ends_stay(tmp_path: Path) -> None:
+def test_noise_is_smoothed_and_the_ends_stay() -> None:
     x = np.linspace(0, 1, 10_000)
     hill = 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))
     noisy = hill + 1e-4 * np.random.default_rng(1).standard_normal(len(x))
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), noisy.tolist(), strict=True))
-    found = profile.read_profile(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.02)
-    assert len(found.x) < 300
-    there = np.interp(np.array(found.x), x, hill)
-    assert np.abs(np.array(found.z) - there + noisy[0]).max() < 4e-4
-    assert found.x[-1] == pytest.approx(1.0)
-    with pytest.raises(InputError, match=r"10000 points, more than .* \(give bed.smoothing"):
-        profile.read_profile(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.0)
+    smooth = profile.read_profile(f"x_m,z_m\n{rows}\n", "scan", "scan", 0.02)
+    assert len(smooth.x) < 300
+    exact = np.interp(np.array(smooth.x), x, hill)
+    assert np.abs(np.array(smooth.z) - exact + noisy[0]).max() < 4e-4
+    assert smooth.x[-1] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -179,10 +144,10 @@ def test_points_nearer_than_mesh_or_grains_can_follow_are_refused(
 ) -> None:
     """A second point 1e-6 m from another once took a fifth of the stress away."""
     second = f"{0.05 + distance!r},{0.01 + 0.2 * distance!r}"
-    (tmp_path / "scan.csv").write_text(points("0,0", "0.05,0.01", second, "0.1,0.02", "0.14,0"))
+    content = points("0,0", "0.05,0.01", second, "0.1,0.02", "0.14,0")
     text = STUDY.replace('"flat"', f'"{flow}"').replace("1e-3", "3e-4")
-    if not near:
-        assert len(bed_of(tmp_path, text).profile.x) == 5  # type: ignore[union-attr]
-        return
-    with pytest.raises(InputError, match=r"bed.profile: scan.csv, x = 0.05.* nearer"):
-        bed_of(tmp_path, text)
+    if near:
+        with pytest.raises(InputError, match=r"bed.profile: scan.csv, x = 0.05.* nearer"):
+            scene_of(tmp_path, content, text)
+    else:
+        assert scene_of(tmp_path, content, text)

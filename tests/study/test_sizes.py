@@ -54,12 +54,6 @@ def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes) -> Non
         assert mass[np.isclose(drawn, size)].sum() == pytest.approx(fraction, abs=1e-3)
 
 
-def test_the_seed_shuffles_the_grains_and_nothing_else() -> None:
-    one, other = (sizes.drawn(LogNormal(sigma_g=1.3), 1.0, 500, seed) for seed in (1, 2))
-    assert not np.array_equal(one, other)
-    np.testing.assert_array_equal(np.sort(one), np.sort(other))
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

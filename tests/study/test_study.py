@@ -16,7 +16,7 @@ from orchestrator.physics.threshold import Threshold, threshold
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, study
 from orchestrator.study.fields import FIELDS
-from orchestrator.study.parts import Grain, GrainBed, PileBed
+from orchestrator.study.parts import Grain, GrainBed
 from orchestrator.study.scene import Scene
 
 GRAIN = "[grain]\ndiameter = 1e-3\n"
@@ -107,16 +107,6 @@ def test_minus_zero_is_zero(field: str) -> None:
     texts = (f"{GRAIN}[axes]\n'{field}' = [{zero}]" for zero in ("0.0", "-0.0"))
     one, other = (_parse(text).scenes[0].id for text in texts)
     assert one == other
-
-
-def test_defaults_are_the_papers() -> None:
-    (scene,) = _parse(PILE).scenes
-    assert isinstance(scene.bed, PileBed)
-    assert (scene.fluid.density, scene.fluid.viscosity, scene.fluid.gravity) == (1.0, 1e-5, 9.81)
-    assert (scene.grain.density, scene.grain.friction_angle_deg) == (2500.0, 35.0)
-    assert (scene.bed.height, scene.bed.entrainment_angle_deg) == (0.02, 60.0)
-    assert scene.protocol.displacement_criterion == 0.3
-    assert scene.protocol.fractions == (0.1, 0.3, 0.5, 0.7)
 
 
 FENCE = "obstacles = [{ kind = 'fence', x = %g, height = %g }]\n"
