@@ -11,10 +11,8 @@ from typing import ClassVar
 
 LONGEST = 400
 """Characters of a message's place, cause and remedy, each."""
-_ROOM = "make room, then the same command continues"
 _REMEDIES = {
-    errno.ENOSPC: _ROOM,
-    errno.EDQUOT: _ROOM,
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room, then the same command continues"),
     errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
     errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
     errno.EMFILE: "raise the limit: ulimit -n 1024",
@@ -24,10 +22,7 @@ _REMEDIES = {
 
 
 class OrchestratorError(Exception):
-    """A failure that the command line prints without a traceback.
-
-    It says what went wrong in one sentence, where (the file, field or case), and the remedy.
-    """
+    """A failure that is printed without a traceback: what went wrong, where, and the remedy."""
 
     exit_code = 1
 
