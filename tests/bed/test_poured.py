@@ -17,7 +17,7 @@ from orchestrator.errors import InputError, SolverError
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
 from orchestrator.study.sizes import LogNormal, Sizes
-from orchestrator.types import BoolArray, FloatArray, IntArray
+from orchestrator.types import FloatArray, IntArray
 
 SURFACE, WIDTH = 0.5 + 1 / 30, 4.0
 MIXED = LogNormal(sigma_g=1.3)
@@ -105,25 +105,6 @@ def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Pa
     number = _contacts(places, sizes)[inner & (z > low) & (z < high)]
     assert 4 < number.mean() < 6
     assert np.mean(number >= 3) > 0.98
-
-
-def test_where_the_sides_are_changes_neither_who_is_exposed_nor_who_touches(strip: Path) -> None:
-    places, sizes = _grains(strip, WIDTH)
-    x, y, z = places.xyz.T
-
-    def judged(shift: float) -> tuple[BoolArray, set[tuple[int, int]]]:
-        moved = Places.of(np.column_stack([x, z]), y + shift, WIDTH)
-        flat = Places.of(np.column_stack([x, 0 * x]), moved.xyz[:, 1], WIDTH)
-        first, second, _ = moved.contacts(sizes)
-        pairs = set(zip(first.tolist(), second.tolist(), strict=True))
-        return packing.unshadowed(flat, z, sizes / 2), pairs
-
-    free, touching = judged(0.0)
-    assert 0.8 < free.sum() / (WIDTH * np.ptp(x)) < 2.0
-    for shift in (0.5, 1.7, 3.9):
-        again, pairs = judged(shift)
-        np.testing.assert_array_equal(again, free)
-        assert pairs == touching
 
 
 class Lattice(PouredBed):

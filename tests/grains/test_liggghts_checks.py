@@ -1,7 +1,9 @@
-"""The contact law as LIGGGHTS runs it, against exact answers; tolerance 1 %."""
+"""The contact law as LIGGGHTS runs it, against exact answers, and a bed that feeds itself."""
 
 import math
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -52,3 +54,18 @@ def test_a_pushed_grain_passes_the_marker_in_time(
     said = run_check("in.passing", push=push, displacement_criterion=displacement_criterion)
     exact = passing_time(push, displacement_criterion)
     assert _number(said, "time of passing") == pytest.approx(exact, rel=0.005)
+
+
+FOLDER = Path(__file__).parents[2] / "examples" / "flux"
+
+
+@pytest.mark.skipif(shutil.which("liggghts") is None, reason="liggghts is not installed")
+def test_a_bed_feeds_itself_above_its_threshold_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(FOLDER))
+    import measure  # type: ignore[import-not-found]
+
+    rest, swept = measure.flux(tmp_path, 1, (0.003, 0.1), hold=10.0, length=20)
+    assert abs(rest) < measure.CRITERION
+    assert swept > 100 * measure.CRITERION

@@ -1,15 +1,27 @@
-"""Piles on both real solvers: the flow's stress on the grains, their motion, their thresholds."""
+"""Piles of both solvers, through the whole line: stress, motion, thresholds, poured beds."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
+from orchestrator.errors import InputError
+from orchestrator.grains import pile as pile_of_grains
 from orchestrator.grains import threshold
+from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
+from orchestrator.plan import Plan
+from orchestrator.report import piles
+from orchestrator.report.results import Results
 from orchestrator.study import study
+from orchestrator.study.study import Study
+from orchestrator.tables.piles import Answer, size_class_rows
+from orchestrator.types import FloatArray
 from tests import small_study
 
 SMALL = """
@@ -100,3 +112,134 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     (scene,) = study.parse(text, name="row", where="test").scenes
     pile = Pile(scene)
     assert least <= pile.loads(tmp_path).row_hold() <= most
+
+
+STUDY = """
+fluid = {{ density = 1000.0, viscosity = 1e-6 }}
+flow = {{ model = "flat" }}
+{fields}
+[protocol]
+load_increment = 0.05
+waiting_time = 6.0
+time_step = 0.3
+final_fraction = 0.5
+fractions = [0.1, 0.3]
+[axes]
+"protocol.method" = {methods}
+"""
+MIXED = """
+grain = { diameter = 1e-3, density = 2650.0, stiffness = 1e3, sizes = { sigma_g = 1.25 } }
+bed = { kind = "pile", slope_deg = 15.0, height = 0.006, packing = "poured", poured_depth = 3.0 }
+"""
+STRIP = """
+grain = { diameter = 1e-3, density = 2650.0, stiffness = 1e3 }
+[bed]
+kind = "pile"
+shape = "flat"
+height = 0.005
+length = 0.004
+packing = "poured"
+poured_depth = 3.0
+width = 3.0
+mobile_layers = 1
+"""
+
+
+class Done(NamedTuple):
+    """A study whose runs are done."""
+
+    asked: Study
+    plan: Plan
+    cases: Path
+    tables: dict[str, pd.DataFrame]
+
+    def pile(self, method: str) -> Pile:
+        """The pile by a method."""
+        piles = self.plan.piles.values()
+        return next(one for one in piles if one.scene.protocol.method == method)
+
+
+def _done(cases: Path, fields: str, methods: list[str]) -> Done:
+    text = STUDY.format(fields=fields, methods=methods)
+    asked = study.parse(text, name="poured", where="test")
+    planned = small_study.in_turn(asked, cases)
+    return Done(asked, planned, cases, dict(tables.make(asked, planned, cases, [*planned.cases])))
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    return _done(tmp_path_factory.mktemp("cases"), MIXED, ["pivot", "peeling", "dem"])
+
+
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Done:
+    return _done(tmp_path_factory.mktemp("cases"), STRIP, ["pivot", "dem"])
+
+
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, name: str) -> None:
+    done: Done = request.getfixturevalue(name)
+    assert sorted(one.kind for one in done.plan.cases.values()) == ["pile", "poured"]
+    assert len({id(pile.packing) for pile in done.plan.piles.values()}) == 1
+    made = done.tables
+    rows = made["pile_threshold"].merge(made["scenes"][["scene_id", "method"]], on="scene_id")
+    early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
+    assert set(early.index) == {pile.scene.protocol.method for pile in done.plan.piles.values()}
+    assert early.between(0.003, 0.2).all()
+    held = made["pile_grain"]["pivot_deg"].dropna()
+    assert len(held) > 0.3 * len(made["pile_grain"])
+    assert held.between(-90, 180).all()
+    drawn = piles.poured(Results(done.asked, done.plan, made, done.cases))
+    names = {f"poured-{method}" for method in early.index}
+    assert {figure.name for figure in drawn} >= names | {"pivots"}
+
+
+def test_a_bed_none_of_whose_grains_is_held_is_refused(
+    mixed: Done, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pile, none = mixed.pile("dem"), np.zeros(mixed.pile("dem").packing.count)
+    for name in ("alone", "leaving"):
+        monkeypatch.setattr(Loads, name, lambda loads: none)
+    with pytest.raises(InputError, match="lets it go"):
+        pile_of_grains.flows(pile.loads(mixed.cases))
+
+
+def test_each_size_class_has_its_threshold(mixed: Done) -> None:
+    rows, pile = mixed.tables["size_class"], mixed.pile("dem")
+    assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count).all()
+    middle = rows[np.abs(np.log(rows["size_over_d"])) < np.log(2) / 4]
+    assert (middle["hiding"].dropna() == 1).all()
+    # where the first grains of the class around d lie loose, nothing is hidden
+    name, pile = next(iter(mixed.plan.piles.items()))
+    answer = Answer.read(mixed.plan.decisions[name], pile, mixed.cases)
+    near = np.abs(np.log(pile.packing.sizes[pile.packing.windward])) < np.log(2) / 4
+    motion = Motion.of_flows(np.where(near, 0.0, 0.1))
+    loose = pd.DataFrame(size_class_rows(replace(answer, motion=motion)))
+    assert set(loose["shields_own"] > 0) == {False, True}
+    assert loose["hiding"].isna().all()
+
+
+def _written(done: Done) -> FloatArray:
+    """The grains that LIGGGHTS was given: id, type, diameter, density, x, y, z."""
+    text = (done.cases / done.pile("dem").case.name / "grains.data").read_text()
+    return np.array([row.split() for row in text.partition("Atoms\n\n")[2].splitlines()], float)
+
+
+def test_each_grain_weighs_and_is_driven_by_its_own_size(mixed: Done) -> None:
+    pile = mixed.pile("dem")
+    packed = pile.packing
+    assert packed.sizes.max() / packed.sizes.min() > 1.5
+    np.testing.assert_allclose(_written(mixed)[:, 2], packed.sizes * 1e-3, rtol=1e-14)
+    force = np.linalg.norm(pile.loads(mixed.cases).loading.at(0.02), axis=1)[packed.windward]
+    assert (np.diff(force[np.argsort(packed.sizes[packed.windward])]) > 0).all()
+
+
+def test_grains_lie_between_the_sides_and_feel_the_flow_along_x(strip: Done) -> None:
+    y, pile = _written(strip)[:, 5] / 1e-3, strip.pile("dem")
+    assert 0 <= y.min() < y.max() < 3.0
+    assert np.ptp(y) > 2.0
+    exposed = pile.packing.windward
+    # some lie beside others at one x
+    assert exposed.sum() > 4.0
+    assert (pile.loads(strip.cases).loading.at(0.02)[exposed] > 0).all()
+    assert strip.tables["pile_grain"]["y_m"].between(0, 0.003).all()
