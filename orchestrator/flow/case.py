@@ -1,6 +1,7 @@
 """The flow over one bed line as an OpenFOAM case, and what its last iteration holds."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version as installed
@@ -134,10 +135,7 @@ class FlowCase(Case):
     @cached_property
     def grid(self) -> Grid:
         """The grid lines of the mesh along it."""
-        cells = self.settings.cells_per_face
-        return along(
-            self.bed_line, slope_deg=self.slope_deg, cells_per_face=cells, growth=self.growth
-        )
+        return along(self.bed_line, self.slope_deg, self.settings.cells_per_face, self.growth)
 
     @cached_property
     def needs(self) -> tuple["FlowCase", ...]:
@@ -179,11 +177,8 @@ class FlowCase(Case):
                 remedy="lower it, or raise flow.cells_per_face",
             )
         if not self.settings.depth and self.lid < LEAST_LID:
-            raise InputError(
-                f"{self.lid:g} is below {LEAST_LID:g} heights of the forms",
-                where="flow.lid",
-                remedy="raise it",
-            )
+            what = f"{self.lid:g} is below {LEAST_LID:g} heights of the forms"
+            raise InputError(what, where="flow.lid", remedy="raise it")
         shortest, x, end = self.grid.shortest
         if shortest >= LEAST_CELL * self.first_cell_m:
             return
@@ -228,46 +223,33 @@ class FlowCase(Case):
         # an iteration carries a change past some twenty cells: with more of them along the bed the
         # flow still changes at a residual at which that over a pile has ended
         residual = RESIDUAL * min(1.0, CELLS_ALONG / sum(self.grid.cells))
-        set_values(
-            directory / "parameters",
-            top=TOPS[settings.top],
-            freeStream=settings.speed,
-            speedHeight=SPEED_HEIGHT * self.height_m,
-            lidHeight=lid_m,
-            columnOffset=-self.height_m,
-            firstCentre=self._first_centre,
-            roughnessLength=self.roughness_m,
-            viscosity=self.viscosity_m2_s,
-            turbulence=settings.turbulence_model,
-            convection=settings.convection_scheme,
-            correctors=settings.non_orthogonal_correctors,
-            residual=f"{residual:.3g}",
-        )
-        set_values(
-            directory / "parameters.geo",
-            slope_deg=self.slope_deg,
-            height=self.height_m,
-            lid=lid_m,
-            closed=int(settings.top == "closed channel"),
-            first_cell=self.first_cell_m,
-            growth=self.growth,
-            growth_far=self.growth_far,
-        )
+        h, closed = self.height_m, settings.top == "closed channel"
+        heights = {"speedHeight": SPEED_HEIGHT * h, "lidHeight": lid_m, "columnOffset": -h}
+        wall = {"firstCentre": self._first_centre, "roughnessLength": self.roughness_m}
+        fluid = {"freeStream": settings.speed, "viscosity": self.viscosity_m2_s}
+        models = {"turbulence": settings.turbulence_model, "convection": settings.convection_scheme}
+        ends = {"correctors": settings.non_orthogonal_correctors, "residual": f"{residual:.3g}"}
+        every = {"top": TOPS[settings.top], **heights, **wall, **fluid, **models, **ends}
+        set_values(directory / "parameters", every)
+        form = {"slope_deg": self.slope_deg, "height": h, "lid": lid_m, "closed": int(closed)}
+        cells = {"first_cell": self.first_cell_m, "growth": self.growth}
+        set_values(directory / "parameters.geo", {**form, **cells, "growth_far": self.growth_far})
         self.grid.write(directory / "bed_line.geo")
         if self.profile:
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
-        lid_type = {"lid": "wall"} if settings.top == "closed channel" else {}
-        inlet = {"inlet": PATCHES["inlet"].format(-self.height_m)}
-        types = {**PATCHES, **inlet, **lid_type}
+        types = {**PATCHES, "inlet": PATCHES["inlet"].format(-h)}
+        types |= {"lid": "wall"} if closed else {}
         middles = write_poly_mesh(write_mesh(directory), directory, types)
         x, z = middles[:, 0, 0], middles[..., 2]
-        for coarser in self.needs:
+        # a bed that changes has no flow on half the cells
+        starts = [each for each in self.needs if (cases / each.name).is_dir()]
+        for coarser in starts:
             solved, line = SolvedFlow(cases / coarser.name), self.bed_line
             omega = settings.turbulence_model == "kOmegaSST"
             for name in ("U", "p", "k", "nut", "omega" if omega else "epsilon"):
                 values = solved.at(name, x, z - line.height(x)[:, None], line)
                 start_from(directory / "0" / name, values)
-        if not self.needs:
+        if not starts:
             # the log layer: a third of the iterations from a uniform flow
             ustar, over = self.ustar0_m_s, np.abs(z.ravel())
             speed = log_law_speed(ustar, over, self.roughness_m)
@@ -295,15 +277,10 @@ class FlowCase(Case):
         stress = solved.stress()
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
-        table = diagnostics(
-            stress,
-            approach=solved.approach_ustar(),
-            slope_deg=self.slope_deg,
-            height=self.height_m,
-            roughness=self.roughness_m,
-            reynolds=self.ustar0_m_s / self.viscosity_m2_s,
-            mean_speed=self.mean_speed_over_log_law(solved) if self.settings.depth else None,
-        )
+        reynolds = self.ustar0_m_s / self.viscosity_m2_s
+        speed = self.mean_speed_over_log_law(solved) if self.settings.depth else None
+        bed = (self.slope_deg, self.height_m, self.roughness_m)
+        table = diagnostics(stress, solved.approach_ustar(), reynolds, *bed, mean_speed=speed)
         text = table.to_csv(float_format="%.6g", lineterminator="\n")
         write_durably(directory / DIAGNOSTICS, text)
         approach = table.loc["approach_ustar_over_log_law"]
@@ -337,7 +314,7 @@ class FlowCase(Case):
             )
 
 
-def set_values(path: Path, **values: float | str) -> None:
+def set_values(path: Path, values: Mapping[str, object]) -> None:
     """Replace the values in a template's list; its comments stay."""
     text = path.read_text(encoding="utf-8")
     for name, value in values.items():

@@ -43,16 +43,9 @@ _HEXAHEDRON = 5  # gmsh's element type
 
 @dataclass(frozen=True)
 class Grid:
-    """The pieces between n corners of a bed line.
+    """The pieces between the corners of a bed line (m), with one more where a piece was divided.
 
-    Attributes
-    ----------
-    line : BedLine
-        The bed line, m, with a corner more where a piece was divided.
-    cells : tuple of int, n - 1
-        Cells of each piece.
-    ratio : tuple of float, n - 1
-        Length of a cell over that of the one upstream of it.
+    Each piece has a number of cells, and the length of a cell over that of the one upstream of it.
     """
 
     line: BedLine
@@ -85,19 +78,11 @@ def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
     return replace(line, x=x)
 
 
-def along(line: BedLine, *, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
-    """The grid along a bed line that begins and ends with flat bed.
+def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
+    """The grid along a bed line (m) that begins and ends with flat bed.
 
-    Parameters
-    ----------
-    line : BedLine
-        m.
-    slope_deg : float
-        Slope of the face that has `cells_per_face` cells if it is as high as the form; 0: none.
-    cells_per_face : int
-        Their number.
-    growth : float
-        Ratio of neighbouring cells beside the form.
+    A face of the slope that is as high as the form has `cells_per_face` cells; a slope of 0 stands
+    for no face. `growth` is the ratio of neighbouring cells beside the form.
     """
     face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
     cell = face / cells_per_face

@@ -85,24 +85,10 @@ class WallStress:
     def mean_over(
         self, s_m: ArrayLike, length_m: ArrayLike, measure: Measure = "wall"
     ) -> FloatArray:
-        """Mean signed stress over a length of bed centred on each place.
+        """Mean signed stress tau/u*_0^2 over lengths of bed (m) centred on arc lengths (m).
 
-        The integral is exact: over each face the stress is linear, with the face's value as its
-        mean and the slope that its neighbours give.
-
-        Parameters
-        ----------
-        s_m : array_like
-            Arc lengths along the bed, m.
-        length_m : array_like
-            Lengths of bed to average over, m; broadcast against `s_m`.
-        measure : {"wall", "eq10"}
-            The stress on the wall, or that of Eq. 10.
-
-        Returns
-        -------
-        array
-            Mean of tau/u*_0^2, of the broadcast shape.
+        The two broadcast. The integral is exact: over each face the stress is linear, with the
+        face's value as its mean and the slope that its neighbours give.
 
         Raises
         ------
@@ -156,13 +142,7 @@ class WallStress:
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
-        """Read a table of `to_csv`.
-
-        Raises
-        ------
-        InputError
-            If the file is not such a table.
-        """
+        """Read a table of `to_csv`; an InputError if the file is not such a table."""
         names = [one.name for one in fields(cls)]
         try:
             table = pd.read_csv(path, dtype=str).astype(float)  # to the last digit
@@ -175,32 +155,20 @@ class WallStress:
 
 def diagnostics(
     stress: WallStress,
-    *,
     approach: float,
+    reynolds: float,
     slope_deg: float,
     height: float,
     roughness: float,
-    reynolds: float,
+    *,
     mean_speed: float | None = None,
 ) -> pd.DataFrame:
     """A few numbers of a solved flow beside the ranges in which sound flows have them.
 
-    Parameters
-    ----------
-    stress : WallStress
-        The stress of the solved flow.
-    approach, mean_speed : float
-        Friction velocity before the inlet, and mean speed of a channel, over that of the log law.
-    slope_deg, height, roughness : float
-        Slope of the pile, degrees; its height and roughness length, m.
-    reynolds : float
-        u*_0 over the solve's nu, 1/m.
-
-    Returns
-    -------
-    DataFrame
-        With ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no (NaN is not), for each
-        ``quantity`` of the index.
+    `approach` and, of a channel, `mean_speed` are the friction velocity and the mean speed before
+    the inlet over those of the log law; `reynolds` is u*_0 over the solve's nu, 1/m. The table has
+    ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no (NaN is not), for each
+    ``quantity`` of the index. Lengths are in m.
     """
     centre = float(np.median(stress.z_e_m))
     shortest = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0

@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import meshio
 import numpy as np
@@ -26,26 +25,19 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import is_whole
 from orchestrator.solvers.openfoam import read_last_time
 from orchestrator.study import fields
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import PileBed, Turbulence
 from orchestrator.types import FloatArray
 
 ESTIMATES: dict[str, tuple[str, Look]] = {
-    "ustar_over_ustar0_wall": ("wall stress", {"color": "black", "lw": 1.3}),
-    "ustar_over_ustar0_eq10": ("Eq. 10, $\\ln((z_e+z_0)/z_0)$", {"color": "#0072b2", "lw": 1.0}),
-    "ustar_over_ustar0_eq10_printed": (
-        "Eq. 10 as printed, $\\ln(z_e/z_0)$",
-        {"color": "#56b4e9", "lw": 1.0, "ls": "--"},
-    ),
+    "wall": ("wall stress", {"color": "black", "lw": 1.3}),
+    "eq10": ("Eq. 10, $\\ln((z_e+z_0)/z_0)$", {"color": "#0072b2", "lw": 1.0}),
+    "eq10_printed": ("Eq. 10 as printed, $\\ln(z_e/z_0)$", {"color": "#56b4e9", "ls": "--"}),
 }
-GRAINS: Look = {"color": "#f0a35e", "lw": 3.0}
+GRAINS: Look = {"color": "#f0a35e", "lw": 3.0, "zorder": 1.5, "gid": "grains"}
 REVERSED: Look = {"color": "0.85", "lw": 0}
-MODELS = {
-    "kEpsilon": "#0072b2",
-    "RNGkEpsilon": "#d55e00",
-    "realizableKE": "#009e73",
-    "kOmegaSST": "#cc79a7",
-}
+MODELS = dict(zip(get_args(Turbulence), ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), strict=True))
 """Colours of the turbulence models."""
+USTAR = r"$u^\star/u^\star_0$"
 SPEED = r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$"
 SOLVED = [name for name, item in fields.COLUMNS.items() if item.info.scope == "solved flows"]
 NOTABLE_RATIO = 1.5
@@ -54,10 +46,6 @@ GAP = 3.0
 """Distance of neighbouring counted grains, over the median one, across which no line joins them."""
 FLAT = 0.05
 """Height over the level beside a form up to which the bed belongs to that level, h."""
-SMOOTHED = 6.0
-"""Standard deviation of the smoothing of streamlines along x, columns."""
-CREST = (-0.7, 0.7, -0.25, 0.25)
-"""The part of the mesh that is drawn large: from the crest to its edges, h."""
 BEDS = 4
 """Largest number of beds in the map of thresholds."""
 Window = tuple[float, float, float, float]
@@ -155,9 +143,9 @@ def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
     rows = table[table["flow_case"] == pile.flow.name]
     line, h = pile.model.line, pile.bed.height
     x, z, wall = (rows[name].to_numpy(float) for name in ("x_m", "z_m", "ustar_over_ustar0_wall"))
-    for column, (_, look) in ESTIMATES.items():
-        values = rows[column].to_numpy(float)
-        top.plot(x / h, np.where(np.isfinite(values), values, np.nan), gid=column, **look)
+    for name, (_, look) in ESTIMATES.items():
+        values = rows[f"ustar_over_ustar0_{name}"].replace([np.inf, -np.inf], np.nan)
+        top.plot(x / h, values, gid=name, **look)
     _shade_reversed(top, x / h, wall)
     top.set_ylim(top=1.25 * top.get_ylim()[1])
     grains = results.joined("pile_grain")
@@ -169,7 +157,7 @@ def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
         step = np.diff(group["s_m"].to_numpy(float), prepend=np.nan)
         behind_gap = np.flatnonzero(step > GAP * np.median(step[1:])) if len(step) > 1 else step[:0]
         place, felt = (np.insert(values, behind_gap, np.nan) for values in (place, felt))
-        top.plot(place / h, felt, gid="grains", zorder=1.5, **GRAINS)
+        top.plot(place / h, felt, **GRAINS)
     _draw_bed(below, pile)
     below.text(0.015, 0.6, "flow →", transform=below.transAxes, fontsize=6.5, color="0.35")
     below.set(xlabel=_x_label(pile), ylabel="$z/h$", ylim=(z.min() / h - 0.3, z.max() / h + 0.4))
@@ -177,7 +165,7 @@ def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
         for ax in (top, below):
             ax.axvline(line.x[at] / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
         style.upright_note(top, line.x[at] / h - 0.1, name, at="top")
-    top.set(xlim=(-4, line.x[-2] / h + 10), ylabel=r"$u^\star/u^\star_0$")
+    top.set(xlim=(-4, line.x[-2] / h + 10), ylabel=USTAR)
     top.set_title(_title(results, pile), loc="left")
 
 
@@ -214,12 +202,9 @@ def velocity(case: Path, window: Window, shape: tuple[int, int]) -> FloatArray:
     """
     import pyvista  # half a second, which only a study with piles waits for
 
-    mesh = _cells(case)
-    left, right, bottom, top = window
-    rows, columns = shape
-    middle = (mesh.bounds[2] + mesh.bounds[3]) / 2
+    mesh, (rows, columns), (left, right, bottom, top) = _cells(case), shape, window
     spacing = ((right - left) / (columns - 1), 1.0, (top - bottom) / (rows - 1))
-    origin = (left, middle, bottom)
+    origin = (left, (mesh.bounds[2] + mesh.bounds[3]) / 2, bottom)
     grid = pyvista.ImageData(dimensions=(columns, 1, rows), spacing=spacing, origin=origin)
     sampled: Any = grid.sample(mesh)
     inside = np.asarray(sampled["vtkValidPointMask"], bool)[:, None]
@@ -258,14 +243,10 @@ def flow(results: Results) -> Iterator[Figure]:
         axes[-1].set_xlabel(_x_label(shown[-1]))
         bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
         bar.set_label(SPEED)
-        models, speeds = (
-            ", ".join(
-                {labels.value(column, fields.COLUMNS[column].used(p.scene)): 0 for p in shown}
-            )
-            for column in ("turbulence_model", "solve_u_e_m_s")
-        )
-        lid = not any(pile.scene.flow.depth for pile in shown)
-        text = caption("flow", models=models, speeds=speeds, lid=lid)
+        flows, lid = [pile.scene.flow for pile in shown], not any(p.scene.flow.depth for p in shown)
+        models = {labels.value("turbulence_model", flow.turbulence_model): 0 for flow in flows}
+        speeds = {labels.value("solve_u_e_m_s", flow.speed): 0 for flow in flows}
+        text = caption("flow", models=", ".join(models), speeds=", ".join(speeds), lid=lid)
         names, title = tuple(pile.flow.name for pile in shown), f"Flow over the pile{title}"
         yield Figure(f"flow{name}", title, text, names, figure, fold=bool(name))
 
@@ -293,7 +274,7 @@ def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
     back = np.nanmin(above_bed) * np.array([0.9, 0.6, 0.3])
     for psi, levels in ((from_above, forward), (above_bed, back[back < 0])):
         # the grid meets the bed in steps, which the integral from there carries upwards
-        inside = np.where(np.isnan(u), np.nan, gaussian_filter1d(psi, SMOOTHED, axis=1))
+        inside = np.where(np.isnan(u), np.nan, gaussian_filter1d(psi, 6.0, axis=1))
         ax.contour(x, z, inside, levels, colors="white", linewidths=0.45, linestyles="solid")
 
 
@@ -302,9 +283,8 @@ def mesh(results: Results) -> Iterator[Figure]:
     for pile in drawn(results)[:1]:
         edges = read_edges(results.cases / pile.flow.name) / pile.bed.height
         line, h = pile.model.line, pile.bed.height
-        (x, z), (left, right, bottom, top) = line.crest / h, CREST
-        windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5)]
-        windows += [(x + left, x + right, z + bottom, z + top)]
+        x, z = line.crest / h
+        windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5), (x - 0.7, x + 0.7, z - 0.25, z + 0.25)]
         shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
         figure = style.canvas(6.4 * sum(shapes) + 0.8)
         axes = list(figure.subplots(2, 1, height_ratios=shapes))
@@ -321,7 +301,7 @@ def mesh(results: Results) -> Iterator[Figure]:
         axes[0].add_patch(box)
         axes[0].set_title(_title(results, pile), loc="left")
         axes[1].set_title("the crest", loc="left")
-        axes[1].set_xlabel(_x_label(pile))
+        axes[1].set(xlabel=_x_label(pile))
         first = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}"
         cells, lid = pile.flow.settings.cells_per_face, not pile.scene.flow.depth
         text = caption("mesh", cells=cells, first=first, lid=lid)
@@ -331,12 +311,10 @@ def mesh(results: Results) -> Iterator[Figure]:
 def read_edges(case: Path) -> FloatArray:
     """The edges of a mesh one cell deep, seen across the flow: x and z of ends, (E, 2, 2), m."""
     mesh = meshio.read(case / "pile.msh")
-    front = mesh.points[:, 1] < mesh.points[:, 1].mean()
     quads = mesh.cells_dict["quad"]
-    side = quads[front[quads].all(axis=1)]
-    ends = np.concatenate([side[:, list(pair)] for pair in pairwise((0, 1, 2, 3, 0))])
-    seen = np.unique(np.sort(ends, axis=1), axis=0)
-    return np.asarray(mesh.points[seen][:, :, [0, 2]])
+    side = quads[(mesh.points[quads, 1] < mesh.points[:, 1].mean()).all(axis=1)]
+    ends = np.sort(np.stack([side, np.roll(side, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    return np.asarray(mesh.points[np.unique(ends, axis=0)][:, :, [0, 2]])
 
 
 def where(results: Results) -> Iterator[Figure]:
@@ -366,12 +344,10 @@ def _where_bed(part: SubFigure, results: Results, pile: Pile, grains: pd.DataFra
     h, line = pile.bed.height, pile.model.line
     window = line.x[1] / h - 4.0, line.x[-2] / h + 4.0
     along = pile.stress(results.cases)
-    ustar = along.ustar_over_ustar0_wall
-    top.plot(along.x_m / h, ustar, color="black", lw=1.0, gid="stress")
-    _shade_reversed(top, along.x_m / h, ustar)
-    top.set(ylabel=r"$u^\star/u^\star_0$", xlim=window)
+    top.plot(along.x_m / h, along.ustar_over_ustar0_wall, color="black", lw=1.0, gid="stress")
+    _shade_reversed(top, along.x_m / h, along.ustar_over_ustar0_wall)
+    top.set(ylabel=USTAR, xlim=window)
     top.set_title(f"{shape(pile.bed)}, {_title(results, pile)}", loc="left")
-
     low, high = min(line.z) / h - 0.2, max(line.z) / h + 2.5
     if pile.model.cases and is_whole(pile.flow, results.cases):
         extent = (*window, low + 0.2, high)
@@ -380,16 +356,15 @@ def _where_bed(part: SubFigure, results: Results, pile: Pile, grains: pd.DataFra
     _draw_bed(bed, pile)
     bed.set(ylim=(low, high), ylabel="$z/h$")
 
-    place, flow_ = grains["x_m"].to_numpy(float) / h, grains["ustar0_m_s"].to_numpy(float)
-    goes = np.isfinite(flow_)
-    rank = np.argsort(np.argsort(flow_[goes], kind="stable"), kind="stable")
-    share = (rank + 1) / len(grains)
-    dots = map_.scatter(place[goes], flow_[goes], c=share, s=5, cmap="plasma", vmin=0, vmax=1)
-    dots.set_gid("thresholds")
-    for at in place[~goes]:
+    grains = grains.assign(x=grains["x_m"] / h)
+    goes = grains[np.isfinite(grains["ustar0_m_s"])]
+    share = goes["ustar0_m_s"].rank(method="first") / len(grains)
+    look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
+    map_.scatter(goes["x"], goes["ustar0_m_s"], c=share, **look)
+    for at in grains["x"].drop(goes.index):
         map_.axvline(at, color="0.75", lw=0.3, zorder=0)
-    first = np.argsort(np.where(flow_ > 0, flow_, np.inf))[:1]
-    for at, value in zip(place[first], flow_[first], strict=True):
+    first = goes[goes["ustar0_m_s"] > 0].nsmallest(1, "ustar0_m_s")
+    for at, value in first[["x", "ustar0_m_s"]].to_numpy():
         map_.plot(at, value, "v", ms=7, mfc="none", mec="#d55e00", gid="first")
         text = f"first, at {value:.3g} m/s"
         map_.annotate(text, (at, value), (0, 9), textcoords="offset points")
@@ -416,7 +391,6 @@ def hills(results: Results) -> Iterator[Figure]:
     flows, table = pd.concat([rows for _, rows in listed]), results.tables["wall_stress"]
     canvas = style.canvas(2.7 * len(listed) + 0.3)
     panels = canvas.subplots(2 * len(listed), 1, sharex=True, height_ratios=[3, 1] * len(listed))
-    unverified = "" if flows["measured_verified"].all() else " (unverified)"
     measured: Look = {"color": "black", "lw": 1.2, "gid": "measured"}
     for number, (aspect, rows) in enumerate(listed):
         along, back = panels[2 * number : 2 * number + 2]
@@ -432,19 +406,17 @@ def hills(results: Results) -> Iterator[Figure]:
         if end > 0:
             back.axvline(end, **measured)
         if rows["reattachment_over_h"].isna().all():
-            centre: Look = {**style.NOTE, "ha": "center", "va": "center"}
-            back.text(0.5, 0.5, "no reversed flow", transform=back.transAxes, **centre)
+            back.text(0.5, 0.5, "no reversed flow", transform=back.transAxes, **style.NOTE)
         along.axhline(0, color="0.4", lw=0.6)
-        along.set(ylabel=r"$u^\star/u^\star_0$")
-        steepest = labels.amount(float(rows["alpha_deg"].iloc[0]), "°")
-        along.set_title(f"half length {aspect:g} h, {steepest}", loc="left")
+        along.set(ylabel=USTAR)
+        along.set_title(f"half length {aspect:g} h, {rows['alpha_deg'].iloc[0]:.3g}°", loc="left")
         back.set(yticks=[], ylim=(len(rows) - 0.3, -0.7), ylabel="reversed")
     panels[-1].set(xlabel="$x/h$ from the top", xlim=(-9, 13))
     names = [name for name in MODELS if name in set(flows["turbulence_model"])]
     colours = [style.entry(labels.value("turbulence_model", name), MODELS[name]) for name in names]
-    label = f"measured end of the reversed flow{unverified}"
-    entries = [Line2D([], [], label=label, **measured)]
-    known = (flows["measured_reattachment_over_h"] > 0).any()
-    style.legends(canvas, colours, entries if known else [])
+    unverified = "" if flows["measured_verified"].all() else " (unverified)"
+    entry = Line2D([], [], label=f"measured end of the reversed flow{unverified}", **measured)
+    has_end = (flows["measured_reattachment_over_h"] > 0).any()
+    style.legends(canvas, colours, [entry] if has_end else [])
     cases, title = tuple(flows["flow_case"]), "Hills that others measured"
     yield Figure("hills", title, caption("hills"), cases, canvas, first=True)

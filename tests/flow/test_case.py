@@ -281,7 +281,7 @@ def test_diagnostics_tell_a_sound_run_from_others(solve: Solve) -> None:
 
 
 def test_the_template_runs_as_a_channel(template: Path) -> None:
-    set_values(template / "parameters", top="open")
+    set_values(template / "parameters", {"top": "open"})
     assert allrun(template).returncode == 0
     assert SolvedFlow(template).approach_ustar() == pytest.approx(1, abs=0.02)
 

@@ -141,14 +141,7 @@ def sound() -> WallStress:
 def unsound(
     stress: WallStress, roughness: float = 3e-5, reynolds: float = 5e4, approach: float = 1.0
 ) -> set[str]:
-    table = diagnostics(
-        stress,
-        approach=approach,
-        slope_deg=15.0,
-        height=HEIGHT,
-        roughness=roughness,
-        reynolds=reynolds,
-    )
+    table = diagnostics(stress, approach, reynolds, 15.0, HEIGHT, roughness)
     return set(table.index[table["sound"] == "no"])
 
 

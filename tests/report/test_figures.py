@@ -148,9 +148,9 @@ def test_extended_diagram_shows_each_fraction_that_was_reached(
 def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
     table = results.tables["wall_stress"]
     top, profile = drawn(flows.stress(results))["wall-stress"]
-    for column in flows.ESTIMATES:
-        (line,) = marked(top, column)
-        assert np.asarray(line.get_ydata()).tolist() == table[column].tolist()
+    for name in flows.ESTIMATES:
+        (line,) = marked(top, name)
+        assert np.asarray(line.get_ydata()).tolist() == table[f"ustar_over_ustar0_{name}"].tolist()
         assert line.get_xdata() == pytest.approx(table["x_m"] / 0.01)
     half = 1 / np.tan(np.radians(15))
     for name, place in (("toe", 0), ("crest", half), ("lee toe", 2 * half)):
