@@ -10,13 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import (
-    GAS_BELOW,
-    GEOMETRIC,
-    MOST_POINTS,
-    PARAMETERS,
-    QUANTITIES,
-)
+from orchestrator.calculator import GAS_BELOW, GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 
 if TYPE_CHECKING:
@@ -141,11 +135,7 @@ def questions(axes: Mapping[str, Sequence[Value]]) -> dict[str, str]:
         for name, low, high, question, factor in UNITS
         if low <= top[name] < high
     }
-    smallest, rho, nu = (
-        min(numbers["diameter"], default=0.0),
-        top["fluid_density"],
-        top["viscosity"],
-    )
+    smallest, rho, nu = min(numbers["diameter"], default=0), top["fluid_density"], top["viscosity"]
     if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[rho < GAS_BELOW]:
         asked["diameter"] = (
             f"{smallest:g} m: cohesion, which the force laws leave out, holds grains this small;"
@@ -198,7 +188,7 @@ def as_json(table: "pd.DataFrame") -> str:
 
 def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
-    chosen, rest = table[table["answer"]], table[~table["answer"]]
+    chosen = table[table["answer"]]
     name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
     shown = {c: label for c, (_, label) in QUANTITIES.items() if table[c].notna().any()}
     if varied:
@@ -214,13 +204,9 @@ def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterat
         for law, why in zip(chosen["law"], chosen["why_not"], strict=True):
             if why:
                 yield f"  outside the range of {law}: {why}"
-        if not chosen["valid"].any():
-            yield f"  laws that hold here: {', '.join(rest.loc[rest['valid'], 'law'])}"
         yield ""
-        first, rows = (
-            {"law": "force law"},
-            table.sort_values("answer", ascending=False, kind="stable"),
-        )
+        first = {"law": "force law"}
+        rows = table.sort_values("answer", ascending=False, kind="stable")
         shown.pop("wind_1m_m_s", None)
     first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
     holds = ["holds", *(f"no: {why}" if why else "yes" for why in rows["why_not"])]

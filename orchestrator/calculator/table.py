@@ -34,21 +34,12 @@ def check_law(name: str, where: str = "threshold: law") -> None:
 def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
     """Thresholds of single grains under every force law.
 
-    Parameters
-    ----------
-    points : DataFrame
-        A row for each point; its columns are keys of `PARAMETERS`. A parameter that is left out
-        has its default, and the depth none.
-    answer : str
-        A force law, or ``paper`` for the paper's rule.
-
-    Returns
-    -------
-    DataFrame
-        A row for each point and law, point by point: the parameters, ``law``, the columns of
-        `QUANTITIES`, ``valid`` and ``why_not``, ``regime``, and ``answer``, whether the law is one
-        of those that are asked for. A gas has winds, a liquid of a given depth a mean velocity
-        where its flow is turbulent; the others are NaN.
+    `points` has a row for each point and keys of `PARAMETERS` as columns; a parameter that is left
+    out has its default, and the depth none. `answer` is a force law, or ``paper`` for the paper's
+    rule. The table has a row for each point and law, point by point: the parameters, ``law``, the
+    columns of `QUANTITIES`, ``valid`` and ``why_not``, ``regime``, and ``answer``, whether the law
+    is one of those asked for. A gas has winds, a liquid of a given depth a mean velocity where its
+    flow is turbulent; the others are NaN.
 
     Raises
     ------

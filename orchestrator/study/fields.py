@@ -9,18 +9,14 @@ from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.part import Info, Part
-from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
+from orchestrator.study.parts import PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal
 
 PARTS: Mapping[str, type[Part]] = {
-    "fluid": Fluid,
-    "grain": Grain,
-    "bed": PileBed,
-    "flow": Flow,
-    "forces": Forces,
-    "protocol": Protocol,
+    name: PileBed if name == "bed" else declared.annotation  # type: ignore[misc]
+    for name, declared in Scene.model_fields.items()
 }
 """The tables of a study file; a bed of one grain has no field that a pile has not."""
 ANSWERED = "answered_"

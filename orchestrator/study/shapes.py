@@ -11,7 +11,6 @@ from math import cos, exp, log, pi, radians, sin, sqrt, tan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from orchestrator.types import FloatArray
 
@@ -127,6 +126,8 @@ def rushil_aspect(slope_deg: float) -> float:
     def steeper(logarithm: float) -> float:
         x, z = rushil_hill(exp(logarithm))
         return float(np.max(np.diff(z) / np.diff(x))) - tan(radians(slope_deg))
+
+    from scipy.optimize import brentq
 
     return exp(brentq(steeper, log(0.1), log(1e3)))
 

@@ -6,7 +6,6 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
-from scipy.special import ndtr, ndtri
 
 from orchestrator.study.part import List, UnfitError
 from orchestrator.types import FloatArray
@@ -35,6 +34,8 @@ class LogNormal(BaseModel):
 
     def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
         """Diameter over the median that a part of the mass (power 0) or number (3) is below."""
+        from scipy.special import ndtr, ndtri
+
         width = log(self.sigma_g)
         middle = -power * width**2
         low, high = (ndtr((log(end) - middle) / width) for end in self.ends)

@@ -110,7 +110,6 @@ def test_an_answer_outside_its_range_is_marked_and_laws_that_hold_are_named(run:
     code, out, _ = run(*gravel)
     assert code == 0
     assert "outside the range of bridged: particle Reynolds number (Schiller and Naumann)" in out
-    assert "laws that hold here: bridged-gravel, " in out
     assert "outside" not in run(*gravel, "--law", "bridged-gravel")[1]
 
 

@@ -77,11 +77,7 @@ def test_a_former_key_is_refused_with_the_present_one_named() -> None:
 
 @pytest.mark.parametrize(
     ("d", "regime", "laws"),
-    [
-        (5e-5, "low", ["low"]),
-        (2e-4, "transition", ["low", "high"]),
-        (1e-3, "high", ["high"]),
-    ],
+    [(5e-5, "low", ["low"]), (2e-4, "transition", ["low", "high"]), (1e-3, "high", ["high"])],
 )
 def test_the_papers_rule_takes_the_laws_that_hold(d: float, regime: str, laws: list[str]) -> None:
     text = f"[grain]\ndiameter = {d}\n"
