@@ -88,10 +88,7 @@ def _parser() -> Parser:
         return command
 
     study = add_run("study", _study, "run what is missing of a study, and draw it", "first-look")
-    text = (
-        "relative error that tau_c may have: the cheapest models known to be within it;"
-        " 0: every scene as the file asks"
-    )
+    text = "relative error that tau_c may have: cheapest models within it; 0: as the file asks"
     study.add_argument("--tolerance", type=float, metavar="X", help=text)
     text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
     study.add_argument("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)

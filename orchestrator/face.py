@@ -102,18 +102,10 @@ def run(
     workers: int | None = None,
     tolerance: float | None = None,
 ) -> "Opened":
-    """Run what is missing of a study, draw it, and open it.
+    """Run what is missing of a study file, or of a preset by its name, draw it, and open it.
 
-    Parameters
-    ----------
-    source : str or Path
-        A study file, or the name of a preset.
-    out : str or Path, optional
-        Its directory; by default ``results/NAME``.
-    workers : int, optional
-        Cases at a time; by default one for each processor.
-    tolerance : float, optional
-        Relative error that thresholds may have.
+    `out` is its directory, by default ``results/NAME``, `workers` the number of cases at a time, by
+    default one for each processor, and `tolerance` the relative error that thresholds may have.
 
     Raises
     ------
@@ -122,12 +114,12 @@ def run(
     SolverError
         If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
     """
-    if workers is not None and workers < 1:
+    workers = (os.cpu_count() or 1) if workers is None else workers
+    if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
     asked = load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
-    count = (os.cpu_count() or 1) if workers is None else workers
-    finished = pipeline.run(asked, place, workers=count, guests=GUESTS)
+    finished = pipeline.run(asked, place, workers=workers, guests=GUESTS)
     if finished.failures:
         name, error = next(iter(finished.failures.items()))
         what = f"{len(finished.failures)} cases failed; {name}: {error}"
@@ -147,10 +139,7 @@ def load(source: str | Path, tolerance: float | None = None, name: str = "tolera
 def open(directory: str | Path) -> "Opened":
     """Open the directory of a study that was run.
 
-    Raises
-    ------
-    OrchestratorError
-        If it holds no study or no tables, or these have changed since they were written.
+    An `OrchestratorError` if it holds no study or no tables, or these have changed since.
     """
     space = Workspace(Path(directory).absolute())
     asked, planned = pipeline.reopen(space)
@@ -158,10 +147,9 @@ def open(directory: str | Path) -> "Opened":
 
 
 class Opened:
-    """A study that was run, as `run` and `open` give it.
+    """A study that was run: its directory, page and title, and every table by its name.
 
-    It has the `directory` and the `page`, the `title` in the study file, and the `tables`: every
-    table by its name, a DataFrame with SI units in the columns' names. `plot` draws its figures.
+    Tables are DataFrames with SI units in the columns' names. `plot` draws its figures.
     """
 
     def __init__(self, results: Results) -> None:
@@ -174,10 +162,7 @@ class Opened:
 
     @property
     def thresholds(self) -> pd.DataFrame:
-        """The thresholds of the piles, or of the single grains of a study without piles.
-
-        Each row has its scene's parameters beside it, and says whether it is ``usable``.
-        """
+        """The thresholds of the piles, or else of the single grains, beside their scenes."""
         piles = self._results.joined("pile_threshold")
         return piles if len(piles) else self._results.joined("single_grain")
 
@@ -192,13 +177,7 @@ class Opened:
         return tuple(self.answer.split("\n\n")[-1].splitlines())
 
     def case(self, name: str) -> Path:
-        """The directory of the one case whose name begins so.
-
-        Raises
-        ------
-        InputError
-            If no case begins so, or several do.
-        """
+        """The directory of the one case whose name begins so; else an `InputError`."""
         names = [case for case in self._results.plan.cases if case.startswith(name)]
         if len(names) != 1:
             what = f"{len(names)} cases begin with {name!r}"
@@ -213,13 +192,7 @@ class Plots:
         self._results = results
 
     def shields(self) -> "Figure":
-        """The extended Shields diagram of the page.
-
-        Raises
-        ------
-        OrchestratorError
-            If the study has nothing for it yet.
-        """
+        """The extended Shields diagram of the page; an `OrchestratorError` if there is none."""
         from orchestrator.report import settings, shields
 
         with settings.own():

@@ -30,8 +30,7 @@ Failures = Mapping[str, OrchestratorError]
 class Finished(NamedTuple):
     """Outcome of a study: its page, the number of cases that were run, and those that failed.
 
-    `left` are the cases of an earlier study file that this one does not ask for, and `answer` is
-    the answer for a terminal.
+    `left` are the cases that the study file does not ask for any more; the answer is a text.
     """
 
     page: Path
@@ -55,12 +54,9 @@ def run(
 
     Raises
     ------
-    InputError
-        If the study cannot be answered, or the directory cannot be used.
-    SolverError
-        If a solver is missing or too old.
-    Interrupted
-        If the user stopped it; every child has ended.
+    InputError, SolverError, Interrupted
+        If the study cannot be answered or the directory not be used; if a solver is missing or too
+        old; if the user stopped it: then every child has ended.
     """
     plan.make(study)  # what cannot be answered is refused before anything is written
     space = Workspace(out.absolute())
@@ -87,10 +83,7 @@ def run(
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
-    """Write into the directory what is asked for; whether it is something else than before.
-
-    An `InputError` if the directory is of another study file of the same name, still there.
-    """
+    """Write into the directory what is asked for; whether it is something else than before."""
     about = {"study": study.text, "tolerance": study.tolerance}
     before = read_marker(space.root, STUDY) or {}
     changed = any(before.get(key, value) != value for key, value in about.items())
@@ -112,9 +105,9 @@ def complete(
     queue: Queue | None = None,
     after_s: float = 0.0,
 ) -> Failures:
-    """Run cases and show their progress; the failures by the cases' names.
+    """Run cases, each for `limit_s` at most, show their progress, and give the failures.
 
-    A case may take `limit_s`, s; tables and figures after the runs are expected to take `after_s`.
+    Tables and figures after the runs are expected to take `after_s`.
     """
     if not todo:
         return {}
@@ -127,13 +120,7 @@ def complete(
 
 
 def reopen(space: Workspace) -> tuple[Study, Plan]:
-    """The study that a directory was made for, and its plan.
-
-    Raises
-    ------
-    InputError
-        If the directory holds no study.
-    """
+    """The study that a directory was made for, and its plan; an `InputError` if it holds none."""
     about = space.description()
     if "study" not in about:
         what = f"this is no study but an experiment, {about['name']}"
@@ -177,10 +164,7 @@ def _draw(
     failures: Failures,
     guests: Sequence[Guest],
 ) -> str:
-    """Write tables, figures and page, and last the marker of what they are made of; the answer.
-
-    The states are those of the cases that are done, by name, as `Plan.done` gives them.
-    """
+    """Write tables, figures and page, and last the marker of what they are made of; the answer."""
     space.drop(STATE)
     states = {name: states[name] for name in planned.cases if name in states}
     made = tables.make(study, planned, space.cases, states)

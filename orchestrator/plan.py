@@ -18,9 +18,9 @@ from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
 
-START_S, SCENE_S, GRAIN_S = 2.0, 4e-3, 4e-5
-"""Times of tables and figures on each scene, and on each grain of a bed without a run, s: measured
-on `first-look`, `ripples` and `paper --tolerance 0.2`, two cores."""
+START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
+"""Times of imports and of the first figures, of each scene, and of each grain of a bed without a
+run, s: measured on `first-look`, `dune` and `paper --tolerance 0.2`, two cores."""
 BYTES = {"flow": 2.9e6, "pile": 1.8e6, "cells": 1.5e6}
 """Mean size of a case of the preset `paper`, by its kind; of any other, `OTHER_BYTES`."""
 OTHER_BYTES = 2e6
@@ -64,10 +64,8 @@ class Plan:
 def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
-    With a tolerance, each scene is answered on the cheapest levels that are known to meet it; with
-    one of 0, as it is asked; without one, `by_default`. `above` has levels that turned out to be
-    not good enough, by scene id. The grains of a poured bed are read from `cases`, the directory
-    of the runs.
+    `above` has levels that turned out to be not good enough, by scene id. The grains of a poured
+    bed are read from `cases`, the directory of the runs.
 
     Raises
     ------

@@ -69,8 +69,8 @@ def judge(tables: Tables) -> list[Judged]:
 def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: bool) -> Markup:
     """The report card as a section of the page; empty where no claim could be judged.
 
-    `figures` are the names of the page's figures in their order. With a tolerance (`has_tolerance`)
-    many scenes are answered without DEM, which the section says.
+    `figures` are the names of the page's figures in their order; `has_tolerance` is whether many
+    scenes may be answered without DEM.
     """
     entries = []
     for one in (one for one in judged if one.verdict != "no data"):
@@ -85,18 +85,13 @@ def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: boo
 
 def frame(judged: Sequence[Judged]) -> pd.DataFrame:
     """The claims as a table; the comparisons are one text, a line for each."""
+    columns = ["claim", "where", "measured", "verdict", "rule", "why"]
+    texts = ["\n".join(map(str, one.comparisons)) for one in judged]
     rows = [
-        {
-            "claim": one.claim.says,
-            "where": one.claim.where,
-            "measured": "\n".join(map(str, one.comparisons)),
-            "verdict": one.verdict,
-            "rule": RULE,
-            "why": one.why,
-        }
-        for one in judged
+        (one.claim.says, one.claim.where, text, one.verdict, RULE, one.why)
+        for one, text in zip(judged, texts, strict=True)
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _claims() -> Iterator[Claim]:
