@@ -16,6 +16,8 @@ SAMPLING_INTERVAL = 0.5
 """Time between two samples of the grains, sqrt(d/g')."""
 SETTLE = 10.0
 """Time of load step 0."""
+REST_ENERGY = 1e-6
+"""Kinetic energy of the mobile grains that have not passed, below which the bed is at rest, W d."""
 MARGIN = 3.0
 """From a face to the height at which a grain in flight is gone, d."""
 AWAY = 10.0
@@ -65,6 +67,11 @@ class Bed:
         sizes = (float(row["d_m"]) for row in self.grains if row["kind"] != "fixed")
         mass = self.scene["mass_kg"] * (min(sizes) / self.scene["d_m"]) ** 3
         return self.scene["time_step"] * math.sqrt(mass / self.scene["spring_n_m"])
+
+    @property
+    def rest_energy(self):
+        """Kinetic energy of the grains that have not passed, below which the bed is at rest, J."""
+        return REST_ENERGY * self.scene["weight_n"] * self.scene["d_m"]
 
     @property
     def settle_drag(self):

@@ -56,6 +56,7 @@ def bed_parameters(bed, step):
         "sampling_steps": sample,
         "settle_steps": int(door.SETTLE / door.SAMPLING_INTERVAL + 0.5) * sample,
         "settle_drag": bed.settle_drag,
+        "rest_energy": bed.rest_energy,
         "away": door.AWAY,
         "behind": bed.behind,
         "waiting_samples": int(bed.scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5),

@@ -17,6 +17,7 @@ KARMAN = 2.5
 INERTIA = 0.4  # of a sphere, over m r^2
 TOUCH = 1.001  # two grains closer than this touch, of the sum of their radii
 STEP = 0.05  # of the integration, in sqrt(m/K)
+REST = 1e-6  # kinetic energy at rest, in W d
 
 
 def forces(scene, ustar):
@@ -195,12 +196,17 @@ def moves(scene, grains, resting, load_step):
     for rest in resting:
         for _ in range(int(10 * unit / bed.dt)):
             bed.step(float(rest["fx_n"]), float(rest["fz_n"]))
-    x, z = bed.x, bed.z
-    for _ in range(int(scene["waiting_time"] * unit / bed.dt)):
-        bed.step(float(load_step["fx_n"]), float(load_step["fz_n"]))
+    x, z, before = bed.x, bed.z, 0.0
+    for _ in range(int(2 * scene["waiting_time"])):  # samples, T/2 apart
+        for _ in range(int(unit / 2 / bed.dt)):
+            bed.step(float(load_step["fx_n"]), float(load_step["fz_n"]))
         travel = (bed.x - x) * math.cos(alpha) + (bed.z - z) * math.sin(alpha)
         if travel >= scene["displacement_criterion"] * scene["d_m"]:
             return True
+        energy = scene["mass_kg"] * (bed.vx**2 + bed.vz**2) / 2
+        if energy < min(before, REST * scene["weight_n"] * scene["d_m"]):
+            return False  # at rest
+        before = energy
     return False
 
 

@@ -169,7 +169,7 @@ def bed(scene, case):
 
 
 class Protocol:
-    """Which hold it is, who has moved, and who is gone."""
+    """The load step, which grains have moved in which, and which are gone."""
 
     def __init__(self, asked, ids):
         """Begin to settle."""
@@ -195,7 +195,7 @@ class Protocol:
         self._begin(0)
 
     def _begin(self, load_step):
-        self.load_step, self.calm = load_step, 0
+        self.load_step, self.calm, self.energy = load_step, 0, 0.0
         for number, (fx, fz) in zip(self.ids, self.asked.force(load_step), strict=True):
             if O.bodies[number] is not None:
                 O.forces.setPermF(number, (fx, 0, fz))
@@ -208,7 +208,7 @@ class Protocol:
             O.forces.setPermF(number, (fx - gamma * vx, 0, fz - gamma * vz))
 
     def sample(self):
-        """Note who has moved, remove who is gone, go on to the next load step if all is calm."""
+        """Note which grains have moved, remove those that are gone, go on to the next load step."""
         if self.load_step == 0:
             self.settling -= 1
             if self.settling == 0:
@@ -216,7 +216,10 @@ class Protocol:
                 self.fluid.dead = True
                 self._begin(1)
             return
-        self.calm = 0 if self._note() else self.calm + 1
+        has_passed, before, self.energy = self._note(), self.energy, self._unpassed_energy()
+        self.calm = 0 if has_passed else self.calm + 1
+        if not has_passed and self.energy < min(before, self.asked.rest_energy):
+            self.calm = self.waiting_samples  # at rest
         self.moving = [number for number in self.moving if not self._gone(number)]
         lie = 0 in self.moved_in
         if lie and self.calm < self.waiting_samples:
@@ -233,6 +236,12 @@ class Protocol:
                 self.moved_in[place] = self.load_step
                 self.carried[place] = O.bodies[number] is None
         return self.moved_in.count(0) < before
+
+    def _unpassed_energy(self):
+        """Kinetic energy of translation of the mobile grains that have not passed, J."""
+        passed = {number for number, step in zip(self.counted, self.moved_in, strict=True) if step}
+        states = [O.bodies[number].state for number in self.moving if number not in passed]
+        return sum(state.mass * state.vel.squaredNorm() / 2 for state in states)
 
     def _passed(self, number):
         return O.bodies[number] is None or self._travel(number) >= self.marker
