@@ -135,8 +135,8 @@ def problems(
                 runs = (cell_of[scene.id],) if scene.id in ours else ()
                 yield scenes.pivot(scene, ours.get(scene.id, np.nan)), runs
         if "flow" in kinds:
-            for pile in {pile.flow.name: pile for pile in solved.values()}.values():
-                yield scenes.flow(pile, results), (pile.flow.name,)
+            for name, solve in {n: s for p in solved.values() for n, s in p.solves.items()}.items():
+                yield scenes.flow(solve, results), (name,)
         for asked_id, pile in piles.items():
             # replicas of lattices are in the intervals of the others
             if pile.bed.is_replica or pile.scene.protocol.method != "dem":
@@ -145,7 +145,7 @@ def problems(
                 yield scenes.bed("pile", pile, results, cases), (pile.case.name,)
             # grains on other beds are given at level 4 alone, one by one
             if "line" in kinds and asked_id in solved and pile.bed.is_triangle:
-                both = pile.flow.name, pile.case.name
+                both = *pile.solves, pile.case.name
                 yield scenes.bed("line", pile, results, cases), both
 
     names = scene_names(planned, asked)
@@ -155,7 +155,7 @@ def problems(
 
 def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
     """A name for each scene and each flow of a study, by its digest: the numbers that differ."""
-    flows = {run.id[:12]: p.scene for p in planned.piles.values() for run in p.model.cases}
+    flows = {s.flow.id[:12]: s.scene for p in planned.piles.values() for s in p.solves.values()}
     grains = {one.id: one for one in asked.scenes if one.id not in planned.piles}
     piles = {name: pile.scene for name, pile in planned.piles.items()}
     of_flow = {"alpha_deg", "h_m", "z0_over_d", "nu_m2_s"}
@@ -216,7 +216,7 @@ class Ours:
         planned = plan.make(self.study)
         digests = scene_names(planned, self.study)
         piles = planned.piles.values()
-        flows = {digests[run.id[:12]]: p.scene for p in piles for run in p.model.cases}
+        flows = {digests[s.flow.id[:12]]: s.scene for p in piles for s in p.solves.values()}
         self.scenes = {digests[scene.id]: scene for scene in self.study.scenes} | flows
         for name in names:
             if chosen.scenes[name]["kind"] not in CHECKS and name[2:] not in self.scenes:
@@ -231,8 +231,8 @@ class Ours:
         group = Group("benchmark", (self.scenes[name[2:]],), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
-        flows = [run for pile in planned.piles.values() for run in pile.model.cases]
         runs: Sequence[Case] = [*planned.cases.values()]
+        flows = [run for run in runs if run.kind == "flow"]
         runs = {"closed-form": [], "flow": flows}.get(given["kind"], runs)
         for run in runs:  # several scenes share a flow, a poured bed or a pile
             if not case.done_state(run, self.root):

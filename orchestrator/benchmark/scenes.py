@@ -1,6 +1,6 @@
 """The scenes of a pack: levels 1 and 2 are formulas, levels 3 to 5 the results of a study."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,34 +59,36 @@ UNIT = float(np.sqrt(DIAMETER * GRAVITY))
 """sqrt(d g') of the check decks' grain, m/s."""
 LEAST_QUIET = 5.0
 """Load steps shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
-_CONTACT = {"phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step"}
-_HIDDEN = {
-    # settings of our meshes and methods; the domain is given by bed line and height
-    *("expansion_ratio", "lid", "upstream", "downstream", "convection_scheme"),
-    *("non_orthogonal_correctors", "method", "z0_over_d", "bed"),
-    # what bed line, grains, stress and forces follow from: a pack has the results
-    *("sizes", "poured_depth", "width", "exposure"),
-    *("bed_shape", "windward", "lee_slope_deg", "brink_radius", "length", "forms", "spacing"),
-    *("profile", "smoothing", "obstacles", "counted", "flow_top", "depth_m"),
+_GRAIN = (
+    *("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "d_m", "rho_sol_kg_m3", "alpha_deg", "beta_deg", "z0_m"),
+    *("force_law", "alpha_s", "regime", "mass_kg", "reduced_gravity_m_s2", "weight_n"),
+)
+_DEM = (
+    *("phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step"),
+    *("displacement_criterion", "waiting_time", "load_increment"),
+)
+_BED = (
+    *("h_m", "packing", "disorder", "seed", "flow_model", "stress", "update", "final_fraction"),
+)
+_FLOW = (
+    *("mobile_layers", "averaging_length", "loaded_grains", "solve_z0_m", "solve_nu_m2_s"),
+    *("first_cell_m", "cells_per_face", "turbulence_model"),
+)
+ENTRIES: Mapping[str, Sequence[str]] = {
+    "closed-form": (*_GRAIN, "relative_size"),
+    "pivot": (*_GRAIN, "relative_size", *_DEM),
+    "pile": (*_GRAIN, *_DEM, *_BED),
+    "line": (*_GRAIN, *_DEM, *_BED, *_FLOW),
 }
-_WITHOUT_EFFECT: Mapping[str, set[str]] = {
-    "closed-form": {*_CONTACT, "displacement_criterion", "waiting_time", "load_increment"},
-    "pivot": set(),
-    "pile": {
-        *("averaging_length", "loaded_grains", "mobile_layers", "turbulence_model"),
-        *("solve_u_e_m_s", "solve_z0_m", "solve_nu_m2_s", "first_cell_m", "cells_per_face"),
-    },
-    "line": {"solve_u_e_m_s"},  # the speed of the approaching flow is in the entries of level 3
-}
-"""Parameters of a scene without effect on the answer to a kind."""
+"""Entries of the kinds whose scenes are those of a study: what has an effect on the answer."""
 
 
 def parameters(scene: Scene, kind: str) -> Row:
     """Entries of a scene, with its force law decided, in a problem of a kind."""
     g, weight = scene.reduced_gravity, scene.weight
     grain = mechanics(scene.grain.diameter, scene.grain.density, g, weight, scene.grain.stiffness)
-    values, hidden = fields.used(scene) | grain, _HIDDEN | _WITHOUT_EFFECT[kind]
-    return {key: value for key, value in values.items() if value is not None and key not in hidden}
+    values = fields.used(scene) | grain
+    return {key: values[key] for key in ENTRIES[kind] if values.get(key) is not None}
 
 
 def mechanics(d: float, density: float, gravity: float, weight: float, stiffness: float) -> Row:
