@@ -23,7 +23,7 @@ from orchestrator.report.page import caption
 from orchestrator.report.results import Results, measured_hills
 from orchestrator.report.style import Figure, Look
 from orchestrator.runs.case import is_whole
-from orchestrator.solvers.openfoam import read_last_time
+from orchestrator.solvers.openfoam import read_cells
 from orchestrator.study import fields
 from orchestrator.study.parts import PileBed, Turbulence
 from orchestrator.types import FloatArray
@@ -190,8 +190,7 @@ def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float
 @lru_cache(maxsize=16)
 def _cells(case: Path) -> Any:
     """The cells of a finished flow with the velocity at their corners."""
-    _, cells = read_last_time(case, "bed", ["U"])
-    return cells.cell_data_to_point_data()
+    return read_cells(case, "U").cell_data_to_point_data()
 
 
 def velocity(case: Path, window: Window, shape: tuple[int, int]) -> FloatArray:

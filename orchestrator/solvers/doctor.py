@@ -1,14 +1,13 @@
 """Is everything here that a study needs, and what to install if not."""
 
-import importlib.metadata
 import os
 import shutil
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.runs import process
@@ -25,19 +24,8 @@ _NEEDS = {"gmsh": "apt-get install libglu1-mesa libgl1 libxft2 libxcursor1 libxi
 FREE_GIB = 1.0
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One item that was examined.
-
-    Attributes
-    ----------
-    what : str
-        Its name.
-    good : bool
-        Whether a study can run with it.
-    text : str
-        Version, or what is wrong and what to do.
-    """
+class Finding(NamedTuple):
+    """An item, whether a study can run with it, and its version or what to do."""
 
     what: str
     good: bool
@@ -56,7 +44,17 @@ def examine() -> Iterator[Finding]:
             except OrchestratorError as error:
                 yield Finding(name, False, str(error))
     for name in LIBRARIES:
-        yield _library(name)
+        # in a process of its own: a broken library may end it
+        script = f"import {name}, importlib.metadata as m; print(m.version('{name}'))"
+        environment = {**os.environ, "MATPLOTLIBRC": os.devnull}
+        command = [sys.executable, "-c", script]
+        loaded = subprocess.run(command, env=environment, capture_output=True, text=True)
+        if loaded.returncode == 0:
+            yield Finding(name, True, loaded.stdout.split()[-1])
+        else:
+            cause = [f"it ended with {loaded.returncode}", *loaded.stderr.strip().splitlines()][-1]
+            remedy = _NEEDS.get(name, f"pip install --force-reinstall {name}")
+            yield Finding(name, False, f"does not load: {cause}: {remedy}")
     for name in TOOLS:
         path = shutil.which(name)
         yield Finding(name, bool(path), path or "missing: install coreutils and util-linux")
@@ -64,26 +62,6 @@ def examine() -> Iterator[Finding]:
     yield Finding("limits", not low, low or "enough memory and open files")
     free = shutil.disk_usage(Path.cwd()).free / 2**30
     yield Finding("disk", free >= FREE_GIB, f"{free:.1f} GiB free here")
-
-
-def _library(name: str) -> Finding:
-    try:
-        version = importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return Finding(name, False, f"missing: pip install {name}")
-    # in a process of its own: a broken library may end it
-    loaded = subprocess.run(
-        [sys.executable, "-c", f"import {name}"],
-        env={**os.environ, "MATPLOTLIBRC": os.devnull},
-        capture_output=True,
-        text=True,
-        errors="replace",
-    )
-    if loaded.returncode == 0:
-        return Finding(name, True, version)
-    error = [f"it ended with {loaded.returncode}", *loaded.stderr.strip().splitlines()][-1]
-    remedy = _NEEDS.get(name, f"pip install --force-reinstall {name}")
-    return Finding(name, False, f"does not load: {error}: {remedy}")
 
 
 def text(findings: list[Finding]) -> str:

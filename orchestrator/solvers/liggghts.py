@@ -39,10 +39,8 @@ def version() -> str:
     reply = process.ask(path, "-h", "-log", "none", env=ENVIRONMENT)
     match = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", reply.text)
     if not match:
-        raise SolverError(
-            f"{path} does not say that it is a LIGGGHTS: {reply.gist}",
-            remedy=f"try `{path} -h` by hand; if it is broken, install it anew",
-        )
+        what = f"{path} does not say that it is a LIGGGHTS: {reply.gist}"
+        raise SolverError(what, remedy=f"try `{path} -h` by hand; if it is broken, install it anew")
     what = f"{path} is version {match[1]}.{match[2]}"
     number = (int(match[1]), int(match[2]))
     if number < TRIED:
@@ -61,26 +59,14 @@ def ranks(grains: float) -> int:
 
 
 def programs(ranks: int) -> dict[str, str]:
-    """The programs that run a deck with so many processes, with their versions.
-
-    Raises
-    ------
-    SolverError
-        If one is missing.
-    """
+    """The programs that run a deck with so many processes, with versions; else SolverError."""
     if ranks > 1:
         process.find("mpirun", remedy="install it: apt-get install openmpi-bin")
     return {PROGRAM: version()}
 
 
 def check_log(directory: Path) -> None:
-    """See that a run came to its own end: LIGGGHTS ends with 0 even without any grain left.
-
-    Raises
-    ------
-    SolverError
-        With the log's own line where there is one.
-    """
+    """See that a run came to its own end, else SolverError: LIGGGHTS ends with 0 in any case."""
     log = directory / "log.liggghts"
     text = log.read_text(errors="replace") if log.is_file() else ""
     # the message of an error follows a banner of MPI; the deck's own words hold no such line, and
@@ -89,8 +75,6 @@ def check_log(directory: Path) -> None:
     if error:
         raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
     if LAST_WORDS not in text:
-        raise SolverError(
-            "LIGGGHTS ended before its protocol did",
-            where=str(log),
-            remedy="it was killed, or the disk is full; run the same command again",
-        )
+        what = "LIGGGHTS ended before its protocol did"
+        remedy = "it was killed, or the disk is full; run the same command again"
+        raise SolverError(what, where=str(log), remedy=remedy)

@@ -3,7 +3,6 @@
 import os
 import re
 import warnings
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +13,7 @@ from orchestrator.runs.process import ask, find
 if TYPE_CHECKING:
     import pyvista
 
-PROGRAMS = ("simpleFoam",)
-"""The programs of a study's case; by hand a mesh is made by others before."""
+PROGRAM = "simpleFoam"
 TRIED = ("1912",)
 """Versions that the tests ran with."""
 INSTALL = "install the Debian package `openfoam`"
@@ -29,27 +27,22 @@ _RESIDUAL = re.compile(r"Solving for Ux, Initial residual = (\S+),")
 
 @cache
 def version() -> str:
-    """Version of the OpenFOAM that is found first, as its programs state it, such as "1912".
+    """Version of the OpenFOAM that is found first, as its program states it, such as "1912".
 
     Raises
     ------
     SolverError
-        If a program is missing, does not start, or is of a version that the case cannot run with.
+        If the program is missing, does not start, or is of a version that the case cannot run with.
     """
-    path = [find(name, remedy=INSTALL) for name in PROGRAMS][-1]
-    home = os.environ.get("WM_PROJECT_DIR")
-    reply = ask(path, "-help", env={"WM_PROJECT_DIR": home or _HOME})
+    path = find(PROGRAM, remedy=INSTALL)
+    home = os.environ.get("WM_PROJECT_DIR") or _HOME
+    reply = ask(path, "-help", env={"WM_PROJECT_DIR": home})
     match = _STATED.search(reply.text)
     if match is None:
-        if home and _STATED.search(ask(path, "-help", env={"WM_PROJECT_DIR": _HOME}).text):
-            raise SolverError(
-                f"WM_PROJECT_DIR is {home}, which is not the OpenFOAM of {path}",
-                remedy="unset it, or put the programs of that OpenFOAM first in PATH",
-            )
         raise SolverError(
-            f"{path} is not of the openfoam.com line: "
+            f"{path} with WM_PROJECT_DIR={home} is not of the openfoam.com line: "
             f"{_line_with('Using:', reply.text) or reply.gist}",
-            remedy="put the one of Debian's package `openfoam` first in PATH",
+            remedy="put Debian's `openfoam` first in PATH, and unset WM_PROJECT_DIR",
         )
     number = str(match["named"] or match["api"])
     if int(number) < int(TRIED[0]):
@@ -66,118 +59,66 @@ def version() -> str:
 
 def read_numbers(path: Path) -> dict[str, float]:
     """The entries `name number;` of a dictionary file, such as a case's `parameters`."""
-    text = path.read_text(encoding="utf-8")
-    return {
-        name: float(value) for name, value in re.findall(r"(?m)^(\w+)\s+([-+.\d][^\s;]*);", text)
-    }
+    entries = re.findall(r"(?m)^(\w+)\s+([-+.\d][^\s;]*);", path.read_text(encoding="utf-8"))
+    return {name: float(value) for name, value in entries}
 
 
-def read_last_time(
-    directory: Path, patch: str, arrays: Sequence[str]
-) -> "tuple[pyvista.PolyData, pyvista.UnstructuredGrid]":
-    """A patch and the cells of a case, with cell arrays of its last time, in single precision.
-
-    Raises
-    ------
-    SolverError
-        If the case holds no time but 0, or a file of it is broken.
-    """
+def read_cells(directory: Path, array: str) -> "pyvista.UnstructuredGrid":
+    """The cells of a finished case with a field of its last time, in single precision."""
     import pyvista
 
-    if not any(directory.glob(f"[1-9]*/{arrays[0]}")):
-        raise SolverError("no results", where=str(directory), remedy="run ./Allrun there")
     reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
     # the reader starts at the first time, not at the last
     reader.set_active_time_value(reader.time_values[-1])
     reader.cell_to_point_creation = False
-    reader.disable_all_patch_arrays()
-    reader.enable_patch_array("internalMesh")
-    reader.enable_patch_array(f"patch/{patch}")
     reader.disable_all_cell_arrays()
-    for array in arrays:
-        reader.enable_cell_array(array)
-    blocks: Any = reader.read()
-    try:
-        surface, cells = blocks["boundary"][patch], blocks["internalMesh"]
-        for array in arrays:
-            surface.cell_data[array], cells.cell_data[array]
-    except KeyError as missing:
-        raise SolverError(
-            f"the results are not whole: {missing}",
-            where=str(directory),
-            remedy="is the disk full? Run the case again",
-        ) from missing
-    return surface, cells
+    reader.enable_cell_array(array)
+    cells: Any = reader.read()["internalMesh"]
+    assert isinstance(cells, pyvista.UnstructuredGrid)
+    return cells
 
 
 def check_log(directory: Path) -> int:
-    """Read from its logs how a case that `Allrun` has run in ended.
-
-    Returns
-    -------
-    int
-        The iterations that simpleFoam took to converge.
+    """Read from its log how a case that `Allrun` has run in ended; the iterations that it took.
 
     Raises
     ------
-    Exploded
-        If simpleFoam diverged.
-    Stalled
-        If it did not converge.
+    Exploded, Stalled
+        If simpleFoam diverged, or did not converge.
     SolverError
-        If any program failed or was stopped otherwise, whatever its exit code was.
+        If it failed or was stopped otherwise, whatever its exit code was.
     """
-    where = str(directory)
-    for program in PROGRAMS:
-        try:
-            text = (directory / f"log.{program}").read_text(encoding="utf-8", errors="replace")
-        except FileNotFoundError:
-            what = f"{program} has not run"
-            raise SolverError(what, where=where, remedy="run ./Allrun there") from None
-        times = re.findall(r"^Time = (\d+)$", text, re.MULTILINE)
-        last = f"iteration {times[-1]}" if times else "its header"
-        # first the crash: a NaN also makes simpleFoam stumble over its own residuals' file
-        diverged = ""
-        if re.search(r"residual = -?nan", text):
-            diverged = f"the residuals are not numbers: {_line_with('nan', text)}"
-        elif "sigFpe::sigHandler" in text:
-            diverged = f"floating point exception after {last}"
-        if diverged:
-            raise Exploded(
-                f"simpleFoam diverged: {diverged}",
-                where=where,
-                remedy="another first cell or number of cells per face may do; "
-                "relaxation and correctors are in system/fvSolution",
-            )
-        if "sigSegv::sigHandler" in text:
-            raise SolverError(
-                f"{program} crashed: segmentation fault after {last}",
-                where=where,
-                remedy="run the case again; if it stays, install the package `openfoam` anew",
-            )
-        if fatal := _FATAL.search(text):
-            what = f"{program} stopped: {' '.join(fatal[1].split())}"
-            raise SolverError(what, where=where, remedy=f"log.{program} says where")
-        if text.split()[-1:] != ["End"]:
-            raise SolverError(
-                f"{program} was stopped before its end; its log breaks off after {last}",
-                where=where,
-                remedy="killed, out of time, memory or disk? Run the case again",
-            )
+    where, log = str(directory), directory / f"log.{PROGRAM}"
+    if not log.is_file():
+        raise SolverError(f"{PROGRAM} has not run", where, "run ./Allrun there")
+    text = log.read_text(encoding="utf-8", errors="replace")
+    times = re.findall(r"^Time = (\d+)$", text, re.MULTILINE)
+    last = f"iteration {times[-1]}" if times else "its header"
+    # first the crash: a NaN also makes simpleFoam stumble over its own residuals' file
+    has_nan = re.search(r"residual = -?nan", text)
+    if has_nan or "sigFpe::sigHandler" in text:
+        exception = f"floating point exception after {last}"
+        cause = (
+            f"the residuals are not numbers: {_line_with('nan', text)}" if has_nan else exception
+        )
+        remedy = "other first cells or cells per face may do; see also system/fvSolution"
+        raise Exploded(f"{PROGRAM} diverged: {cause}", where, remedy)
+    if "sigSegv::sigHandler" in text:
+        remedy = "run the case again; if it stays, install the package `openfoam` anew"
+        raise SolverError(f"{PROGRAM} crashed: segmentation fault after {last}", where, remedy)
+    if fatal := _FATAL.search(text):
+        cause = " ".join(fatal[1].split())
+        raise SolverError(f"{PROGRAM} stopped: {cause}", where, f"{log.name} says where")
+    if text.split()[-1:] != ["End"]:
+        what = f"{PROGRAM} was stopped before its end; its log breaks off after {last}"
+        remedy = "killed, out of time, memory or disk? Run the case again"
+        raise SolverError(what, where, remedy)
     converged = _CONVERGED.search(text)
     if converged is None:
-        # how the residual of Ux went over the last two fifths of the run
-        residuals = [float(value) for value in _RESIDUAL.findall(text)]
-        fifth = max(len(residuals) // 5, 1)
-        before, now = residuals[-2 * fifth : -fifth] or residuals, residuals[-fifth:]
-        falls = max(now, default=0.0) < 0.5 * max(before, default=0.0)
-        verb = "still falls" if falls else "cycles, it no longer falls"
-        trend = f"the residual of Ux {verb} ({max(now, default=float('nan')):.1e})"
-        raise Stalled(
-            f"simpleFoam did not converge: {trend} after {last}",
-            where=where,
-            remedy="raise endTime in system/controlDict; if the residuals cycle, relax more",
-        )
+        residual = _RESIDUAL.findall(text)[-1:] or ["not known"]
+        what = f"{PROGRAM} did not converge: the residual of Ux is {residual[0]} after {last}"
+        remedy = "raise endTime in system/controlDict; if the residuals cycle, relax more"
+        raise Stalled(what, where, remedy)
     return int(converged[1])
 
 

@@ -54,11 +54,7 @@ def test_a_run_that_converged(tmp_path: Path) -> None:
         (steps(1.0) + "#1  Foam::sigSegv::sigHandler(int) at ??:?", "segmentation fault"),
         (
             steps(*(0.9**i for i in range(100))) + "\nEnd\n",
-            r"did not converge: the residual of Ux still falls \(2.2e-04\) after iteration 100",
-        ),
-        (
-            steps(*(1e-3 * (1 + i % 3) for i in range(100))) + "\nEnd\n",
-            r"did not converge: the residual of Ux cycles, it no longer falls \(3.0e-03\)",
+            r"did not converge: the residual of Ux is \S+ after iteration 100",
         ),
         ("\nEnd\n", "did not converge"),
     ],
@@ -86,9 +82,8 @@ def test_a_log_cut_anywhere_is_not_a_converged_run(solve: Solve, tmp_path: Path)
 
 
 def pretend(directory: Path, stated: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for program in openfoam.PROGRAMS:
-        (directory / program).write_text(f"#!/bin/sh\necho '{stated}'\n")
-        (directory / program).chmod(0o755)
+    (directory / openfoam.PROGRAM).write_text(f"#!/bin/sh\necho '{stated}'\n")
+    (directory / openfoam.PROGRAM).chmod(0o755)
     monkeypatch.setenv("PATH", f"{directory}:/usr/bin:/bin")
 
 

@@ -187,7 +187,7 @@ def test_the_environment_of_another_openfoam_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("WM_PROJECT_DIR", str(tmp_path))
-    with pytest.raises(SolverError, match=f"WM_PROJECT_DIR is {tmp_path}, .*unset it"):
+    with pytest.raises(SolverError, match=f"WM_PROJECT_DIR={tmp_path} .*unset WM_PROJECT_DIR"):
         VERSIONS["simpleFoam"]()
     monkeypatch.setenv("WM_PROJECT_DIR", "")
     assert VERSIONS["simpleFoam"]() in openfoam.TRIED
