@@ -11,7 +11,7 @@ import pytest
 from tests.cluster import slurm
 from tests.cluster.slurm import Slurm
 from tests.conftest import Shared
-from tests.faults.bench import ORCHESTRATOR, ROOT, undisturbed
+from tests.faults.bench import ORCHESTRATOR, ROOT, tables, undisturbed
 
 STUDY = """
 time_limit = 100
@@ -81,8 +81,3 @@ def local_tables(shared: Shared) -> dict[str, bytes]:
     """The tables of the study as this machine alone makes them."""
     with shared("local") as folder:
         return tables(undisturbed(folder, STUDY))
-
-
-def tables(out: Path) -> dict[str, bytes]:
-    """The tables of a study, byte for byte."""
-    return {path.name: path.read_bytes() for path in (out / "tables").iterdir()}

@@ -25,18 +25,10 @@ SlurmctldPidFile={root}/slurmctld.pid
 SlurmdPidFile={root}/slurmd-%n.pid
 SlurmctldLogFile={root}/slurmctld.log
 SlurmdLogFile={root}/slurmd-%n.log
-AuthType=auth/munge
 AuthInfo=socket={root}/munge.socket
-CryptoType=crypto/munge
 ProctrackType=proctrack/pgid
-TaskPlugin=task/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
-JobAcctGatherType=jobacct_gather/none
-AccountingStorageType=accounting_storage/none
-JobCompType=jobcomp/none
-MpiDefault=none
-SwitchType=switch/none
 ReturnToService=2
 SlurmdParameters=config_overrides
 MailProg=/bin/true
@@ -114,13 +106,13 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
                 stderr=log,
             )
             stack.callback(_end, daemon)
-            _until((root / "munge.socket").exists, "munged", root)
-        _until(lambda: slurm.idle() == nodes, "idle nodes", root)
+            until((root / "munge.socket").exists, "munged")
+        until(lambda: slurm.idle() == nodes, "idle nodes")
         try:
             yield slurm
         finally:
             slurm.says("scancel", "--user", user)
-            _until(lambda: not slurm.jobs(), "the end of all jobs", root)
+            until(lambda: not slurm.jobs(), "the end of all jobs")
 
 
 def _free_ports(count: int) -> int:
@@ -147,9 +139,10 @@ def _end(daemon: "subprocess.Popen[bytes]") -> None:
         daemon.wait()
 
 
-def _until(condition: Callable[[], bool], what: str, root: Path) -> None:
-    for _ in range(1800):
+def until(condition: Callable[[], object], what: str) -> None:
+    """Wait for something, at most five minutes."""
+    for _ in range(6000):
         if condition():
             return
-        time.sleep(0.1)
-    raise RuntimeError(f"waited in vain for {what}; see the logs in {root}")
+        time.sleep(0.05)
+    raise RuntimeError(f"waited in vain for {what}")

@@ -3,26 +3,16 @@
 import os
 import subprocess
 import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator.runs import cluster
-from tests.cluster.conftest import Start, tables
-from tests.cluster.slurm import Slurm
-from tests.faults.bench import ORCHESTRATOR, ROOT, processes_in
+from tests.cluster.conftest import Start
+from tests.cluster.slurm import Slurm, until
+from tests.faults.bench import ORCHESTRATOR, ROOT, processes_in, tables
 
 ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--workers", "2")
-
-
-def _until(condition: Callable[[], object]) -> None:
-    for _ in range(6000):
-        if condition():
-            return
-        time.sleep(0.05)
-    raise AssertionError("waited in vain")
 
 
 def _at_work(cases: Path) -> set[str]:
@@ -46,7 +36,7 @@ def test_two_nodes_give_the_bytes_of_one_machine(
     assert "ON n1" in logs
     assert "ON n2" in logs
     assert not list((tmp_path / "out" / "cases").glob(".*"))
-    _until(lambda: not queue.jobs())
+    until(lambda: not queue.jobs(), "the end of the jobs")
 
 
 def test_a_cancelled_job_is_made_up_for(
@@ -54,7 +44,7 @@ def test_a_cancelled_job_is_made_up_for(
 ) -> None:
     cases = tmp_path / "out" / "cases"
     driver = start(*ON_SLURM)
-    _until(lambda: _at_work(cases))
+    until(lambda: _at_work(cases), "a solver")
     first = set(queue.jobs())
     queue.says("scancel", *first)
     _end(driver)
@@ -67,7 +57,7 @@ def test_a_killed_driver_is_continued(
 ) -> None:
     cases = tmp_path / "out" / "cases"
     driver = start(*ON_SLURM)
-    _until(lambda: list(cases.glob("pile-*/done.json")) and _at_work(cases))
+    until(lambda: list(cases.glob("pile-*/done.json")) and _at_work(cases), "a second solver")
     before = {path: path.stat().st_mtime_ns for path in cases.glob("*/done.json")}
     driver.kill()
     driver.communicate()

@@ -112,11 +112,12 @@ def ended(driver: Driver) -> tuple[int, str]:
 
 def same_tables(first: Path, second: Path) -> bool:
     """Whether two studies have the same tables of results, byte for byte."""
-    one, other = (
-        {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
-        for out in (first, second)
-    )
-    return one == other
+    return tables(first) == tables(second)
+
+
+def tables(out: Path) -> dict[str, bytes]:
+    """The tables of a study, byte for byte."""
+    return {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
 
 
 def wait_for(seen: Callable[[], bool], driver: Driver) -> bool:

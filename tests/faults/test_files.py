@@ -192,49 +192,6 @@ def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path, command: C
     assert same_tables(pile.out, pile.undisturbed)
 
 
-@pytest.mark.parametrize("what", ["a file", "a directory with files"])
-def test_other_things_in_our_places_are_kept(finished: Bench, command: Command, what: str) -> None:
-    files = ("report.html", "report.json", "study.json", RECORD, "tables/scenes.csv")
-    places = files if what != "a file" else (*files[:-1], "tables", "figures", "timings")
-    for path in (finished.out / place for place in places):
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
-        if what == "a file":
-            path.write_text("mine")
-        else:
-            path.mkdir()
-            (path / "thesis.txt").write_text("mine")
-    code, printed = command("study", finished)
-    assert code == 0, printed
-    assert same_tables(finished.out, finished.undisturbed)
-    for place in places:
-        kept = finished.out / KEPT / place
-        if place == RECORD and what == "a file":
-            continue  # a record that cannot be read is no one's
-        assert f"{finished.out / place} is not" in printed
-        assert (kept / "thesis.txt" if kept.is_dir() else kept).read_text() == "mine"
-    assert "no solver was started" in command("study", finished)[1]
-    assert not (finished.out / f"{KEPT}-2").exists()
-
-
-@pytest.mark.parametrize("place", ["figures/*.svg", "timings/*.csv"])
-@pytest.mark.parametrize("content", [None, b"my own words"])
-def test_lost_drawings_are_drawn_again(
-    finished: Bench, command: Command, place: str, content: bytes | None
-) -> None:
-    path = next(finished.out.glob(place))
-    whole = path.read_bytes()
-    path.unlink()
-    if content:
-        path.write_bytes(content)
-    assert command("study", finished)[0] == 0
-    assert path.read_bytes()[:8] == whole[:8]
-    if content:
-        assert (finished.out / KEPT / path.relative_to(finished.out)).read_bytes() == content
-    state = (finished.out / "report.json").stat().st_mtime_ns
-    assert "no solver was started" in command("study", finished)[1]
-    assert (finished.out / "report.json").stat().st_mtime_ns == state
-
-
 def test_cases_of_an_earlier_file_are_named_and_kept(finished: Bench, command: Command) -> None:
     (old,) = case_of(finished.out, "cells")
     before, text = _contents(old), finished.source.read_text()

@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from pydantic import BaseModel
 from orchestrator import cli
 from orchestrator.runs import case
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
-from tests.faults.bench import ROOT
+from tests.faults.bench import ENVIRONMENT, ORCHESTRATOR, ROOT
 
 
 @dataclass(frozen=True)
@@ -229,8 +230,10 @@ def test_names_reach_no_shell_and_no_path(shell: Shell, stem: str) -> None:
     assert not any(path.name == "reached" for path in shell.files())
 
 
-def test_names_that_are_no_text(shell: Shell) -> None:
-    source, out = os.fsdecode(b"\xff\xfe.toml"), os.fsdecode(b"out\xff")
-    Path(source).write_text(GRAIN + "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n")
-    assert shell.run("study", source, "--out", out) == (0, "")
-    assert (shell.folder / out / "report.html").is_file()
+def test_names_that_are_no_text(tmp_path: Path) -> None:
+    source, out = tmp_path / os.fsdecode(b"\xff\xfe.toml"), os.fsdecode(b"out\xff")
+    source.write_text(GRAIN + "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n")
+    command = [*ORCHESTRATOR, "study", str(source), "--out", out]
+    ended = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True)
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / out / "report.html").is_file()

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from orchestrator.errors import SolverError
 from orchestrator.runs import case, engine
@@ -105,27 +103,6 @@ def test_the_time_left_follows_the_pace_of_the_cases_so_far() -> None:
     assert forecast.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
     forecast.ended(Outcome(second, 10.0))
     assert forecast.done == pytest.approx(1 - 20 / 235)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(1, 4), st.lists(st.integers(1, 3), min_size=1, max_size=12))
-def test_no_more_cores_are_taken_than_there_are(count: int, wanted: list[int]) -> None:
-    cores, lock = Cores(count), threading.Lock()
-    taken, largest = 0, 0
-
-    def solve(number: int) -> None:
-        nonlocal taken, largest
-        with cores.held(number):
-            with lock:
-                taken += min(number, count)
-                largest = max(largest, taken)
-            with lock:
-                taken -= min(number, count)
-
-    with ThreadPoolExecutor(6) as pool:
-        list(pool.map(solve, wanted))
-    assert largest <= count
-    assert taken == 0
 
 
 def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
