@@ -73,20 +73,32 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     """
     if shortage := process.shortage():
         raise OrchestratorError(shortage)
-    folder = Folder(root)
-    with contextlib.ExitStack() as stack:
-        try:
-            root.mkdir(parents=True, exist_ok=True)
-            _check(folder, kind, name)
-            stack.enter_context(_held(folder.path(LOCK)))
-        except OSError as error:
-            what = f"the output directory cannot be used: {error.strerror or error}"
-            where = str(error.filename or root)
-            raise InputError(what, where, remedy="choose another one: --out") from None
+    folder, lock = Folder(root), FileLock(root / LOCK, timeout=WAIT_S)
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        _check(folder, kind, name)
+        with contextlib.suppress(OSError):
+            (root / LOCK).rmdir()
+        lock.acquire()
+    except Timeout:
+        holder = (root / LOCK).read_text(errors="replace").strip() or "another process"
+        remedy = "wait for its end, or choose another directory with --out"
+        raise OrchestratorError(f"it is in use by {holder}", str(root), remedy) from None
+    except OSError as error:
+        what = f"the output directory cannot be used: {error.strerror or error}"
+        where = str(error.filename or root)
+        raise InputError(what, where, remedy="choose another one: --out") from None
+    try:
+        with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
+            (root / LOCK).write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
         _check(folder, kind, name)  # another process may have been first
         if new and read_marker(root, kind) is None:
             folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
         yield folder
+    finally:
+        with contextlib.suppress(OSError):
+            os.truncate(root / LOCK, 0)
+        lock.release()
 
 
 def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
@@ -120,29 +132,6 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
         folder.path(place)
 
 
-@contextlib.contextmanager
-def _held(path: Path) -> Iterator[None]:
-    """Hold a lock file, which the system frees however this process ends; else an error."""
-    with contextlib.suppress(OSError):
-        path.rmdir()
-    lock = FileLock(path, timeout=WAIT_S)
-    try:
-        lock.acquire()
-    except Timeout:
-        holder = path.read_text(errors="replace").strip() or "another process"
-        remedy = "wait for its end, or choose another directory with --out"
-        raise OrchestratorError(f"it is in use by {holder}", str(path.parent), remedy) from None
-    with lock:
-        with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
-            path.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
-        try:
-            yield
-        finally:
-            with contextlib.suppress(OSError):
-                os.truncate(path, 0)
-            lock.release()
-
-
 class Workspace(Folder):
     """The directory that holds one study's cases, tables, figures and page.
 
@@ -172,12 +161,14 @@ class Workspace(Folder):
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote; InputError if the directory holds no study."""
         value = read_json(self.root / STUDY.marker)
-        if isinstance(value, dict) and isinstance(value.get("cases"), list):
-            texts = [value.get("name"), value.get("study", ""), *value["cases"]]
-            if all(isinstance(text, str) for text in texts):
-                return value
-        remedy = "name the directory that a study was written to"
-        raise InputError("there is no study in this directory", str(self.root), remedy)
+        names = value.get("cases") if isinstance(value, dict) else None
+        texts = (
+            [value.get("name"), value.get("study", ""), *names] if isinstance(names, list) else [0]
+        )
+        if not all(isinstance(text, str) for text in texts):
+            remedy = "name the directory that a study was written to"
+            raise InputError("there is no study in this directory", str(self.root), remedy)
+        return dict(value)
 
     def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
         """All that a page is made of: the question, the ids of the cases by name, code, files."""

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from orchestrator.errors import SolverError
-from orchestrator.runs import process
+from orchestrator.solvers.programs import ask, find
 
 PROGRAM = "liggghts"
 TRIED = (3, 8)
@@ -34,9 +34,9 @@ def version() -> str:
     SolverError
         If it is missing, does not say its version, or is older than any that works.
     """
-    path = process.find(PROGRAM, remedy=INSTALL)
+    path = find(PROGRAM, remedy=INSTALL)
     # without the option it leaves a log wherever the user happens to be
-    reply = process.ask(path, "-h", "-log", "none", env=ENVIRONMENT)
+    reply = ask(path, "-h", "-log", "none", env=ENVIRONMENT)
     match = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", reply.text)
     if not match:
         what = f"{path} does not say that it is a LIGGGHTS: {reply.gist}"
@@ -61,7 +61,7 @@ def ranks(grains: float) -> int:
 def programs(ranks: int) -> dict[str, str]:
     """The programs that run a deck with so many processes, with versions; else SolverError."""
     if ranks > 1:
-        process.find("mpirun", remedy="install it: apt-get install openmpi-bin")
+        find("mpirun", remedy="install it: apt-get install openmpi-bin")
     return {PROGRAM: version()}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.runs.process import ask, find
+from orchestrator.solvers.programs import ask, find
 
 if TYPE_CHECKING:
     import pyvista

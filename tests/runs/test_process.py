@@ -13,7 +13,7 @@ import pytest
 from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import process
 from orchestrator.runs.process import Ended
-from orchestrator.solvers import doctor, liggghts, openfoam
+from orchestrator.solvers import doctor, liggghts, openfoam, programs
 from tests.conftest import Mount
 
 ROOT = Path(__file__).parents[2]
@@ -173,7 +173,7 @@ def test_a_program_without_a_version_is_refused_with_its_words(
 def test_a_program_that_does_not_answer_is_killed(
     put: Callable[[str], Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(process, "QUERY_S", 0.5)
+    monkeypatch.setattr(programs, "QUERY_S", 0.5)
     put(f"cd {tmp_path}; {FAMILY}")
     with pytest.raises(SolverError, match=r"did not end within 0\.5 s"):
         VERSIONS[name]()
