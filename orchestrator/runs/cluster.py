@@ -5,7 +5,6 @@ import fcntl
 import logging
 import math
 import shlex
-import shutil
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -58,10 +57,6 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         raise InputError(what, where="--cluster", remedy=remedy) from None
     dask, jobqueue, distributed = libraries
     kind = getattr(jobqueue, SYSTEMS[queue.system])
-    submit = kind.job_cls.submit_command.split()[0]
-    if not shutil.which(submit):
-        remedy = "run the command on a machine that may ask the queue for jobs"
-        raise OrchestratorError(f"there is no {submit} on this machine", "--cluster", remedy)
     cases.mkdir(exist_ok=True)
     logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
     if awkward := sorted(AWKWARD.intersection(logs)):
@@ -132,7 +127,8 @@ def _submit(cluster: Any, jobs: int, system: str) -> None:
             # else the cluster's end trips over jobs that never began
             job.status = Status.failed
         what = f"{system} does not take the job: {' '.join(str(error).split())}"
-        raise OrchestratorError(what, "--cluster", "see [cluster] in the study file") from None
+        remedy = "see [cluster] in the study file; this machine must be one that may submit jobs"
+        raise OrchestratorError(what, "--cluster", remedy) from None
 
 
 def _await_first(client: Any, logs: Path) -> None:

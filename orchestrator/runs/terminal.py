@@ -66,19 +66,16 @@ def take() -> None:
             os.fstat(number)
         except OSError:  # closed: else the next file that is opened would be written into
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
-    if sys.stdout is sys.__stdout__:
-        sys.stdout = _text(1, sys.stdout)
-    if sys.stderr is sys.__stderr__:
-        sys.stderr = _text(2, sys.stderr)
-
-
-def _text(number: int, given: TextIO | None) -> TextIO:
-    stream, encoding = Stream(number, "w", closefd=False), "utf-8"
-    if given is not None:
-        given.flush()
-        encoding = given.encoding
-    by_line = number == 2 or stream.isatty()
-    return io.TextIOWrapper(io.BufferedWriter(stream), encoding, "backslashreplace", None, by_line)
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        given: TextIO | None = getattr(sys, name)
+        if given is getattr(sys, f"__{name}__"):
+            stream, encoding = Stream(number, "w", closefd=False), "utf-8"
+            if given is not None:
+                given.flush()
+                encoding = given.encoding
+            buffer, by_line = io.BufferedWriter(stream), number == 2 or stream.isatty()
+            text = io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=by_line)
+            setattr(sys, name, text)
 
 
 def lost() -> OSError | None:

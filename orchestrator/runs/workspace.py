@@ -161,14 +161,13 @@ class Workspace(Folder):
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote; InputError if the directory holds no study."""
         value = read_json(self.root / STUDY.marker)
-        names = value.get("cases") if isinstance(value, dict) else None
-        texts = (
-            [value.get("name"), value.get("study", ""), *names] if isinstance(names, list) else [0]
-        )
-        if not all(isinstance(text, str) for text in texts):
-            remedy = "name the directory that a study was written to"
-            raise InputError("there is no study in this directory", str(self.root), remedy)
-        return dict(value)
+        about = value if isinstance(value, dict) else {}
+        names = about["cases"] if isinstance(about.get("cases"), list) else [None]
+        texts = (about.get("name"), about.get("study", ""), *names)
+        if all(isinstance(text, str) for text in texts):
+            return about
+        remedy = "name the directory that a study was written to"
+        raise InputError("there is no study in this directory", str(self.root), remedy)
 
     def drawn_of(self, ids: Mapping[str, str]) -> dict[str, Any]:
         """All that a page is made of: the question, the ids of the cases by name, code, files."""
