@@ -64,9 +64,11 @@ def read_numbers(path: Path) -> dict[str, float]:
 
 
 def read_cells(directory: Path, array: str) -> "pyvista.UnstructuredGrid":
-    """The cells of a finished case with a field of its last time, in single precision."""
+    """The cells of a case with a field of its last time; SolverError if it has no results."""
     import pyvista
 
+    if not any(directory.glob(f"[1-9]*/{array}")):
+        raise SolverError("no results", where=str(directory), remedy="run ./Allrun there")
     reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
     # the reader starts at the first time, not at the last
     reader.set_active_time_value(reader.time_values[-1])
