@@ -68,7 +68,7 @@ class Case(ABC):
     """
 
     kind: ClassVar[str]
-    """Name of the kind, and first word of the directory's name."""
+    """First word of the directory's name."""
     template: ClassVar[str]
     """Folder below `templates/` that the directory starts as a copy of."""
     recipe: ClassVar[int]

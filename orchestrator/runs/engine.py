@@ -33,10 +33,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Pool:
-    """Where cases run: an executor of threads or processes, here or elsewhere.
+    """Where cases run, `places` of them at a time: an executor of threads or processes.
 
-    `task` runs a case and returns its time, s. So many cases as `places` are handed to the executor
-    at a time. It raises one of `lost` for a case whose process it lost for good.
+    `task` runs a case and returns its time, s; the executor raises one of `lost` for a case whose
+    process it lost for good.
     """
 
     executor: Executor
@@ -46,10 +46,9 @@ class Pool:
 
 
 class Cores:
-    """The cores of this machine, of which a solver takes one or several while it runs.
+    """The cores of this machine; the first solver in the queue is served first.
 
-    The first in the queue is served first: a solver that needs two cores does not wait for ever
-    while others take each single core that falls free.
+    Else one that needs two would wait for ever while others take each core that falls free.
     """
 
     def __init__(self, count: int) -> None:
@@ -74,8 +73,7 @@ def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     """Threads of this process, whose solvers take so many cores as there are workers.
 
     While solvers hold all cores, other threads prepare the next cases and read what the last ones
-    left, so that no solver waits for Python. A run of more than `limit_s` counts as hung. An
-    exception ends all children before it goes on.
+    left, so that no solver waits for Python. An exception ends all children before it goes on.
     """
     stop = threading.Event()
     task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, cores=Cores(workers))
@@ -155,17 +153,10 @@ def run(
 ) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet; return those that failed, or need one that did, with why.
 
-    A case starts once those that it needs have ended. Of the cases that may start, the one with
-    the most expensive chain of cases behind it is the first.
-
-    Parameters
-    ----------
-    todo : mapping of str to Case
-        By name; the needs of each case are either here too or done already.
-    pool : Pool
-        Where they run; Interrupted is raised if it is stopped.
-    report, watch : callable
-        Receive the outcome of each case as it ends, and, a few times a second, the cases that run.
+    A case, by name in `todo`, starts once those that it needs have ended. Of the cases that may
+    start, the one with the most expensive chain of cases behind it is the first. `report` receives
+    the outcome of each case, and `watch`, a few times a second, the cases that run. Interrupted is
+    raised if the pool is stopped.
     """
     needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
     behind, chains = dict.fromkeys(todo, 0.0), {}  # costs, s, of the cases that wait for each
@@ -180,11 +171,11 @@ def run(
     running: dict[Future[float], Case] = {}
     failed: dict[str, OrchestratorError] = {}
 
-    def settle(outcome: Outcome) -> None:
-        if outcome.error:
-            failed[outcome.case.name] = outcome.error
-        report(outcome)
-        sorter.done(outcome.case.name)
+    def settle(case: Case, seconds: float = 0.0, error: OrchestratorError | None = None) -> None:
+        if error:
+            failed[case.name] = error
+        report(Outcome(case, seconds, error))
+        sorter.done(case.name)
 
     while sorter.is_active():
         for name in sorter.get_ready():
@@ -193,8 +184,7 @@ def run(
             case = todo[heapq.heappop(ready)[-1]]
             lost = next((need.name for need in case.needs if need.name in failed), None)
             if lost:
-                cause = SolverError(f"it needs {lost}, which failed", where=case.name)
-                settle(Outcome(case, error=cause))
+                settle(case, error=SolverError(f"it needs {lost}, which failed", case.name))
             else:
                 running[pool.executor.submit(pool.task, case)] = case
         if running:
@@ -204,16 +194,14 @@ def run(
             )
             watch(running.values())
             for future in ended:
-                case = running.pop(future)
-                try:
-                    outcome = Outcome(case, future.result())
-                except Interrupted:
-                    raise
-                except pool.lost as error:
-                    outcome = Outcome(case, error=_loss(error, case.name))
-                except Exception as error:  # a fault in reading a case costs it, not the study
-                    outcome = Outcome(case, error=of_exception(error, case.name))
-                settle(outcome)
+                case, fault = running.pop(future), future.exception()
+                if isinstance(fault, pool.lost):
+                    settle(case, error=_loss(fault, case.name))
+                elif isinstance(fault, Exception) and not isinstance(fault, Interrupted):
+                    # a fault in the reading of one case costs that case, not the study
+                    settle(case, error=of_exception(fault, case.name))
+                else:
+                    settle(case, future.result())
     return failed
 
 

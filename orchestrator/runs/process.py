@@ -73,8 +73,6 @@ def run(
 
     Parameters
     ----------
-    command : sequence of str
-        The program and its arguments; no shell reads them.
     cwd, log : Path
         Working directory; file that takes both output streams.
     limit_s, output_limit, file_limit : float, optional

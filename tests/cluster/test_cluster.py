@@ -2,12 +2,10 @@
 
 import os
 import subprocess
-import threading
 from pathlib import Path
 
 import pytest
 
-from orchestrator.runs import cluster
 from tests.cluster.conftest import Start
 from tests.cluster.slurm import Slurm, until
 from tests.faults.bench import ORCHESTRATOR, ROOT, processes_in, tables
@@ -117,21 +115,3 @@ def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path) -> None
     assert ended.returncode == 2
     assert len(ended.stderr.splitlines()) == 1
     assert "pip install 'dask-jobqueue>=0.9'" in ended.stderr
-
-
-def test_a_queue_without_workers_is_told_of(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.2)
-    (tmp_path / "worker-1.out").write_text("")
-    (tmp_path / "worker-1.err").write_text("line 11: no such Python\n\n")
-    local = {"n_workers": 0, "processes": False, "dashboard_address": ":0"}
-    with distributed.LocalCluster(**local) as empty, distributed.Client(empty) as client:
-        late = threading.Timer(1.0, empty.scale, [1])
-        late.start()
-        cluster._await_first(client, tmp_path)
-        late.join()
-    said = capsys.readouterr().err.splitlines()
-    assert said[0] == "no job has begun for 0 s; worker-1.err says: line 11: no such Python"
-    assert 1 <= len(said) <= 3

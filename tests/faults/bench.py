@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import psutil
+
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -132,23 +134,19 @@ def wait_for(seen: Callable[[], bool], driver: Driver) -> bool:
 def pause(driver: Driver) -> None:
     """Pause a driver where it is, unless it has ended."""
     driver.send_signal(signal.SIGSTOP)
-    while driver.poll() is None:
-        if Path(f"/proc/{driver.pid}/stat").read_text().rpartition(")")[2].split()[0] in "TZ":
-            return
+    stopped = (psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE)
+    while psutil.Process(driver.pid).status() not in stopped:
         time.sleep(0.001)
 
 
 def processes_in(folder: Path) -> dict[int, str]:
     """Names of the living processes that work below a folder, by their number."""
-    found = {}
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            inside = Path(os.readlink(entry / "cwd")).is_relative_to(folder)
-            if inside and (entry / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
-                found[int(entry.name)] = (entry / "comm").read_text().strip()
-        except OSError:
-            continue
-    return found
+    return {
+        process.pid: process.info["name"]
+        for process in psutil.process_iter(["cwd", "name", "status"])
+        if process.info["status"] != psutil.STATUS_ZOMBIE
+        if process.info["cwd"] and Path(process.info["cwd"]).is_relative_to(folder)
+    }
 
 
 def none_left_in(folder: Path) -> bool:
