@@ -19,7 +19,7 @@ from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import text_of
-from orchestrator.runs.progress import Display, Forecast
+from orchestrator.runs.progress import Display
 from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, claimed, read_marker
 from orchestrator.study.study import Study, parse
 
@@ -113,8 +113,7 @@ def complete(
         return {}
     make_pool = partial(cluster.pool, queue) if queue else engine.local
     opened = make_pool(space.cases, workers=workers, limit_s=limit_s)
-    forecast = Forecast(todo.values(), workers, after_s)
-    with opened as pool, Display(forecast, space.cases) as display:
+    with opened as pool, Display(todo.values(), space.cases, workers, after_s) as display:
         engine.check_solvers(todo.values(), pool)
         return engine.run(todo, pool, display, display.watch)
 

@@ -3,7 +3,7 @@
 import math
 import sys
 import time
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from pathlib import Path
 from typing import Self
 
@@ -18,19 +18,28 @@ LOOK_S = 1.0
 
 
 class Display:
-    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends."""
+    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends.
 
-    def __init__(self, forecast: "Forecast", cases: Path) -> None:
+    The cases share so many cores as `workers`; `after_s` is expected after the last of them, s.
+    """
+
+    def __init__(
+        self, todo: Collection[Case], cases: Path, workers: int, after_s: float = 0.0
+    ) -> None:
+        self._cases, self._workers, self._after_s = cases, workers, after_s
+        self._left = sum(case.cost_s for case in todo)
+        self._whole = self._left / workers + after_s
+        self._expected = self._took = 0.0  # costs and times of the cases that have ended, s
+        self._going: dict[str, float] = {}
+        self._count, self._ended, self._looked = len(todo), 0, -math.inf
         self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
-        self._forecast, self._cases = forecast, cases
-        self._ended, self._looked = 0, -math.inf
-        self._bar = Progress(
-            TextColumn("{task.fields[ended]}/{task.fields[count]} cases"),
+        columns = (
+            TextColumn("{task.fields[ended]} cases"),
             BarColumn(),
-            TextColumn("{task.percentage:.0f}% of the work, {task.fields[left]}"),
-            console=self._console,
+            TextColumn("{task.description}"),
         )
-        self._task = self._bar.add_task("", total=1.0, ended=0, count=forecast.count, left="")
+        self._bar = Progress(*columns, console=self._console)
+        self._task = self._bar.add_task("", total=1.0, ended="")
         self._show()
 
     def __enter__(self) -> Self:
@@ -44,55 +53,25 @@ class Display:
 
     def __call__(self, outcome: Outcome) -> None:
         """Take note of a case that has ended."""
+        case, error = outcome.case, outcome.error
         self._ended += 1
-        self._forecast.ended(outcome)
-        place, word = (
-            f"[{self._ended}/{self._forecast.count}]",
-            "failed" if outcome.error else "done",
-        )
-        self._console.print(f"{place} {word}  {outcome.case.name}  {self._show()}")
-        if outcome.error:
-            self._console.print(f"  {outcome.error}")
+        self._going.pop(case.name, None)
+        self._left -= case.cost_s
+        if not error:
+            self._expected += case.cost_s
+            self._took += outcome.seconds * case.ranks
+        ended, text = self._show()
+        self._console.print(f"[{ended}] {'failed' if error else 'done'}  {case.name}  {text}")
+        if error:
+            self._console.print(f"  {error}")
 
     def watch(self, running: Collection[Case]) -> None:
         """Look how far the running cases are, once a second, for the bar of a terminal."""
         if sys.stderr.isatty() and time.monotonic() > self._looked + LOOK_S:
             self._looked = time.monotonic()
-            self._forecast.going((case, case.share(self._cases / case.name)) for case in running)
+            shares = {case.name: case.share(self._cases / case.name) for case in running}
+            self._going = {case.name: shares[case.name] * case.cost_s for case in running}
             self._show()
-
-    def _show(self) -> str:
-        """Show on the bar how far the study is; the same in words."""
-        done, left = self._forecast.done, f"about {human(self._forecast.left_s())} left"
-        self._bar.update(self._task, completed=done, ended=self._ended, left=left)
-        return f"{done:.0%} of the work, {left}"
-
-
-class Forecast:
-    """The time left: what the cases still cost, at the pace of those that have ended.
-
-    The runs share so many cores as `workers`; `after_s` is expected after the last run, s.
-    """
-
-    def __init__(self, todo: Collection[Case], workers: int, after_s: float = 0.0) -> None:
-        self.count = len(todo)
-        self._workers, self._after_s = workers, after_s
-        self._left = sum(case.cost_s for case in todo)
-        self._whole = self._left / workers + after_s
-        self._expected = self._took = 0.0  # costs and times of the cases that have ended, s
-        self._going: dict[str, float] = {}
-
-    def going(self, running: Iterable[tuple[Case, float]]) -> None:
-        """Take note of how much the running cases have done, each a share of its own work."""
-        self._going = {case.name: part * case.cost_s for case, part in running}
-
-    def ended(self, outcome: Outcome) -> None:
-        """Take note of a case that has ended."""
-        self._going.pop(outcome.case.name, None)
-        self._left -= outcome.case.cost_s
-        if not outcome.error:
-            self._expected += outcome.case.cost_s
-            self._took += outcome.seconds * outcome.case.ranks
 
     @property
     def done(self) -> float:
@@ -105,6 +84,13 @@ class Forecast:
             pace = self._took / self._expected if self._took else 1.0
         left = max(0.0, self._left - sum(self._going.values()))
         return pace * left / self._workers + self._after_s
+
+    def _show(self) -> tuple[str, str]:
+        """Show on the bar how far the study is; the same in words."""
+        done, ended = self.done, f"{self._ended}/{self._count}"
+        text = f"{done:.0%} of the work, about {human(self.left_s())} left"
+        self._bar.update(self._task, completed=done, ended=ended, description=text)
+        return ended, text
 
 
 def human(seconds: float) -> str:

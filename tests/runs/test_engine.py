@@ -12,7 +12,7 @@ from orchestrator.errors import SolverError
 from orchestrator.runs import case, engine
 from orchestrator.runs.case import Case
 from orchestrator.runs.engine import Cores, Outcome, Pool
-from orchestrator.runs.progress import Forecast
+from orchestrator.runs.progress import Display
 
 
 @dataclass(frozen=True)
@@ -90,19 +90,17 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
     assert case.done_state(fine, tmp_path)
 
 
-def test_the_time_left_follows_the_pace_of_the_cases_so_far() -> None:
+def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> None:
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
-    forecast = Forecast([first, second, third], workers=2, after_s=20.0)
-    assert forecast.left_s() == pytest.approx(430 / 2 + 20)
-    forecast.ended(Outcome(first, 5.0))
-    assert forecast.left_s() == pytest.approx(0.5 * 420 / 2 + 20)
-    forecast.going([(third, 0.5)])
-    assert forecast.left_s() == pytest.approx(0.5 * 220 / 2 + 20)
-    assert forecast.done == pytest.approx(1 - 130 / 235)
-    forecast.ended(Outcome(third, error=SolverError("died")))
-    assert forecast.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
-    forecast.ended(Outcome(second, 10.0))
-    assert forecast.done == pytest.approx(1 - 20 / 235)
+    display = Display([first, second, third], tmp_path, workers=2, after_s=20.0)
+    assert display.left_s() == pytest.approx(430 / 2 + 20)
+    display(Outcome(first, 5.0))
+    assert display.left_s() == pytest.approx(0.5 * 420 / 2 + 20)
+    assert display.done == pytest.approx(1 - 230 / 235)
+    display(Outcome(third, error=SolverError("died")))
+    assert display.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
+    display(Outcome(second, 10.0))
+    assert display.done == pytest.approx(1 - 20 / 235)
 
 
 def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
