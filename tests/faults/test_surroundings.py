@@ -39,6 +39,8 @@ def test_a_disk_that_no_file_may_be_run_on_and_that_can_then_only_be_read(
     pile.out.symlink_to(pile.folder / "disk" / "out")
     pile.check_finished()
     disk("ro")
+    assert pile.study()[0] == 0  # nothing is left to write
+    pile.source.write_text(f"title = 'another'\n{pile.source.read_text()}")
     code, printed = pile.study()
     assert code in (1, 2), printed
     assert "Read-only file system" in printed
