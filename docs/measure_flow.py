@@ -14,7 +14,7 @@ import numpy as np
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.flow import theory
 from orchestrator.flow.case import WALL_STRESS, FlowCase
-from orchestrator.flow.stress import Measure, WallStress, reattachment
+from orchestrator.flow.stress import Measure, WallStress, bubble
 from orchestrator.runs import case, engine
 from orchestrator.study.parts import Flow
 from orchestrator.study.scene import default_first_cell_height
@@ -150,9 +150,9 @@ def models(cases: Path) -> None:
     for changed in MODELS:
         piles = [other(flow(slope, 3.333e-5), **changed) for slope in (15.0, 30.0)]
         means = " | ".join(f"{windward_mean(one, solved(one, cases)):.3f}" for one in piles)
-        lengths = (reattachment(solved(one, cases), HEIGHT) for one in piles)
+        bubbles = (bubble(solved(one, cases), HEIGHT) for one in piles)
         name = ", ".join(f"{key} = {value}" for key, value in changed.items()) or "nothing"
-        print(f"| {name} | {means} | {', '.join(f'{x:.1f}' for x in lengths)} |")
+        print(f"| {name} | {means} | {', '.join(f'{b[1] if b else 0:.1f}' for b in bubbles)} |")
 
 
 def theories(cases: Path) -> None:

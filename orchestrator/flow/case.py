@@ -166,16 +166,12 @@ class FlowCase(Case):
         Raises
         ------
         InputError
-            With the field of the study file: ``bed.obstacles`` where an obstacle is far smaller
-            than the first cells, else the bed line or a field of the flow.
+            With the field of the study file.
         """
         if self.growth > MOST_GROWTH:
-            raise InputError(
-                f"with {self.settings.cells_per_face} cells per face neighbouring cells differ by"
-                f" {self.growth:.3g}, more than {MOST_GROWTH:g}",
-                where="flow.expansion_ratio",
-                remedy="lower it, or raise flow.cells_per_face",
-            )
+            what = f"neighbouring cells differ by {self.growth:.3g}, more than {MOST_GROWTH:g}"
+            remedy = "lower it, or raise flow.cells_per_face"
+            raise InputError(what, where="flow.expansion_ratio", remedy=remedy)
         if not self.settings.depth and self.lid < LEAST_LID:
             what = f"{self.lid:g} is below {LEAST_LID:g} heights of the forms"
             raise InputError(what, where="flow.lid", remedy="raise it")
@@ -183,15 +179,13 @@ class FlowCase(Case):
         if shortest >= LEAST_CELL * self.first_cell_m:
             return
         near = self.first_cell_m
-        small = any(a - near <= end and x <= b + near for a, b in self.bed_line.bare)
-        raise InputError(
-            f"at x = {x:.4g} m the mesh needs cells {shortest:.2g} m long, far shorter than its"
-            f" first cells are high, {self.first_cell_m:.2g} m",
-            where="bed.obstacles" if small else "bed.profile" if self.profile else "bed",
-            remedy="make the obstacle larger, leave it out, or lower flow.first_cell_height"
-            if small
-            else "take corners apart that nearly coincide",
-        )
+        what = f"at x = {x:.4g} m the mesh needs cells {shortest:.2g} m long, far shorter than its"
+        what = f"{what} first cells are high, {near:.2g} m"
+        if any(a - near <= end and x <= b + near for a, b in self.bed_line.bare):
+            remedy = "make the obstacle larger, leave it out, or lower flow.first_cell_height"
+            raise InputError(what, where="bed.obstacles", remedy=remedy)
+        where = "bed.profile" if self.profile else "bed"
+        raise InputError(what, where=where, remedy="take corners apart that nearly coincide")
 
     @property
     def cost_s(self) -> float:
@@ -285,11 +279,10 @@ class FlowCase(Case):
         write_durably(directory / DIAGNOSTICS, text)
         approach = table.loc["approach_ustar_over_log_law"]
         if approach["sound"] != "yes":
+            what = f"on flat bed u* is {approach['value']:.3f} of the log law's"
+            remedy = f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
             raise SolverError(
-                f"on flat bed u* is {approach['value']:.3f} of the log law's: the wall function"
-                " fails",
-                where=str(directory),
-                remedy=f"{DIAGNOSTICS} says more; raise the first cell's height or the speed",
+                f"{what}: the wall function fails", where=str(directory), remedy=remedy
             )
 
     def mean_speed_over_log_law(self, solved: SolvedFlow) -> float:
@@ -306,12 +299,9 @@ class FlowCase(Case):
         segment = np.clip(np.searchsorted(line.x, stress.x_m) - 1, 0, len(line.slopes_deg) - 1)
         over = stress.z_e_m / np.cos(np.radians(line.slopes_deg[segment])) / self._first_centre
         if not 0.98 < over.min() <= over.max() < 1.02:
-            raise SolverError(
-                f"z_e is {over.min():.3g} to {over.max():.3g} of that of the first cells",
-                where=str(directory),
-                remedy="the mesh is not that of the parameters: lower flow.expansion_ratio, or"
-                " raise flow.first_cell_height",
-            )
+            what = f"z_e is {over.min():.3g} to {over.max():.3g} of that of the first cells"
+            remedy = "lower flow.expansion_ratio, or raise flow.first_cell_height"
+            raise SolverError(what, where=str(directory), remedy=remedy)
 
 
 def set_values(path: Path, values: Mapping[str, object]) -> None:

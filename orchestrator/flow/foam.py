@@ -26,7 +26,7 @@ _WITHOUT_BRACKETS = str.maketrans("()", "  ")
 
 
 def listed(values: FloatArray | IntArray, item: str) -> str:
-    """A list with an item of a format such as ``"(%.10g %.10g %.10g)"`` for each value or row."""
+    """A list with an item of a format such as ``"4(%d %d %d %d)"`` for each value or row."""
     text = f"{item}\n" * len(values) % tuple(values.ravel().tolist())
     return f"{len(values)}\n(\n{text})\n"
 
@@ -50,21 +50,11 @@ def read_list(path: Path, after: str = "") -> FloatArray:
 
 
 def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case from a mesh of hexahedra one cell thick.
+    """Write the ``constant/polyMesh`` of a case from a `meshio.Mesh` of hexahedra one cell thick.
 
-    Parameters
-    ----------
-    mesh : meshio.Mesh
-        Its physical surfaces become the patches; ``bed`` has one face for each column of cells.
-    directory : Path
-        The case.
-    types : mapping
-        Types of the patches, with the entries that belong to them; "patch" if not named.
-
-    Returns
-    -------
-    ndarray, shape (columns, cells of a column, 3)
-        Middles of the cells in their order, m: downstream, in a column upwards.
+    Its physical surfaces become the patches, of the given types with their entries, else "patch";
+    ``bed`` has one face for each column of cells. Returned are the middles of the cells in their
+    order, m: downstream, in a column upwards; shape (columns, cells of a column, 3).
     """
     points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
     tags = mesh.cell_data_dict["gmsh:physical"]["quad"]
@@ -147,12 +137,9 @@ class SolvedFlow:
         after = np.clip(np.searchsorted(places, x), 1, len(places) - 1)
         part = ((x - places[after - 1]) / np.diff(places)[after - 1])[:, None, None]
         columns = (1 - part) * old[after - 1] + part * old[after]
-        return np.concatenate(
-            [
-                np.column_stack([np.interp(up, column[:, 0], c) for c in column[:, 1:].T])
-                for up, column in zip(np.log(heights), columns, strict=True)
-            ]
-        )
+        pairs = zip(np.log(heights), columns, strict=True)
+        fields = ([np.interp(up, old[:, 0], c) for c in old[:, 1:].T] for up, old in pairs)
+        return np.concatenate([np.column_stack(each) for each in fields])
 
     def field(self, name: str, patch: str = "") -> FloatArray:
         """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""
@@ -167,9 +154,8 @@ class SolvedFlow:
         """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells."""
         folder = self.directory / "constant/polyMesh"
         corners = read_list(folder / "points")[read_list(folder / "faces").astype(int)[:, 1:]]
-        owner, neighbour = (
-            read_list(folder / name).astype(int)[:, 0] for name in ("owner", "neighbour")
-        )
+        files = (folder / name for name in ("owner", "neighbour"))
+        owner, neighbour = (read_list(file).astype(int)[:, 0] for file in files)
         # the mean of a hexahedron's corners is that of the means of its sides
         middles = np.zeros((owner.max() + 1, 3))
         np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))
@@ -230,10 +216,9 @@ class SolvedFlow:
 
         It is 1 but for the difference that the rows of the mesh make to the log law.
         """
-        (corners, _, _), numbers = self._mesh, self._numbers
-        first = int(np.argmin(corners[..., 0].mean(axis=1)))
+        first = int(np.argmin(self._mesh[0][..., 0].mean(axis=1)))
         tau = -float(self.field("wallShearStress", "bed")[first, 0])
-        law = [numbers[name] for name in ("freeStream", "speedHeight", "roughnessLength")]
+        law = (self._numbers[name] for name in ("freeStream", "speedHeight", "roughnessLength"))
         return float(np.sqrt(max(tau, 0.0)) / log_law_ustar(*law))
 
     def column_speed(self) -> float:

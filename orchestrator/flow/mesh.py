@@ -177,23 +177,20 @@ def _first(piece: tuple[int, float], length: float) -> float:
 def write_mesh(directory: Path) -> Any:
     """Mesh a case: `pile.geo` with the files that it includes becomes `pile.msh`, binary.
 
-    The mesh must hold hexahedra only, none of them inverted, and the physical groups in `GROUPS`.
     Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`.
 
     Raises
     ------
     SolverError
-        If gmsh fails, or the mesh is not such a one.
+        If gmsh fails, if not all cells are hexahedra, some are inverted, or one of `GROUPS` lacks.
     """
     import meshio
 
     try:
         import gmsh
     except OSError as error:
-        raise SolverError(
-            f"gmsh does not load: {error}",
-            remedy="install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1",
-        ) from error
+        remedy = "install the Debian packages libglu1-mesa libxft2 libxcursor1 libxinerama1"
+        raise SolverError(f"gmsh does not load: {error}", remedy=remedy) from error
     with _GMSH:
         # the default installs a signal handler, which only the main thread may
         gmsh.initialize(ARGUMENTS, readConfigFiles=False, interruptible=False)
@@ -213,11 +210,9 @@ def write_mesh(directory: Path) -> Any:
             gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
             gmsh.write(str(directory / "pile.msh"))
         except Exception as error:  # gmsh raises nothing narrower
-            raise SolverError(
-                f"no usable mesh: {error}",
-                where=str(directory / "pile.msh"),
-                remedy="check the slope, the height and the first cell in parameters.geo",
-            ) from error
+            remedy = "check the slope, the height and the first cell in parameters.geo"
+            where = str(directory / "pile.msh")
+            raise SolverError(f"no usable mesh: {error}", where=where, remedy=remedy) from error
         finally:
             gmsh.finalize()
     return meshio.read(directory / "pile.msh")

@@ -23,13 +23,7 @@ NODES_PER_DECADE, NODES = 2, 4
 
 @dataclass(frozen=True)
 class FlowModel(ABC):
-    """A way to find the stress on the bed of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        A scene with a pile.
-    """
+    """A way to find the stress on the bed of a scene with a pile."""
 
     scene: Scene
 
@@ -46,13 +40,7 @@ class FlowModel(ABC):
 
     @property
     def cases(self) -> tuple[FlowCase, ...]:
-        """The runs that it needs.
-
-        Raises
-        ------
-        InputError
-            If one cannot be meshed, naming the field of the study file.
-        """
+        """The runs that it needs; an InputError names the field if one cannot be meshed."""
         return tuple(run for solve in self.solves for run in solve.cases)
 
     @property

@@ -37,33 +37,21 @@ class WallStress:
 
     Stresses are kinematic and in units of u*_0^2, friction velocities in units of u*_0, the
     undisturbed friction velocity; both are positive where the flow at the bed goes downstream.
-
-    Attributes
-    ----------
-    s_m : array
-        Arc length along the bed from the windward toe to the middle of the face, m.
-    x_m, z_m : array
-        Middle of the face: downstream of the windward toe, above the flat bed, m.
-    length_m : array
-        Length of the face along the bed, m; the values hold over it.
-    z_e_m : array
-        Distance of the first cell's centre from the bed, along its normal, m.
-    tau_wall : array
-        Stress on the wall, from the flow solver.
-    ustar_over_ustar0_eq10 : array
-        Eq. 10 at the first cell's centre: 0.41 u_t / ln((z_e + z0)/z0).
-    ustar_over_ustar0_eq10_printed : array
-        Eq. 10 as the paper prints it: 0.41 u_t / ln(z_e/z0).
     """
 
     s_m: FloatArray
+    """Arc length along the bed from the windward toe to the middle of the face, m."""
     x_m: FloatArray
     z_m: FloatArray
+    """Middle of the face: downstream of the windward toe, above the flat bed, m."""
     length_m: FloatArray
     z_e_m: FloatArray
+    """Distance of the first cell's centre from the bed, along its normal, m."""
     tau_wall: FloatArray
     ustar_over_ustar0_eq10: FloatArray
+    """Eq. 10 at the first cell's centre: 0.41 u_t / ln((z_e + z0)/z0)."""
     ustar_over_ustar0_eq10_printed: FloatArray
+    """Eq. 10 as the paper prints it: 0.41 u_t / ln(z_e/z0)."""
 
     @cached_property
     def ustar_over_ustar0_wall(self) -> FloatArray:
@@ -142,15 +130,9 @@ class WallStress:
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
-        """Read a table of `to_csv`; an InputError if the file is not such a table."""
-        names = [one.name for one in fields(cls)]
-        try:
-            table = pd.read_csv(path, dtype=str).astype(float)  # to the last digit
-        except ValueError:  # no numbers, or nothing at all
-            table = pd.DataFrame()
-        if table.empty or list(table) != [*names, _DERIVED]:
-            raise InputError("not a table of the stress on a bed", where=str(path))
-        return cls(**{name: table[name].to_numpy() for name in names})
+        """Read a table of `to_csv`, to the last digit."""
+        table = pd.read_csv(path, dtype=str).astype(float)
+        return cls(**{each.name: table[each.name].to_numpy() for each in fields(cls)})
 
 
 def diagnostics(
@@ -177,7 +159,7 @@ def diagnostics(
         "y_plus": (reynolds * centre, 1 / KARMAN, inf),
         "z_e_over_z0": (centre / roughness, 0.5, inf),
         "approach_ustar_over_log_law": (approach, 1 - APPROACH_ERROR, 1 + APPROACH_ERROR),
-        "reattachment_over_h": (reattachment(stress, height), shortest, inf),
+        "reattachment_over_h": ((bubble(stress, height) or (0.0, 0.0))[1], shortest, inf),
     }
     if mean_speed is not None:
         channel = (mean_speed, 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR)
@@ -186,12 +168,6 @@ def diagnostics(
     table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     sound = table["value"].between(table["sound_from"], table["sound_to"])
     return table.assign(sound=np.where(sound, "yes", "no")).rename_axis("quantity")
-
-
-def reattachment(stress: WallStress, height: float) -> float:
-    """Where the reversed flow behind the top ends, h downstream of it; 0 where there is none."""
-    ends = bubble(stress, height)
-    return ends[1] if ends else 0.0
 
 
 def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
@@ -206,12 +182,9 @@ def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
         return None
     ends = np.flatnonzero(np.diff(stress.x_m[faces]) > height)
     first, last = faces[0], faces[ends[0]] if ends.size else faces[-1]
-    begins = _without_stress(stress, first, first - 1)
-    stops = _without_stress(stress, last, min(last + 1, len(stress.x_m) - 1))
+    # where the stress changes its sign between two faces: cells of h/3 lie there
+    pairs = [first, first - 1], [last, min(last + 1, len(stress.x_m) - 1)]
+    begins, stops = (
+        float(np.interp(0.0, stress.tau_wall[pair], stress.x_m[pair])) for pair in pairs
+    )
     return (begins - top) / height, (stops - top) / height
-
-
-def _without_stress(stress: WallStress, backward: int, forward: int) -> float:
-    """Place between two faces where the stress changes its sign, m: cells of h/3 lie there."""
-    pair = [backward, forward]
-    return float(np.interp(0.0, stress.tau_wall[pair], stress.x_m[pair]))

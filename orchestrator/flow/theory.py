@@ -97,14 +97,9 @@ def of_wavelength(wavelength_over_roughness: FloatArray) -> tuple[FloatArray, Fl
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The bed that the flow sees, at equally distant places.
+    """The bed that the flow sees, by its height (m) at equally distant places; a crest is one.
 
-    Attributes
-    ----------
-    x, z : array
-        Places downstream of the foot of the first form, and the height there, m; a crest is one.
-    bubbles : tuple of (float, float)
-        Where the flow leaves the bed and where it meets it again, m.
+    `bubbles` are the places where the flow leaves the bed and where it meets it again, m.
     """
 
     x: FloatArray
@@ -215,23 +210,13 @@ def response(slopes: FloatArray, cell: float, coefficients: Coefficients) -> Flo
 
 def _wall_stress(line: BedLine, integral: Callable[[FloatArray], FloatArray]) -> WallStress:
     """The stress on faces of h/100 from its integral along x."""
-    parts = [
-        np.linspace(start, end, ceil((end - start) / line.h * FACES) + 1)[:-1]
-        for start, end in pairwise(line.x)
-    ]
+    counts = (ceil(length / line.h * FACES) + 1 for length in np.diff(line.x))
+    pieces = zip(pairwise(line.x), counts, strict=True)
+    parts = [np.linspace(*ends, count)[:-1] for ends, count in pieces]
     edges = np.append(np.concatenate(parts), line.x[-1])
-    tau = np.diff(integral(edges)) / np.diff(edges)
-    z = line.height(edges)
+    z, tau = line.height(edges), np.diff(integral(edges)) / np.diff(edges)
     length = np.hypot(np.diff(edges), np.diff(z))
     ends = np.cumsum(length)
-    ustar = np.sqrt(tau)
-    return WallStress(
-        s_m=ends - length / 2 - ends[np.searchsorted(edges[1:], 0)],
-        x_m=(edges[1:] + edges[:-1]) / 2,
-        z_m=(z[1:] + z[:-1]) / 2,
-        length_m=length,
-        z_e_m=np.full(len(tau), np.nan),
-        tau_wall=tau,
-        ustar_over_ustar0_eq10=ustar,
-        ustar_over_ustar0_eq10_printed=ustar,
-    )
+    s = ends - length / 2 - ends[np.searchsorted(edges[1:], 0)]
+    x, z, ustar = (edges[1:] + edges[:-1]) / 2, (z[1:] + z[:-1]) / 2, np.sqrt(tau)
+    return WallStress(s, x, z, length, np.full(len(tau), np.nan), tau, ustar, ustar)

@@ -79,11 +79,10 @@ class SphereDrag:
     factor: Callable[[FloatArray], FloatArray]
     highest: float
 
-    def force(self, speed: FloatArray, exposure: Exposure) -> FloatArray:
+    def force(self, speed: FloatArray, at: Exposure) -> FloatArray:
         """Drag (N) of a stream at a speed (m/s): 3 pi rho nu d V factor."""
-        e = exposure
-        stokes = 3 * np.pi * e.fluid_density * e.viscosity * e.diameter * speed
-        return np.asarray(stokes * self.factor(speed * e.diameter / e.viscosity))
+        stokes = 3 * np.pi * at.fluid_density * at.viscosity * at.diameter * speed
+        return np.asarray(stokes * self.factor(speed * at.diameter / at.viscosity))
 
 
 def _schiller_naumann(reynolds: FloatArray) -> FloatArray:
@@ -160,54 +159,54 @@ class ForceLaw(ABC):
     """Whether a grain's own height over the bed matters to its forces."""
 
     @abstractmethod
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Speed of the flow that the drag is computed with, m/s."""
 
     @abstractmethod
-    def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Drag in the direction of the flow, N."""
 
     @abstractmethod
-    def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Lift away from the bed, N."""
 
-    def torque(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def torque(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Torque of the flow about the grain's centre, forwards, N m; none by default."""
-        return exposure.zeros(ustar)
+        return at.zeros(ustar)
 
-    def particle_reynolds(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def particle_reynolds(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Particle Reynolds number V d/nu."""
-        speed = self.speed(ustar, exposure)
-        return np.asarray(speed * exposure.diameter / exposure.viscosity)
+        speed = self.speed(ustar, at)
+        return np.asarray(speed * at.diameter / at.viscosity)
 
-    def speed_over_smooth(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def speed_over_smooth(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Speed of the flow over that with the roughness length of a smooth wall added to z0.
 
         A smooth wall bounds the speed over a bed that is far smoother than its grains are large.
         1 where the grain lies within the viscous sublayer, Re* < 5.
         """
-        e, reynolds = exposure, exposure.reynolds(ustar)
+        reynolds = at.reynolds(ustar)
         with np.errstate(all="ignore"):
-            wall = smooth_wall_roughness(np.maximum(ustar, e.ustar(SUBLAYER)), e.viscosity)
-            rest = (e.fluid_density, e.viscosity, e.lift_coefficient, e.gap)
-            smooth = Exposure(e.diameter, e.roughness + wall, *rest)
-            over = self.speed(ustar, e) / self.speed(ustar, smooth)
+            wall = smooth_wall_roughness(np.maximum(ustar, at.ustar(SUBLAYER)), at.viscosity)
+            rest = (at.fluid_density, at.viscosity, at.lift_coefficient, at.gap)
+            smooth = Exposure(at.diameter, at.roughness + wall, *rest)
+            over = self.speed(ustar, at) / self.speed(ustar, smooth)
         return np.asarray(np.where(reynolds < SUBLAYER, 1.0, over))
 
-    def ranges(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Validity, ...]:
+    def ranges(self, ustar: ArrayLike, at: Exposure) -> tuple[Validity, ...]:
         """The ranges that the law holds in; a law with more of them adds its own."""
-        reynolds = exposure.reynolds(ustar)
-        particle = self.particle_reynolds(ustar, exposure)
-        over = self.speed_over_smooth(ustar, exposure)
+        reynolds = at.reynolds(ustar)
+        particle = self.particle_reynolds(ustar, at)
+        over = self.speed_over_smooth(ustar, at)
         return (
             Validity("Re*", reynolds, *self.reynolds),
             Validity(f"particle Reynolds number ({self.drag_law})", particle, 0.0, self.drag_end),
             Validity("speed over that above a smooth wall", over, 0.0, SMOOTH_END),
         )
 
-    def valid(self, ustar: ArrayLike, exposure: Exposure) -> BoolArray:
+    def valid(self, ustar: ArrayLike, at: Exposure) -> BoolArray:
         """Whether the law holds: in its range of Re* and in all its other ranges."""
-        every = (each.holds for each in self.ranges(ustar, exposure))
+        every = (each.holds for each in self.ranges(ustar, at))
         return np.asarray(np.logical_and.reduce(np.broadcast_arrays(*every)))
 
 
@@ -226,18 +225,22 @@ class DragAndSaffman(ForceLaw):
         cls.drag_law, cls.drag_end = cls.sphere.name, cls.sphere.highest
 
     @abstractmethod
-    def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Shear of the flow that the lift is computed with, 1/s."""
+    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+        """Mean speed (m/s) and shear (1/s) of the flow around the grain."""
 
-    def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
+        """Mean speed of the flow around the grain, m/s."""
+        return self.around(ustar, at)[0]
+
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Drag of the sphere at the speed of the flow around it, N."""
-        return self.sphere.force(self.speed(ustar, exposure), exposure)
+        return self.sphere.force(self.speed(ustar, at), at)
 
-    def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Saffman's lift, N: alpha_s rho sqrt(nu) d^2 V sqrt(du/dz).
 
         Eq. 4 prints the root of ``(du/dz)/ustar``; its dimension needs ``d (du/dz)/ustar``.
         """
-        e = exposure
-        scale = e.lift_coefficient * e.fluid_density * np.sqrt(e.viscosity) * e.diameter**2
-        return np.asarray(scale * self.speed(ustar, e) * np.sqrt(self.gradient(ustar, e)))
+        scale = at.lift_coefficient * at.fluid_density * np.sqrt(at.viscosity) * at.diameter**2
+        speed, shear = self.around(ustar, at)
+        return np.asarray(scale * speed * np.sqrt(shear))

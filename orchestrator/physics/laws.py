@@ -35,16 +35,10 @@ class Low(DragAndSaffman):
     protrudes: ClassVar[bool] = True
     sphere = STOKES
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean speed from z0 to z0 + d, m/s."""
-        e = exposure
-        return np.asarray(
-            np.square(ustar) * velocity.viscous_length(e.diameter, e.gap) / e.viscosity
-        )
-
-    def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """ustar^2/nu, 1/s."""
-        return np.asarray(np.square(ustar) / exposure.viscosity)
+    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+        """Mean speed from z0 to z0 + d, and ustar^2/nu."""
+        shear = np.asarray(np.square(ustar) / at.viscosity)
+        return shear * velocity.viscous_length(at.diameter, at.gap), shear
 
 
 class High(DragAndSaffman):
@@ -60,15 +54,11 @@ class High(DragAndSaffman):
     protrudes: ClassVar[bool] = True
     sphere = SCHILLER_NAUMANN
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean speed from z0 to z0 + d, m/s."""
-        e = exposure
-        return np.multiply(ustar, velocity.rough_speed(e.diameter, e.roughness, e.gap))
-
-    def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean shear from z0 to z0 + d, 1/s."""
-        e = exposure
-        return np.multiply(ustar, velocity.rough_gradient(e.diameter, e.roughness, e.gap))
+    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+        """Means from z0 to z0 + d."""
+        grain = (at.diameter, at.roughness, at.gap)
+        speed, shear = velocity.rough_speed(*grain), velocity.rough_gradient(*grain)
+        return np.multiply(ustar, speed), np.multiply(ustar, shear)
 
 
 class Bridged(DragAndSaffman):
@@ -85,18 +75,12 @@ class Bridged(DragAndSaffman):
     protrudes: ClassVar[bool] = True
     sphere = SCHILLER_NAUMANN
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean speed around the grain, m/s."""
-        e = exposure
-        viscous = np.asarray(e.viscosity / velocity.viscous_length(e.diameter, e.gap))
-        rough = velocity.rough_speed(e.diameter, e.roughness, e.gap)
-        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
-
-    def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean shear around the grain, 1/s."""
-        e = exposure
-        rough = velocity.rough_gradient(e.diameter, e.roughness, e.gap)
-        return velocity.bridge(np.asarray(ustar, float), e.viscosity, rough)
+    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+        """Means over the height of the grain."""
+        u, grain = np.asarray(ustar, float), (at.diameter, at.roughness, at.gap)
+        viscous = np.asarray(at.viscosity / velocity.viscous_length(at.diameter, at.gap))
+        speed = velocity.bridge(u, viscous, velocity.rough_speed(*grain))
+        return speed, velocity.bridge(u, at.viscosity, velocity.rough_gradient(*grain))
 
 
 class BridgedGravel(Bridged):
@@ -130,26 +114,19 @@ class Profile(DragAndSaffman):
     )
     sphere = SCHILLER_NAUMANN
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean speed around the grain, m/s."""
-        return np.multiply(ustar, self._layer(ustar, exposure)[0])
-
-    def gradient(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
-        """Mean shear around the grain, 1/s."""
-        shear = self._layer(ustar, exposure)[1]
-        return np.asarray(np.square(ustar) / exposure.viscosity * shear)
-
-    def ranges(self, ustar: ArrayLike, exposure: Exposure) -> tuple[Validity, ...]:
-        """The ranges of every law, and that of the correlation of the shift."""
-        roughness = SAND_GRAIN * exposure.ratio * exposure.reynolds(ustar)
-        rough = Validity("roughness ks u*/nu (Cebeci and Chang)", roughness, 0.0, velocity.ROUGHEST)
-        return (*super().ranges(ustar, exposure), rough)
-
-    def _layer(self, ustar: ArrayLike, exposure: Exposure) -> tuple[FloatArray, FloatArray]:
+    def around(self, ustar: ArrayLike, at: Exposure) -> tuple[FloatArray, FloatArray]:
+        """Means from z0 to z0 + d."""
         # a mean over no height at all is the limit of that over little
-        d = np.maximum(exposure.reynolds(ustar), 1e-100)
-        base = exposure.ratio * d
-        return velocity.layer(base, base + d, velocity.shift(SAND_GRAIN * base))
+        d = np.maximum(at.reynolds(ustar), 1e-100)
+        base = at.ratio * d
+        speed, shear = velocity.layer(base, base + d, velocity.shift(SAND_GRAIN * base))
+        return np.multiply(ustar, speed), np.asarray(np.square(ustar) / at.viscosity * shear)
+
+    def ranges(self, ustar: ArrayLike, at: Exposure) -> tuple[Validity, ...]:
+        """The ranges of every law, and that of the correlation of the shift."""
+        roughness = SAND_GRAIN * at.ratio * at.reynolds(ustar)
+        rough = Validity("roughness ks u*/nu (Cebeci and Chang)", roughness, 0.0, velocity.ROUGHEST)
+        return (*super().ranges(ustar, at), rough)
 
 
 class ClaudinAndreotti(ForceLaw):
@@ -170,21 +147,21 @@ class ClaudinAndreotti(ForceLaw):
     drag_coefficients: ClassVar[tuple[float, float]] = (1.0, 5.0)
     karman: ClassVar[float] = 0.4
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Speed at the height d/2, m/s."""
-        viscous = np.asarray(2 * exposure.viscosity / exposure.diameter)
-        rough = np.asarray(np.log1p(0.5 / exposure.ratio) / self.karman)
+        viscous = np.asarray(2 * at.viscosity / at.diameter)
+        rough = np.asarray(np.log1p(0.5 / at.ratio) / self.karman)
         return velocity.bridge(np.asarray(ustar, float), viscous, rough)
 
-    def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Drag, N."""
-        e, u, (rough, viscous) = exposure, self.speed(ustar, exposure), self.drag_coefficients
-        root = np.sqrt(rough) * u + viscous * np.sqrt(e.viscosity * u / e.diameter)
-        return np.asarray(np.pi / 8 * e.fluid_density * e.diameter**2 * root**2)
+        u, (rough, viscous) = self.speed(ustar, at), self.drag_coefficients
+        root = np.sqrt(rough) * u + viscous * np.sqrt(at.viscosity * u / at.diameter)
+        return np.asarray(np.pi / 8 * at.fluid_density * at.diameter**2 * root**2)
 
-    def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """No lift, N."""
-        return exposure.zeros(ustar)
+        return at.zeros(ustar)
 
 
 class Zeng(ForceLaw):
@@ -209,29 +186,28 @@ class Zeng(ForceLaw):
     drag_law: ClassVar[str] = "Zeng et al."
     drag_end: ClassVar[float] = 200.0
 
-    def speed(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Speed at the grain's centre, m/s."""
-        e = exposure
-        viscous = np.asarray(e.viscosity / velocity.viscous_length(e.diameter, e.gap))
-        rough = np.asarray(INVERSE_KARMAN * np.log1p(0.5 / e.ratio))
+        viscous = np.asarray(at.viscosity / velocity.viscous_length(at.diameter, at.gap))
+        rough = np.asarray(INVERSE_KARMAN * np.log1p(0.5 / at.ratio))
         return velocity.bridge(np.asarray(ustar, float), viscous, rough)
 
-    def drag(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Drag, N."""
-        e, gap, speed = exposure, exposure.ratio, self.speed(ustar, exposure)
-        reynolds = speed * e.diameter / e.viscosity
+        gap, speed = at.ratio, self.speed(ustar, at)
+        reynolds = speed * at.diameter / at.viscosity
         wall = 1 + 0.138 * np.exp(-2 * gap) + 9 / (16 * (1 + 2 * gap))
         a = 0.15 - 0.046 * (1 - 0.16 * gap**2) * np.exp(-0.7 * gap)
         b = 0.687 + 0.066 * (1 - 0.76 * gap**2) * np.exp(-(gap**0.9))
-        stokes = 3 * np.pi * e.fluid_density * e.viscosity * e.diameter * speed
+        stokes = 3 * np.pi * at.fluid_density * at.viscosity * at.diameter * speed
         return np.asarray(stokes * wall * (1 + a * reynolds**b))
 
-    def lift(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Lift in contact with the wall, N."""
-        e, speed = exposure, self.speed(ustar, exposure)
-        reynolds = speed * e.diameter / e.viscosity
+        speed = self.speed(ustar, at)
+        reynolds = speed * at.diameter / at.viscosity
         coefficient = 3.663 / (reynolds**2 + 0.1173) ** 0.22
-        return np.asarray(np.pi / 8 * e.fluid_density * e.diameter**2 * speed**2 * coefficient)
+        return np.asarray(np.pi / 8 * at.fluid_density * at.diameter**2 * speed**2 * coefficient)
 
 
 class ZengTorque(Zeng):
@@ -250,9 +226,9 @@ class ZengTorque(Zeng):
     arm: ClassVar[float] = 2 * 0.944 / (3 * 1.7005) / 2
     """Torque over drag, d."""
 
-    def torque(self, ustar: ArrayLike, exposure: Exposure) -> FloatArray:
+    def torque(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
         """Torque about the centre, N m."""
-        return np.asarray(self.arm * exposure.diameter * self.drag(ustar, exposure))
+        return np.asarray(self.arm * at.diameter * self.drag(ustar, at))
 
 
 _EVERY = (Low, High, Bridged, BridgedGravel, Profile, ClaudinAndreotti, Zeng, ZengTorque)

@@ -86,7 +86,7 @@ def forces(
     """
     law, grain = LAWS[scene.forces.law], single_grain(scene)
     exposure = Exposure(grain.diameter * np.asarray(sizes, float), *grain[1:5], gaps)
-    return partial(law.drag, exposure=exposure), partial(law.lift, exposure=exposure)
+    return partial(law.drag, at=exposure), partial(law.lift, at=exposure)
 
 
 def regime_of(scene: Scene) -> Regime:

@@ -12,8 +12,8 @@ import pytest
 from orchestrator.bed.line import between_flats, of_bed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.fidelity import limits
-from orchestrator.flow.case import LEAST_CELL, FlowCase
-from orchestrator.flow.mesh import ratio_of, write_mesh
+from orchestrator.flow.case import FlowCase
+from orchestrator.flow.mesh import write_mesh
 from orchestrator.flow.model import model
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
@@ -100,15 +100,6 @@ def test_a_thousand_corners_are_meshed(tmp_path: Path) -> None:
     assert len(corners) - 3 == sum(flow.grid.cells) >= 999
 
 
-def test_twice_the_cells_keep_the_first_cell(tmp_path: Path) -> None:
-    meshes = [
-        first_cells(case.prepare(changed(PILE, cells_per_face=n), tmp_path)) for n in (16, 32)
-    ]
-    (coarse, low), (fine, high) = meshes
-    assert 1.7 < len(fine) / len(coarse) < 2.3
-    assert np.median(low) == pytest.approx(np.median(high), rel=1e-3)
-
-
 def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
     given = meshio.read(template / "pile.msh").points
     write_mesh(template)
@@ -156,14 +147,6 @@ def test_a_gentle_profile_has_a_mesh(tmp_path: Path) -> None:
     np.testing.assert_allclose(first_cells(directory)[1], flow.first_cell_m, rtol=1e-3)
 
 
-@pytest.mark.parametrize("cells", [2, 40, 400, 5000])
-@pytest.mark.parametrize("part", [1e-3, 0.1, 0.999])
-def test_a_geometric_series_fills_the_length(cells: int, part: float) -> None:
-    first = part / cells
-    ratio = ratio_of(cells, first, 1.0)
-    assert first * (ratio ** np.arange(cells)).sum() == pytest.approx(1.0, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("text", "field"),
     [
@@ -183,17 +166,3 @@ def test_beds_and_settings_without_a_mesh_are_refused_with_their_field(
     assert raised.value.where.startswith("a.toml: ")
     assert raised.value.where.endswith(field)
     assert raised.value.remedy
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "lee_slope_deg = 0.5",
-        'obstacles = [{ kind = "block", x = -5.0, height = 0.02, length = 5.0 }]',
-        'obstacles = [{ kind = "fence", x = -0.1, height = 1e-3 }]',
-        "flow = { cells_per_face = 400 }",
-    ],
-)
-def test_long_stretches_small_fences_and_fine_faces_have_a_grid(text: str) -> None:
-    flow = of_study(text)
-    assert flow.grid.shortest[0] > LEAST_CELL * flow.first_cell_m

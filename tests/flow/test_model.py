@@ -66,12 +66,6 @@ def test_which_grains_carry_the_flows_force(
         assert np.flatnonzero(pile.packing.windward)[-1] == np.argmax(pile.packing.centres[:, 1])
 
 
-def test_a_longer_average_takes_from_the_crest(tmp_path: Path) -> None:
-    short, long = piles('model = "hill"\n[axes]\n"forces.averaging_length" = [0.025, 0.5]\n')
-    crest = [pile.speed(tmp_path)[-1] for pile in (short, long)]
-    assert crest[1] < 0.8 * crest[0]
-
-
 def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
     axes = '[axes]\n"bed.roughness" = [3.1e-5, 3.3e-5]\n'
     assert len({pile.flow.name for pile in piles(axes)}) == 2
@@ -79,12 +73,6 @@ def test_beds_of_nearly_one_roughness_share_a_solve() -> None:
     assert len({pile.flow.name for pile in shared}) == 1
     assert {pile.flow.roughness_m for pile in shared} == {3.2e-5}
     assert len({pile.case.name for pile in shared}) == 2
-
-
-def test_the_settings_of_the_solver_reach_its_case() -> None:
-    given = {"turbulence_model": "kOmegaSST", "convection_scheme": "upwind", "lid": 50.0}
-    (pile,) = piles("".join(f"{name} = {value!r}\n" for name, value in given.items()))
-    assert {name: getattr(pile.flow.settings, name) for name in given} == given
 
 
 def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:

@@ -6,7 +6,6 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.solvers import openfoam
-from tests.flow.conftest import PILE, Solve
 
 HEADER = "trapFpe: Floating point exception trapping enabled (FOAM_SIGFPE).\nCreate time\n"
 STEP = """
@@ -71,24 +70,10 @@ def test_a_case_that_has_not_run(tmp_path: Path) -> None:
         openfoam.check_log(tmp_path)
 
 
-def test_a_log_cut_anywhere_is_not_a_converged_run(solve: Solve, tmp_path: Path) -> None:
-    log = (solve(PILE) / "log.simpleFoam").read_text()
-    whole = log.rstrip()
-    for kept in [*range(0, len(whole), 997), len(whole) - 1, len(whole) - 4]:
-        leave_logs(tmp_path, "")
-        (tmp_path / "log.simpleFoam").write_text(log[:kept])
-        with pytest.raises(SolverError):
-            openfoam.check_log(tmp_path)
-
-
 def pretend(directory: Path, stated: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (directory / openfoam.PROGRAM).write_text(f"#!/bin/sh\necho '{stated}'\n")
     (directory / openfoam.PROGRAM).chmod(0o755)
     monkeypatch.setenv("PATH", f"{directory}:/usr/bin:/bin")
-
-
-def test_the_version_that_is_here() -> None:
-    assert openfoam.version() in openfoam.TRIED
 
 
 @pytest.mark.parametrize(
@@ -114,16 +99,3 @@ def test_a_later_version_is_not_known_to_work(
     pretend(tmp_path, "Using: OpenFOAM-v2312 (2312) - visit www.openfoam.com", monkeypatch)
     with pytest.warns(UserWarning, match="2312 has not been tried, 1912 has"):
         assert openfoam.version.__wrapped__() == "2312"
-
-
-def test_a_missing_program_names_the_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(SolverError, match="install the Debian package `openfoam`"):
-        openfoam.version.__wrapped__()
-
-
-def test_numbers_of_a_dictionary(tmp_path: Path) -> None:
-    (tmp_path / "parameters").write_text("// a 1;\nspeed 10.5;  // m/s\n\nz0   1e-05;\n")
-    assert openfoam.read_numbers(tmp_path / "parameters") == {"speed": 10.5, "z0": 1e-5}

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from orchestrator.bed.line import triangle
-from orchestrator.errors import InputError, SolverError
+from orchestrator.errors import InputError
 from orchestrator.flow import theory
-from orchestrator.flow.foam import SolvedFlow
-from orchestrator.flow.stress import WallStress, bubble, diagnostics, reattachment
+from orchestrator.flow.stress import WallStress, bubble, diagnostics
 from orchestrator.types import FloatArray
 
 HEIGHT = 0.02
@@ -107,18 +106,6 @@ def test_table_gives_the_same_numbers_back(stress: WallStress, tmp_path: Path) -
     assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
 
 
-@pytest.mark.parametrize("text", ["", "a,b\n1,2\n", "\n"])
-def test_another_table_is_refused(tmp_path: Path, text: str) -> None:
-    (tmp_path / "other.csv").write_text(text)
-    with pytest.raises(InputError, match=r"other\.csv: not a table"):
-        WallStress.from_csv(tmp_path / "other.csv")
-
-
-def test_a_case_that_has_not_run_has_no_stress(template: Path) -> None:
-    with pytest.raises(SolverError, match=r"no results \(run \./Allrun there\)"):
-        SolvedFlow(template).stress()
-
-
 def test_vtk_is_not_loaded_before_it_is_needed() -> None:
     heavy = "{'gmsh', 'meshio', 'pyvista', 'vtkmodules'}"
     code = f"import sys, orchestrator.flow.case; sys.exit(bool({heavy} & set(sys.modules)))"
@@ -152,11 +139,6 @@ def test_each_flaw_is_named(sound: WallStress) -> None:
     assert unsound(replace(sound, tau_wall=np.abs(sound.tau_wall))) == {"reattachment_over_h"}
     for approach in (0.9, 1.09, np.nan):
         assert unsound(sound, approach=approach) == {"approach_ustar_over_log_law"}
-
-
-def test_the_end_of_the_reversed_flow(sound: WallStress) -> None:
-    assert reattachment(sound, HEIGHT) == pytest.approx(6, abs=0.02)
-    assert reattachment(theory.flat(triangle(15.0, HEIGHT)), HEIGHT) == 0
 
 
 def test_a_corners_eddy_does_not_end_the_reversed_flow(sound: WallStress) -> None:

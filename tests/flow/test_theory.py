@@ -32,16 +32,6 @@ def test_the_integral_of_a_triangle_is_exact() -> None:
     np.testing.assert_allclose(fine[far], exact[far], atol=2e-3)
 
 
-def test_a_lorentz_hill_has_the_integral_of_the_tables() -> None:
-    """Of 1/(1 + x^2) the Hilbert transform of the slope is (1 - x^2)/(1 + x^2)^2."""
-    x = np.linspace(-60, 60, 12001)
-    middle = (x[1:] + x[:-1]) / 2
-    exact = (1 - middle**2) / (1 + middle**2) ** 2
-    near = np.abs(middle) < 3
-    found = hilbert(np.diff(1 / (1 + x**2)) / 0.01, 0.01)
-    np.testing.assert_allclose(found[near], exact[near], atol=1e-4)
-
-
 def test_each_wave_is_answered_by_its_own_coefficients() -> None:
     """A long train of z = a cos kx: tau - 1 = a k (A cos kx - B sin kx) far from its ends."""
     cell, wavelength = 0.01, 1.0

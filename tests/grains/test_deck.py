@@ -33,7 +33,7 @@ OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))
 def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
     law_name: str, ratio: float, ustar0: float
 ) -> None:
-    drag, lift = (partial(f, exposure=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
+    drag, lift = (partial(f, at=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
     loading = Loading(drag, lift, np.array([ratio, 0.0]), ALONG, OUTWARD)
     local = abs(ratio) * ustar0
     exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
@@ -49,7 +49,7 @@ def test_a_grain_in_the_deck_feels_the_closed_forms_force_at_its_own_stress(
 def test_the_table_of_forces_finds_the_flow_of_the_force_law(
     law_name: str, goal: float, arms: tuple[float, float]
 ) -> None:
-    drag, lift = (partial(f, exposure=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
+    drag, lift = (partial(f, at=WHERE) for f in (LAWS[law_name].drag, LAWS[law_name].lift))
     weight = 1e-5
     ustar = ForceTable(drag, lift, weight, 0.5).reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))

@@ -20,14 +20,6 @@ def unit(ratio: float = 1 / 30) -> Exposure:
     return Exposure(1.0, ratio, 1.0, 1.0)
 
 
-@every_law
-def test_a_law_is_found_by_its_name(name: str) -> None:
-    assert law(name) is LAWS[name]
-    assert LAWS[name].name == name
-    assert LAWS[name].label
-    assert LAWS[name].reference
-
-
 def test_an_unknown_name_is_answered_with_the_names_of_the_laws() -> None:
     with pytest.raises(InputError, match=r"did you mean bridged\?") as caught:
         law("brigded")

@@ -58,17 +58,6 @@ def test_threshold_is_the_root_of_the_printed_equations(
     assert float(found.friction_velocity) == pytest.approx(ustar, rel=1e-12)
 
 
-def test_eq_3_in_its_printed_form() -> None:
-    alpha, beta, ratio = np.radians(20), np.radians(50), 0.1
-    found = of_air("low", 1e-4, ratio, 20, 50, 1e-3)
-    geometry = 1 + 2 * ratio
-    lift = 1.615 / 2 * found.reynolds * geometry
-    printed = (np.pi / 6 * (np.sin(alpha) * np.tan(beta) + np.cos(alpha))) / (
-        1.5 * np.pi * geometry * np.tan(beta) + lift
-    )
-    assert float(found.shields) == pytest.approx(float(printed), rel=1e-12)
-
-
 # computed for the specification, by another program
 @pytest.mark.parametrize(
     ("d", "theta", "curve"),
@@ -142,19 +131,6 @@ def test_thresholds_rise_with_slope_weight_and_the_depth_of_the_pocket(
     heavy = threshold(LAWS[name], where, density=2500.0 * factor, slope_deg=0, **angle)
     assert float(heavy.friction_velocity) > up[0]
     assert float(of_air(name, d, ratio, 0, beta - 4, 1e-5).friction_velocity) > up[0]
-
-
-@every_law
-@few
-@given(d=diameters, factor=st.floats(0.1, 10), ratio=ratios, beta=betas)
-def test_the_shields_number_depends_on_the_scale_through_the_reynolds_number(
-    name: str, d: float, factor: float, ratio: float, beta: float
-) -> None:
-    small = of_air(name, d, ratio, 10, beta, 1e-5)
-    # the same d^3 g/nu^2 with another diameter
-    large = of_air(name, factor * d, ratio, 10, beta, 1e-5 * factor**1.5)
-    assert float(large.shields) == pytest.approx(float(small.shields), rel=1e-11)
-    assert float(large.reynolds) == pytest.approx(float(small.reynolds), rel=1e-11)
 
 
 def test_without_resistance_there_is_no_threshold() -> None:
