@@ -70,22 +70,11 @@ MOST_PILES = 4
 
 @dataclass(frozen=True)
 class Choice:
-    """One choice that the levels share.
+    """One choice that all levels share, and what else it could be.
 
-    Attributes
-    ----------
-    name, why : str
-        What tables and figures call it, and why its alternatives are as good.
-    field : str
-        The field that it changes.
-    values, times, beside : sequence
-        Its alternatives: values of the field, factors of the scene's value, and sums to it.
-    packings : str
-        Whether "all" piles have it, "lattices" or "poured" beds alone.
-    of_solved_flow : bool
-        Whether it moves nothing under a flow that is not solved.
-    dynamic : bool
-        Whether DEM alone feels it.
+    The alternatives are `values` of the field, `times` the scene's value, and sums `beside` it.
+    `packings` says whether "all" piles have it, "lattices" or "poured" beds alone; a choice
+    `of_solved_flow` moves nothing under another flow, and one that is `dynamic` DEM alone feels.
     """
 
     name: str
@@ -118,18 +107,17 @@ class Choice:
                 yield name, other
 
     def _alternatives(self, scene: Scene) -> dict[str, Fields]:
+        if self.name == "packing" and scene.is_poured:
+            return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
         if self.name == "packing":
-            if scene.is_poured:
-                return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
             gaps = {"bed.packing": "disordered", "bed.disorder": 0.05}
-            return {
+            rows: dict[str, Fields] = {
                 "rows along the slope": {"bed.packing": "aligned"},
                 "level rows": {"bed.packing": "horizontal"},
-                **{f"random gaps, seed {seed}": {**gaps, "bed.seed": seed} for seed in SEEDS},
             }
+            return rows | {f"random gaps, seed {n}": {**gaps, "bed.seed": n} for n in SEEDS}
         if self.name == "force law":  # peeling knows no torque
-            laws = {name: law for name, law in LAWS.items() if not law.turns}
-            return {law.label: {self.field: name} for name, law in laws.items()}
+            return {law.label: {self.field: n} for n, law in LAWS.items() if not law.turns}
         of_cell = self.name == "first cell"
         value = scene.first_cell_height if of_cell else value_of(scene, self.field)
         return {
@@ -170,13 +158,7 @@ def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
 
 
 def experiment(study: Study, out: Path) -> Experiment:
-    """What each shared choice is worth, changed alone on the piles of a study.
-
-    Raises
-    ------
-    InputError
-        If the study has no pile or one is beyond a limit of the methods.
-    """
+    """What each shared choice is worth, changed alone on the piles of a study."""
     limits.check_study(study)
     listed, asked = changes(study)
     planned = plan.of(asked, study.name, cases=out.absolute() / "cases")
@@ -188,15 +170,12 @@ def experiment(study: Study, out: Path) -> Experiment:
 
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
     failing = {run.name for change in listed for run in planned.piles[change.base].runs}
-    return Experiment(
-        "budget",
-        "What a threshold is worth",
-        planned,
-        tables,
-        lambda tables, runs: _sections(listed, tables, runs),
-        study.time_limit_s,
-        failing=failing,
-    )
+
+    def sections(tables: Tables, runs: Runs) -> list[Section]:
+        return _sections(listed, tables, runs)
+
+    title, limit_s = "What a threshold is worth", study.time_limit_s
+    return Experiment("budget", title, planned, tables, sections, limit_s, failing=failing)
 
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
@@ -225,10 +204,7 @@ def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
 
 
 def shares(moved: pd.DataFrame) -> pd.DataFrame:
-    """A row for each scene, choice and fraction: how far down and up its alternatives move it.
-
-    Both signs are at least 0: of alternatives that all raise it the lower share is 0.
-    """
+    """How far down and up the alternatives move each scene at a fraction; both at least 0."""
     keys = ["scene_id", "scene", "model_class", "choice", "fraction"]
     grouped = moved.dropna(subset=list(QUANTITIES)).groupby(keys, sort=False)
     parts = {}
@@ -284,17 +260,12 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     sheets = [sheet(pd.DataFrame(kept, columns=["choice", "alternatives", "why"]))]
-    # a flow model may refuse a bed
-    lost = [
-        (label(change.scene), f"{change.choice.name}: {change.alternative}", "; ".join(causes))
-        for change in listed
-        if not runs.are_done(change.other)
-        for runs_of in [of[change.other].runs]
-        for causes in [[runs.failures[r.name].what for r in runs_of if r.name in runs.failures]]
-    ]
-    text = "The alternatives of the second table have no answer." * bool(lost)
+    columns = ["scene", "choice", "alternative"]
+    lost = [c for c in listed if not runs.are_done(c.other)]  # a flow model may refuse a bed
     if lost:
-        sheets.append(sheet(pd.DataFrame(lost, columns=["scene", "alternative", "why"])))
+        refused = [(label(c.scene), c.choice.name, c.alternative) for c in lost]
+        sheets.append(sheet(pd.DataFrame(refused, columns=columns)))
+    text = "The alternatives of the second table have no answer." * bool(lost)
     last = Section("The choices and their alternatives", text, tables=sheets)
     return [*sections, *tornados, last]
 

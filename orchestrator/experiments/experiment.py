@@ -46,24 +46,11 @@ class Runs:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an experiment runs and makes.
+    """What an experiment runs and makes: its name and title, its scenes and runs, its page.
 
-    Attributes
-    ----------
-    name, title : str
-        Of the experiment and of its page.
-    planned : Plan
-        Its scenes and runs.
-    tables : callable
-        The tables by name, the main one first; where that is empty, nothing is known.
-    sections : callable
-        The sections of the page.
-    limit_s : float
-        Time after which a case is stopped, s.
-    verdicts : container of str
-        How a run ends that failed and is not run again: its failure is the answer.
-    failing : container of str, optional
-        The runs whose failure counts as one of the experiment, by name; by default all.
+    `tables` gives the tables by name, the main one first; where that is empty, nothing is known. A
+    run may take `limit_s`, s. A failed run that ends by one of the `verdicts` is not run again: its
+    failure is the answer. Failures of the runs named in `failing` count (None: of all).
     """
 
     name: str
@@ -78,14 +65,7 @@ class Experiment:
     def run(self, out: Path, *, workers: int) -> Finished:
         """Run what is missing in a directory, write the tables and draw the page.
 
-        Raises
-        ------
-        InputError
-            If the directory cannot be used.
-        SolverError
-            If a solver is missing.
-        OrchestratorError
-            If too little ran to its end for a table.
+        An `OrchestratorError` if too little ran to its end for a table.
         """
         space, planned = Workspace(out.absolute()), self.planned
         with claimed(space.root, EXPERIMENT, self.name) as folder:
@@ -112,13 +92,7 @@ class Experiment:
 
 
 def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:
-    """The piles of a study with their beds; with `by_dem`, lattices that DEM answers.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """The piles of a study with their beds; with `by_dem`, lattices that DEM answers."""
     chosen = {
         scene: scene.bed
         for scene in study.scenes

@@ -96,13 +96,7 @@ FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
 def experiment(study: Study, out: Path) -> Experiment:
-    """What each level costs and how far it is off, on the piles of a study.
-
-    Raises
-    ------
-    InputError
-        If the study has no pile that is answered by DEM, or one is beyond a limit of the methods.
-    """
+    """What each level costs and how far it is off, on the piles of a study."""
     limits.check_study(study)
     routes, pairs = naive_routes(study), decisions(study)
     planned = plan.of({**pairs, **routes}, study.name, cases=out.absolute() / "cases")
@@ -283,13 +277,7 @@ def _shift(values: pd.Series, reference: pd.Series) -> float:
 
 
 def naive_routes(study: Study) -> dict[str, Decision]:
-    """The lowest lattice of a study, in grains, by each naive route; first that of K = 1e6 N/m.
-
-    Raises
-    ------
-    InputError
-        If it has none that is answered by DEM.
-    """
+    """The lowest lattice of a study, in grains, by each naive route; first that of K = 1e6 N/m."""
     lattices = piles(study, by_dem=True)
     scene = min(lattices, key=lambda scene: lattices[scene].height / scene.grain.diameter)
     whole = changed(WHOLE.answer(scene), STEPS)
@@ -305,21 +293,21 @@ def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
 
     The naive routes are of the small pile; `fast` is the pile in question on the level `FAST`.
     """
-    pile = runs.planned.piles[fast]
-    cost_s = runs.cpu_s(pile.method.cases)
-    rows = []
+    piles = runs.planned.piles
+    pile, rows = piles[fast], []
+
+    def load_steps(route: str) -> int:
+        return len(Motion.from_csv(runs.cases / piles[route].case.name).flow) - 1
+
     for route in routes:
-        small = runs.planned.piles[route]
-        naive_s = math.nan
+        small, naive_s = piles[route], math.nan
         if runs.are_done(route, fast):
             whole = Pile(WHOLE.answer(pile.scene), runs.cases)
-            grains = whole.packing.mobile.sum() / small.packing.mobile.sum()
-            first, all_of_them = (
-                len(Motion.from_csv(runs.cases / run.case.name).flow) - 1 for run in (small, pile)
-            )
-            naive_s = runs.cpu_s(small.method.cases) / first * grains * all_of_them
-        rows.append((route, float(naive_s), True))
-    rows.append((FAST.name, cost_s, False))
+            grains = float(whole.packing.mobile.sum() / small.packing.mobile.sum())
+            step_s = runs.cpu_s(small.method.cases) / load_steps(route)
+            naive_s = step_s * grains * load_steps(fast)
+        rows.append((route, naive_s, True))
+    rows.append((FAST.name, runs.cpu_s(pile.method.cases), False))
     return pd.DataFrame(rows, columns=["route", "core_s", "extrapolated"])
 
 
@@ -362,17 +350,10 @@ def _sections(tables: Tables, runs: Runs) -> list[Section]:
 
 
 def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
-    """Errors against cost on logarithmic axes.
+    """Errors against cost: a row of panels for each packing, one beside it for each column.
 
-    A row of panels for each packing, a column of them for each column of errors. A single column
-    has the number of every pair, the front and its names; several have the numbers on the front.
-
-    Parameters
-    ----------
-    pairs : DataFrame
-        A row for each pair of levels and packing, as `together` gives it.
-    columns : mapping of str to str
-        Columns of errors, and the heads of their panels.
+    A single column has the number of every pair, the front and its names; several have the numbers
+    on the front. `columns` has the heads of the panels by the columns of `together`.
     """
     single, names = len(columns) == 1, pairs["flow_level"] + ", " + pairs["grain_level"]
     colours = pairs["grain_level"].map(METHODS).fillna(METHODS["DEM"])
@@ -399,7 +380,7 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
     used = [style.entry(name, colour) for name, colour in METHODS.items()]
     numbered = (table if single else table[table["pareto"]]).drop_duplicates("number")
-    style.legends(canvas, used, [*_numbers(numbered), *_marks(single=single)])
+    style.legends(canvas, used, _samples(numbered, single=single))
     canvas.draw_without_rendering()  # labels are placed in a finished layout
     for ax, texts_here in tags:
         if texts_here:
@@ -433,18 +414,15 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
     return tags
 
 
-def _numbers(rows: pd.DataFrame) -> list[Artist]:
-    each: Any = rows.itertuples(index=False)
-    return [
-        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
-        for row in each
-    ]
-
-
-def _marks(*, single: bool) -> list[Artist]:
-    """Samples of the markers, of the bands, and of the front of a single column."""
+def _samples(pairs: pd.DataFrame, *, single: bool) -> list[Artist]:
+    """Samples of the pairs' numbers, the markers, the bands, and the front of a single column."""
     mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
+    each: Any = pairs.itertuples(index=False)
     return [
+        *(
+            Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
+            for row in each
+        ),
         Line2D([], [], marker="^", mfc="0.2", label="threshold too high", **mark),
         Line2D([], [], marker="v", mfc="0.2", label="threshold too low", **mark),
         Line2D([], [], marker="^", mfc="white", label="hollow: another model", **mark),

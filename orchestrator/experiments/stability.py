@@ -152,14 +152,10 @@ def planned_for(maps: Sequence[Map]) -> Plan:
 
 
 def judge(one: Map, runs: Runs) -> pd.DataFrame:
-    """Judge every run of a map.
+    """Judge every run of a map: x and y of its place, numbers or texts, and what became of it.
 
-    Returns
-    -------
-    DataFrame
-        A row for each place: map; x and y, numbers or texts; verdict, "good", "wrong" or one of
-        `NOTICED`; caught, whether the run itself noticed; error, relative and signed, or NaN; note,
-        the cause.
+    verdict, "good", "wrong" or one of `NOTICED`; caught, whether the run itself noticed; error,
+    relative and signed, or NaN; note, the cause.
     """
     rows: list[Row] = []
     for place in one.places:

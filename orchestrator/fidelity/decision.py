@@ -40,20 +40,10 @@ rate is a part of what is asked."""
 
 @dataclass(frozen=True)
 class Decision:
-    """How a scene is answered.
+    """How a scene is answered: as `asked` by the study, and the `scene` that answers it.
 
-    Attributes
-    ----------
-    asked, scene : Scene
-        As the study asks for it, and as it is answered.
-    levels : Pair or None
-        The fidelity levels of a pile; None for a single grain.
-    known : Known
-        The error of tau_c on these levels and its uncertainty.
-    why : str
-        The reason, for people.
-    by_default : bool
-        Whether the study file left the levels open.
+    The `levels` (None for a single grain) with their `known` error of tau_c; `why`, for people; and
+    whether the study file left the levels open.
     """
 
     asked: Scene
@@ -95,7 +85,6 @@ THEORY = level("flow", "waves")
 """Above it the flow is solved."""
 CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
 """Above it are the levels that check an answer without DEM."""
-WITHIN = "cheapest within the tolerance"
 SPREAD = "within the model's own spread of"
 NONE_WITHIN = "cheapest whose error is below the uncertainty of the reference: none is"
 """How the reason begins where no levels meet the tolerance."""
@@ -107,6 +96,9 @@ def decide(
     """Choose the levels that are known to be within a tolerance of the best ones, at least cost.
 
     A flow that several piles share is run once, and a run of DEM costs what it takes for that pile.
+    Where no levels are within the tolerance, a scene is on the cheapest whose error is below the
+    uncertainty of their reference; it is as asked where nothing is known, or where the way to the
+    answer is a part of what is asked.
 
     Parameters
     ----------
@@ -117,25 +109,18 @@ def decide(
         included; None or 0: the scenes as they are asked.
     above : mapping of str to Bound, optional
         Levels that turned out to be not good enough, by the id of the scene.
-
-    Returns
-    -------
-    dict of str to Decision
-        By the id of the scene. Where no levels are within the tolerance, on the cheapest whose
-        error is below the uncertainty of their reference; as asked where nothing is known, or where
-        the way to the answer is a part of what is asked.
     """
     decided, offered = {}, {}
     for scene in scenes:
         pairs, why = _offered(scene, tolerance, above.get(scene.id, NO_BOUND))
         if pairs:
             offered[scene.id] = [_Option.of(scene, pair, why) for pair in pairs]
-        elif not why and not isinstance(scene.bed, PileBed):
+        elif why or isinstance(scene.bed, PileBed):
+            decided[scene.id] = as_asked(scene, why)
+        else:
             exact = changed(scene, {"protocol.method": "pivot"})
             why = "the closed form is exact for a single grain in a held flow"
             decided[scene.id] = Decision(scene, exact, None, UNKNOWN, why)
-            continue
-        decided[scene.id] = as_asked(scene, why)
     return decided | _cheapest(offered)
 
 
@@ -184,14 +169,14 @@ def _good_enough(
         for pair in itertools.product(*offered)
     }
     pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
-    within, why = [pair for pair in pairs if known[pair].total <= tolerance], WITHIN
+    within, why = [pair for pair in pairs if known[pair].total <= tolerance], "cheapest"
     if not within:
         best = min((error.total for error in known.values()), default=math.inf)
         if math.isinf(best):
             return (), "no error is known: as the study asks"
         # errors below the uncertainty of the reference cannot be ranked
         within = [pair for pair in pairs if known[pair].error <= best]
-        why = f"{NONE_WITHIN} within the tolerance"
+        why = NONE_WITHIN
     kept: list[Pair] = []
     for pair in within:
         cost = known[pair]
@@ -202,7 +187,7 @@ def _good_enough(
             for other in kept
         ):
             kept.append(pair)
-    return kept, why
+    return kept, f"{why} within the tolerance"
 
 
 @cache  # a plan is made several times
@@ -240,9 +225,7 @@ def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
     In each round every scene takes the option with the least time, where a flow is shared by those
     who took it in the round before: in the first by all who could, and once more by none.
     """
-    names = [
-        {name for option in options for name in option.flows_s} for options in offered.values()
-    ]
+    names = ({name for one in options for name in one.flows_s} for options in offered.values())
     best, least = dict[str, _Option](), math.inf
     for users in (Counter(itertools.chain(*names)), Counter[str]()):
         mine: dict[str, Mapping[str, float]] = dict.fromkeys(offered, users)
@@ -282,14 +265,13 @@ def by_default(
     listed, floor = list(scenes), calibration.lowest_floor()
     bounds = {scene.id: above.get(scene.id, NO_BOUND) for scene in listed}
     bounds = {key: bound._replace(flow=bound.flow or THEORY) for key, bound in bounds.items()}
-    decided = decide((scene for scene in listed if is_open(scene)), floor, bounds)
+    decided = {scene.id: as_asked(scene) for scene in listed}
+    decided |= decide((scene for scene in listed if is_open(scene)), floor, bounds)
     for key, chosen in decided.items():
-        if not chosen.is_as_asked and chosen.levels:
-            why = chosen.why.replace(WITHIN, f"cheapest {SPREAD} {floor:.0%}")
-            why = why.replace("within the tolerance", f"{SPREAD} {floor:.0%}")
-            why = f"chosen by default: {why}"
-            decided[key] = replace(chosen, why=why, by_default=True)
-    return {scene.id: decided.get(scene.id) or as_asked(scene) for scene in listed}
+        if chosen.levels and not chosen.is_as_asked:
+            why = chosen.why.replace("within the tolerance", f"{SPREAD} {floor:.0%}")
+            decided[key] = replace(chosen, why=f"chosen by default: {why}", by_default=True)
+    return decided
 
 
 def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:

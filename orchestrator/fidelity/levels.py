@@ -38,23 +38,12 @@ FINER = {
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One way to answer the flow or the grains of a pile.
+    """One way to answer the flow or the grains of a pile: the fields of a scene that it sets.
 
-    Attributes
-    ----------
-    name, meaning : str
-        What tables call it, and what it is.
-    sets, on_poured : mapping
-        The fields that it sets, and those that it sets to something else on a poured bed.
-    derived : str
-        The field that follows from the scene: "threshold_speed", "paper_stiffness", "strip_width",
-        or empty.
-    same_model : bool
-        Whether it has the model choices of the reference; others are measured and never chosen.
-    most_grains : float
-        The ladder measures an expensive level on piles of at most this many exposed grains.
-    not_on : sequence of str
-        Packings that it cannot answer.
+    `on_poured` are those that it sets to something else on a poured bed, `derived` names the one
+    that follows from the scene ("threshold_speed", "paper_stiffness", "strip_width"). A level that
+    is not of the reference's model is measured and never chosen; the ladder measures an expensive
+    one on piles of at most `most_grains` exposed grains. Packings `not_on` it cannot answer.
     """
 
     name: str
@@ -139,13 +128,7 @@ def value_of(scene: Scene, name: str) -> Any:
 
 
 def changed(scene: Scene, fields: Fields) -> Scene:
-    """A scene with some fields changed.
-
-    Raises
-    ------
-    InputError
-        For a field that does not exist, or a value that it cannot have.
-    """
+    """A scene with some fields changed; an `InputError` for a value that a field cannot have."""
     parts: dict[str, dict[str, Any]] = {name: dict(getattr(scene, name)) for name in PARTS}
     for name, value in fields.items():
         part, _, field = name.partition(".")

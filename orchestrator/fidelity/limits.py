@@ -37,10 +37,9 @@ CLOSE_PACKED_DEG = 59.0
 
 
 class Fault(NamedTuple):
-    """A limit that a scene is beyond.
+    """A limit that a scene is beyond: a study is refused, or merely warned.
 
-    The map that shows it, the field of a study file to change, what is wrong, what would do, and
-    whether a study is refused; else it is warned.
+    The map that shows it, the field of a study file to change, what is wrong and what would do.
     """
 
     map: str
