@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from orchestrator import plan
 from orchestrator.fidelity import calibration, decision
 from orchestrator.fidelity.calibration import LEVEL_BED, floor, lowest_floor, model_class
-from orchestrator.fidelity.decision import NO_BOUND, NONE_WITHIN, Bound, Decision, as_asked
+from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, as_asked
 from orchestrator.fidelity.levels import AS_ASKED, FLAT, FLOW, GRAINS, LEVELS, Pair, level
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
@@ -35,13 +33,11 @@ def time_s(scene: Scene, pair: Pair) -> float:
     return sum(run.cost_s for run in (*pile.model.cases, *pile.method.cases))
 
 
-@given(one=st.floats(0.001, 0.9), other=st.floats(0.001, 0.9))
-def test_a_looser_tolerance_is_never_dearer(pile: MakePile, one: float, other: float) -> None:
-    tight, loose = (decide(pile(), tolerance) for tolerance in sorted([one, other]))
-    assert tight.levels
-    assert loose.levels
-    cheaper = time_s(pile(), loose.levels) <= time_s(pile(), tight.levels) + 0.1
-    assert cheaper or NONE_WITHIN in tight.why
+def test_a_looser_tolerance_is_never_dearer(pile: MakePile) -> None:
+    chosen = [decide(pile(), tolerance) for tolerance in np.geomspace(0.03, 0.9, 60)]
+    times = [time_s(pile(), one.levels) for one in chosen if one.levels and "none" not in one.why]
+    assert len(times) > 50
+    assert (np.diff(times) <= 0).all()
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered", "poured"])
