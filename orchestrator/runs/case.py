@@ -16,7 +16,7 @@ from orchestrator.errors import OrchestratorError, SolverError
 from orchestrator.runs import files
 from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json, write_json
 
-PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).absolute().parents[1]
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """Name of a case's directory."""
 IDENTITY = "case.json"
