@@ -19,8 +19,7 @@ class Parameter(NamedTuple):
 
 
 MOST_POINTS = 100_000
-GAS_BELOW = 100.0
-"""Density that tells gases from liquids, kg/m3: Venus has 65 at its ground."""
+GAS_BELOW = 100.0  # density that tells gases from liquids, kg/m3: Venus has 65 at its ground
 PARAMETERS = {
     "diameter": Parameter("grain.diameter", "d_m", "d, m"),
     "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", 2500.0),

@@ -16,8 +16,7 @@ from orchestrator.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-Value = float | str
-"""A number, or a part of the diameter such as ``d/30``."""
+Value = float | str  # a number, or a part of the diameter such as ``d/30``
 OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
 FORM = "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; a z0 may be d/30"
 RANGES = (
@@ -38,8 +37,7 @@ UNITS = (
 """Ranges in which a number is likelier in another unit, the question, and the factor to SI."""
 COHESIVE_BELOW = (6e-5, 1e-4)
 """Diameter below which cohesion is no longer small against the weight, in liquids and gases, m."""
-USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))
-"""Usual dynamic viscosities of liquids and gases, Pa s."""
+USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))  # usual dynamic viscosities of liquids and gases, Pa s
 RULE = {
     "low": "Eq. 2 (low), since Re* is below 3",
     "high": "Eq. 4 (high), since Re* is not below 30",

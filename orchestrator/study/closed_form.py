@@ -16,8 +16,7 @@ from orchestrator.physics.threshold import LAWS_OF, Regime, Threshold, regime, t
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray
 
-Force = Callable[[ArrayLike], FloatArray]
-"""A force (N) of friction velocities (m/s)."""
+Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities (m/s)
 PAPER = "paper"
 """The paper's rule in a study file: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 

@@ -8,8 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 from pydantic.fields import FieldInfo
 
-List = Field(strict=False)
-"""Beside a type of tuples: a list of TOML is taken as one."""
+List = Field(strict=False)  # beside a type of tuples: a list of TOML is taken as one
 # Limits of nature, not of the methods, in SI units. Each has its extremes beside it.
 Roughness = Annotated[float, Field(ge=1e-12, le=10)]
 """From far below any grain, where a wall is smooth, to the largest boulder."""

@@ -35,10 +35,8 @@ BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
     "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
 }
-LEVEL = 4.0
-"""Length of level bed with grains, over the height."""
-LEAST_UPDATE = 0.02
-"""Least part of the grains between two solves of the flow."""
+LEVEL = 4.0  # length of level bed with grains, over the height
+LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
 
 _pile = partial(field, scope="piles")
 _poured = partial(field, scope="poured beds")

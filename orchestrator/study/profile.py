@@ -17,16 +17,12 @@ from orchestrator.types import FloatArray, IntArray
 
 SHAPE_FIELDS = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
 """Fields of a bed that a profile replaces."""
-LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5
-"""Bytes of a file, and largest coordinate, m."""
-MOST_CORNERS = 3000
-"""Most corners of a bed line, each of which is a grid line of the flow's mesh."""
+LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest coordinate, m
+MOST_CORNERS = 3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 GAP, DENSE = 20.0, 20
 """A step along x this many times the middle one is a gap, in a profile of so many points."""
-STEEPEST_DEG = 60.0
-"""Slope beyond which no mesh of vertical grid lines follows the bed."""
-RESOLVED = 4
-"""Corners of a smoothed line in its smoothing length."""
+STEEPEST_DEG = 60.0  # slope beyond which no mesh of vertical grid lines follows the bed
+RESOLVED = 4  # corners of a smoothed line in its smoothing length
 
 
 @dataclass(frozen=True)
@@ -44,16 +40,6 @@ class Profile:
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
-
-    @property
-    def height(self) -> float:
-        """From its lowest to its highest point, m."""
-        return max(self.z) - min(self.z)
-
-    @property
-    def steepest_deg(self) -> float:
-        """Slope where it rises most, degrees; 0 where it never does."""
-        return max(float(np.degrees(np.arctan(np.diff(self.z) / np.diff(self.x))).max()), 0.0)
 
 
 @dataclass
@@ -77,8 +63,9 @@ class Files:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value
         place = f"{where}: {self.folder / name}"
         profile = read_profile(self._text(name, place), Path(name).name, place, smoothing)
-        slope = round(profile.steepest_deg, 2)
-        return {"profile": profile, "height": profile.height, "slope_deg": slope}
+        steepest = np.degrees(np.arctan(np.diff(profile.z) / np.diff(profile.x))).max()
+        height, slope = max(profile.z) - min(profile.z), round(max(float(steepest), 0.0), 2)
+        return {"profile": profile, "height": height, "slope_deg": slope}
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
         """The rows of a sieve table, diameter (m) and fraction."""

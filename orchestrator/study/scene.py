@@ -16,11 +16,10 @@ from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.study.part import Part, UnfitError
 from orchestrator.study.parts import Bed, Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
-from orchestrator.study.shapes import having
+from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sizes import Sizes, extremes, percentile
 
-BUILDABLE_DEG = (2.0, 60.0)
-"""Slopes of piles that can be meshed and packed."""
+BUILDABLE_DEG = (2.0, 60.0)  # slopes of piles that can be meshed and packed
 SOLVE_VISCOSITY = 1e-5
 """Kinematic viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
 VISCOUS_CELLS = 2.5
@@ -32,8 +31,7 @@ MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: contacts give back 0.05 W d."""
 LEAST_WIDTH = 3.0
 """Least width of a strip, diameters of its largest grain: none touches another from both sides."""
-MOST_GRAINS = 1e5
-"""Largest length of a bed, diameters."""
+MOST_GRAINS = 1e5  # largest length of a bed, diameters
 NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 """Least distance of two points of a profile, over the diameter and over the height of the first
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
@@ -170,9 +168,8 @@ class Scene(Part):
     @property
     def weight(self) -> float:
         """Submerged weight W of a grain, N."""
-        sphere = {"diameter": self.grain.diameter, "density": self.grain.density}
         fluid = {"fluid_density": self.fluid.density, "gravity": self.fluid.gravity}
-        return float(weight(**sphere, **fluid))
+        return float(weight(diameter=self.grain.diameter, density=self.grain.density, **fluid))
 
     @property
     def limiting_slope_deg(self) -> float:
@@ -231,7 +228,7 @@ def _check_shape(bed: PileBed) -> None:
     if bed.smoothing:
         raise UnfitError("bed.smoothing", "it is of a profile")
     for name, declared in PileBed.model_fields.items():
-        shapes = having(name)
+        shapes = [shape for shape, facts in SHAPES.items() if name in facts.fields]
         if shapes and bed.shape not in shapes and getattr(bed, name) != declared.default:
             remedy = f"leave it out; it is of: {', '.join(shapes)}"
             raise UnfitError(f"bed.{name}", f"the shape {bed.shape} has none", remedy)

@@ -147,8 +147,7 @@ def _flat(bed: "PileBed") -> FloatArray:
 
 
 TRAIN, LEE, LEVEL = ("forms", "spacing"), ("lee_slope_deg",), ("length",)
-SLIP_FACE_DEG = 30.0
-"""Lee slope of a dune and of a step down."""
+SLIP_FACE_DEG = 30.0  # lee slope of a dune and of a step down
 _LISTED = (
     Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
     Shape(
@@ -182,10 +181,4 @@ _LISTED = (
     ),
     Shape("flat", "level bed", _flat, LEVEL, rises=False, counted="all"),
 )
-SHAPES = {shape.name: shape for shape in _LISTED}
-"""All shapes, by what a study file calls them."""
-
-
-def having(field: str) -> tuple[str, ...]:
-    """Names of the shapes that have a field of the bed which others do not have; maybe none."""
-    return tuple(name for name, shape in SHAPES.items() if field in shape.fields)
+SHAPES = {shape.name: shape for shape in _LISTED}  # all shapes, by what a study file calls them

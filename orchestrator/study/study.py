@@ -29,8 +29,7 @@ from orchestrator.study.sizes import Sizes, percentile
 
 PRESETS = Path(__file__).parent / "presets"
 TIME_LIMIT_S = 3600.0
-BED = {"kind": "grain", "roughness": "d/30"}
-"""Fields of a bed that a file may leave out."""
+BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
 """Largest study file, bytes: one that lists every scene that there may be is smaller."""
