@@ -69,14 +69,13 @@ def check(scene: Scene, where: str) -> None:
     for fault in faults(scene):
         remedy = f"{fault.remedy}; map “{fault.map}” of `orchestrator stability`"
         if fault.refused:
-            raise InputError(fault.what, where=f"{where}: {fault.field}", remedy=remedy)
+            raise InputError(fault.what, f"{where}: {fault.field}", remedy)
         warnings.warn(f"{fault.field}: {fault.what} ({remedy})", stacklevel=2)
     if isinstance(scene.bed, PileBed):
         try:
             _ = model(scene).cases  # a mesh that cannot be made is refused before anything runs
         except InputError as error:
-            place = f"{where}: {error.where}"
-            raise InputError(error.what, where=place, remedy=error.remedy) from None
+            raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
 
 
 def faults(scene: Scene) -> Iterator[Fault]:

@@ -25,20 +25,13 @@ height = 0.007
 roughness = "d/30"
 packing = "poured"
 """
-LEVEL = """
-grain = { diameter = 1e-3, sizes = { sigma_g = 1.2 } }
-bed = { kind = "pile", shape = "flat", length = 0.02, packing = "poured" }
-flow = { model = "flat" }
-"""
 OF_LATTICES = "entrainment angle"
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    text = """
-        grain = { diameter = 1e-3 }
-        bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
-    """
+    bed = 'kind = "pile", slope_deg = 15.0, roughness = "d/30"'
+    text = f"grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}"
     return study.parse(text, name="one", where="test").scenes[0]
 
 
@@ -129,7 +122,8 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
 
 
 def test_a_flow_that_is_not_solved_has_no_choices_of_its_own() -> None:
-    listed, asked = budget.changes(study.parse(LEVEL, name="level", where="level"))
+    text = SMALL.replace('"solve"', '"flat"').replace("slope_deg = 25.0", 'shape = "flat"')
+    listed, asked = budget.changes(study.parse(text, name="level", where="level"))
     assert all(one.scene.flow.model == "flat" for one in asked.values())
     assert {change.choice.name for change in listed} == {
         one.name for one in CHOICES if not one.of_solved_flow and one.name != OF_LATTICES

@@ -34,8 +34,6 @@ name = "small"
 name = "larger"
 bed = {{ height = 0.012 }}
 """
-
-
 BY_HAND = """
 [[group]]
 name = "asked for by the pivot"
