@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -13,7 +12,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestrator import cli
 from orchestrator.benchmark import compare, pack, page
 from orchestrator.benchmark.compare import Choice, Limits, split
 from orchestrator.errors import InputError, OrchestratorError
@@ -39,31 +37,21 @@ INCLINE = "quantity,at,value\nacceleration_over_g,,0.06225\n"
 FAULTS = {
     # limits
     "sleeps": ("time.sleep(1000)", "it did not end within 3 s and was killed"),
-    "ignores the end": (
-        *("import signal; signal.signal(15, signal.SIG_IGN); time.sleep(99)", "not end within 3 s"),
-    ),
     "prints": ("while True: print('y' * 4096)", "it printed more than 1 MiB"),
     "a large file": ("Path('f').write_bytes(bytes(10**7))", "File too large"),
     "memory": ("b = bytes([1]) * 10**9", "it ended with 1: MemoryError"),
     # ends
     "exit 1": ("sys.exit('the mesh is inverted')", "it ended with 1: the mesh is inverted"),
-    "a core": ("os.abort()", "it ended with 134"),
     "a right answer, but": (AFTER + "sys.exit(3)", "it ended with 3"),
     # files in place of an answer
     "nothing": ("sys.exit(0)", "it wrote no answer.csv"),
-    "its directory gone": ("import shutil; shutil.rmtree(out.parent)", "it wrote no answer.csv"),
     "a huge answer": ("out.open('wb').truncate(8 * 2**20)", "more than 4 MiB"),
-    "a device": ("out.symlink_to('/dev/zero')", "it wrote no answer.csv"),
     "a pipe": ("os.mkfifo(out)", "it wrote no answer.csv"),
-    "a directory": ("out.mkdir()", "it wrote no answer.csv"),
     # answers that are not whole
     "no text": ("out.write_bytes(b'\\xff\\xfe')", "answer.csv cannot be read"),
-    "zeros": ("out.write_bytes(b'quantity,at,value\\n' + bytes(99))", "line 2|no end"),
     "no head": (AFTER + "out.write_text(text[18:])", "does not begin with quantity,at,value"),
     "a line cut short": (AFTER + "out.write_text(text[:text.rindex(',')])", "line 2: "),
     "a file cut short": (AFTER + "out.write_text(text[:-3])", "its last line has no end"),
-    "a decimal comma": (AFTER + "out.write_text(text.replace('0.0', '0,0'))", "line 2: "),
-    "not a number": (AFTER + "out.write_text(text.replace('0.0', 'nan#'))", "finite number"),
     "infinite": ("out.write_text('quantity,at,value\\na,,-inf\\n')", "finite number"),
     "twice": (AFTER + "out.write_text(text + text[18:])", "answers acceleration_over_g twice"),
     "another name": (
@@ -180,22 +168,6 @@ def test_a_command_that_cannot_work(command: str, words: str) -> None:
         split(command)
 
 
-def test_no_shell_reads_the_command(formulas: Path, tmp_path: Path) -> None:
-    command = program(tmp_path, TAIL) + " $HOME `touch shell` $(touch shell)"
-    compare.run(formulas, command, tmp_path / "results", SCENE, LIMITS)
-    assert not list(tmp_path.rglob("shell"))
-
-
-@pytest.mark.parametrize("words", [["--limit", "nan"], ["--memory", "0"], ["--level", "6"]])
-def test_options_that_are_refused(
-    formulas: Path, capsys: pytest.CaptureFixture[str], words: list[str]
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        cli.main(["benchmark", "run", str(formulas), "--solver", RIGHT, *words])
-    assert ended.value.code == 2
-    assert words[0] in capsys.readouterr().err
-
-
 def _running(text: str) -> bool:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -206,36 +178,21 @@ def _running(text: str) -> bool:
     return False
 
 
-def _wait(text: str, *, until: bool) -> None:
-    end = time.monotonic() + 120
-    while _running(text) != until and time.monotonic() < end:
-        time.sleep(0.05)
-    assert _running(text) == until
-
-
 def test_a_killed_run_leaves_nothing_at_work(formulas: Path, tmp_path: Path) -> None:
-    command = program(tmp_path, "time.sleep(100)")
     words = [sys.executable, "-m", "orchestrator", "benchmark", "run", str(formulas)]
     driver = subprocess.Popen(
-        [*words, "--solver", command, "--scene", *SCENE.patterns],
+        [*words, "--solver", program(tmp_path, "time.sleep(100)"), "--scene", *SCENE.patterns],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stderr=subprocess.DEVNULL,
     )
-    path = f"{tmp_path / 'my solver.py'}\0/"
-    _wait(path, until=True)
-    driver.send_signal(signal.SIGKILL)
-    driver.wait()
-    _wait(path, until=False)
-
-
-def test_what_a_solver_leaves_at_work_ends_with_it(formulas: Path, tmp_path: Path) -> None:
-    left = str(tmp_path / "left")
-    sleeper = f"[sys.executable, '-c', 'import time; time.sleep(99)', {left!r}]"
-    assert not run(
-        formulas, tmp_path, f"import subprocess; subprocess.Popen({sleeper})" + TAIL
-    ).failures
-    _wait(left, until=False)
+    path, end = f"{tmp_path / 'my solver.py'}\0/", time.monotonic() + 120
+    for is_at_work in (True, False):
+        while _running(path) != is_at_work and time.monotonic() < end:
+            time.sleep(0.05)
+        assert _running(path) == is_at_work
+        driver.kill()
+        driver.wait()
 
 
 @pytest.mark.parametrize("packed", ["all_levels", "poured"])
@@ -288,16 +245,6 @@ def test_two_solvers_on_one_page(
         table = pd.read_csv(both / name)
         assert table["solver"].unique().tolist() == ["right", "wrong_one"]
         assert table.groupby("solver").size().nunique() == 1
-
-
-def test_where_the_page_lies(
-    all_levels: Path, right: Path, wrong: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(right, tmp_path / "other")
-    outcome = compare.compare(all_levels, [right, tmp_path / "other"], None, CHOICE)
-    assert outcome.failures == []
-    assert outcome.page == tmp_path / "results" / "benchmark-pack" / "comparison.html"
     # alone a solver is not named, and the page lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
     assert outcome.failures[0].startswith("4-")
@@ -378,19 +325,6 @@ def test_results_of_another_solver_or_pack_stay(
     _refused(all_levels, results, "answers to another pack", program(tmp_path, TAIL))
     with workspace.claimed(results, workspace.RESULTS, program(tmp_path, TAIL)):
         _refused(formulas, results, "it is in use by", program(tmp_path, TAIL))
-
-
-@pytest.mark.filterwarnings("ignore:.*is not what this program wrote")
-def test_files_of_the_user_survive_in_results(formulas: Path, tmp_path: Path) -> None:
-    run(formulas, tmp_path, TAIL)
-    results = tmp_path / "results"
-    (results / "2-incline-5" / "notes.txt").write_text("mine\n")
-    (results / "figures" / "mine.png").write_text("mine\n")
-    (results / "comparison.csv").unlink()
-    (results / "comparison.csv").write_text("mine\n")
-    run(formulas, tmp_path, TAIL)
-    kept = {p.name for p in results.rglob("*") if p.is_file() and p.read_bytes() == b"mine\n"}
-    assert kept == {"notes.txt", "mine.png", "comparison.csv"}
 
 
 def test_a_changed_pack_is_not_used_further(formulas: Path, tmp_path: Path) -> None:

@@ -100,12 +100,6 @@ def test_an_engine_agrees_on_other_beds(
     assert _run(request.getfixturevalue(packed), tmp_path, engine, "4-*").failures == []
 
 
-def test_an_engine_declines_other_kinds(formulas: Path, tmp_path: Path, engine: str) -> None:
-    first = min(path.name for path in (formulas / "scenes").glob("1-*"))
-    (line,) = _run(formulas, tmp_path, engine, first).failures
-    assert "it ended with 2" in line
-
-
 def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:
     if shutil.which("lmp") is None:
         pytest.skip("lmp is not installed")

@@ -1,6 +1,5 @@
 """A pack says all that a solver needs, and is refused when it is not what was exported."""
 
-import contextlib
 import functools
 import hashlib
 import json
@@ -14,8 +13,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from orchestrator import cli
 from orchestrator.benchmark import pack, scenes
@@ -26,7 +23,6 @@ from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from tests.benchmark.conftest import ROOT
-from tests.conftest import Command
 
 
 def _documented() -> set[tuple[str, str]]:
@@ -236,36 +232,26 @@ def test_export_twice_and_without_liggghts(
     assert pd.read_csv(tmp_path / "pack" / "times.csv").empty
 
 
-def test_what_cannot_be_exported(orchestrator: Command, tmp_path: Path) -> None:
-    (tmp_path / "one.toml").write_text("[grain]\ndiameter = 1e-3\n")
-    ended = orchestrator("study", "one.toml", "--tolerance", "0.1", "--out", "tolerant")
-    assert ended.returncode == 0, ended.stderr
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "thesis.tex").write_text("\\end")
-    for arguments, words in (
-        (("new", "--level", "3"), ("--level", "--from")),
-        (("mine",), ("thesis.tex", "not a benchmark pack")),
-        (("new", "--from", "mine"), ("no study",)),
-        (("new", "--from", "tolerant"), ("tolerance of 0.1", "without it")),
-    ):
-        ended = orchestrator("benchmark", "export", *arguments)
-        assert ended.returncode == 2
-        assert "Traceback" not in ended.stderr
-        assert all(word in ended.stderr for word in words), ended.stderr
-    assert (tmp_path / "mine" / "thesis.tex").is_file()
-
-
 @pytest.mark.parametrize(
-    "fields", ['bed.packing = "poured"\nbed.width = 5.0', "protocol.update = 0.1"]
+    ("fields", "named"),
+    [
+        ('bed.packing = "poured"\nbed.width = 5.0', "bed.width"),
+        ("protocol.update = 0.1", "protocol.update"),
+        ("", "the study is not finished"),
+    ],
 )
-def test_beds_that_no_pack_holds_are_refused(fields: str, tmp_path: Path) -> None:
+def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> None:
     text = f'grain.diameter = 1e-3\nbed.kind = "pile"\nbed.slope_deg = 20.0\n{fields}\n'
     text += 'protocol.method = "dem"\nflow.first_cell_height = 1e-3\n'
-    space = Workspace(tmp_path)
     with claimed(tmp_path, STUDY, "held"):
-        space.describe(STUDY, "held", [], study=text, tolerance=None)
-    with pytest.raises(InputError, match=r"bed\.width|protocol\.update"):
+        Workspace(tmp_path).describe(STUDY, "held", [], study=text, tolerance=None)
+    with pytest.raises(InputError, match=re.escape(named)):
         export(tmp_path / "pack", tmp_path, ())
+    with pytest.raises(InputError, match=r"level 3 needs .*--from"):
+        export(tmp_path / "pack", None, (3,))
+    (tmp_path / "thesis.tex").write_text("\\end")
+    with pytest.raises(InputError, match="holds the study"):
+        export(tmp_path, None, ())
 
 
 @pytest.fixture
@@ -274,19 +260,6 @@ def copy(all_levels: Path, tmp_path: Path) -> Path:
     root = tmp_path / "pack"
     shutil.copytree(all_levels, root)
     return root
-
-
-@pytest.mark.parametrize("harm", ["changed", "removed", "added"])
-def test_a_pack_that_was_touched_is_refused(copy: Path, harm: str) -> None:
-    victim = copy / "scenes" / "2-incline-20" / "scene.json"
-    if harm == "changed":
-        victim.write_text(victim.read_text().replace("20.0", "21.0"))
-    elif harm == "removed":
-        victim.unlink()
-    else:
-        victim.with_name("more.csv").write_text("1\n")
-    with pytest.raises(InputError, match=r"scenes/2-incline-20/.*the pack is not used"):
-        pack.read(copy)
 
 
 def _seal(root: Path) -> None:
@@ -347,28 +320,22 @@ def _study(root: Path, text: str) -> None:
 
 
 INCLINE = "scenes/2-incline-20"
+TOUCHED = ("changed", "removed", "added")
 HARMS: dict[str, Callable[[Path], object]] = {
     **{
         f"a scene {name!r}": functools.partial(_rename, name=name)
         for name in ("../../evil", "/tmp/evil", "2-a/b", "2-é", "2-$\\frac$", "2-a\n")
     },
+    "changed": lambda root: _edit(root / INCLINE / "scene.json", d_m=2e-3),
+    "removed": lambda root: (root / INCLINE / "ask.csv").unlink(),
+    "added": lambda root: (root / INCLINE / "more.csv").write_text("1\n"),
     "no JSON": lambda root: (root / INCLINE / "scene.json").write_bytes(b"\xff\xfe{"),
-    "a bomb": lambda root: (root / INCLINE / "scene.json").write_text('{"a":' * 100_000),
-    "a list": lambda root: (root / INCLINE / "scene.json").write_text("[1]"),
     "another level": lambda root: _edit(root / INCLINE / "scene.json", level=3),
-    "another kind": lambda root: _edit(root / INCLINE / "scene.json", kind="pile"),
-    "another scene": lambda root: _edit(root / INCLINE / "scene.json", scene="2-incline-5"),
-    "null": lambda root: _edit(root / INCLINE / "scene.json", d_m=None),
     "NaN": lambda root: _edit(root / INCLINE / "scene.json", d_m=float("nan")),
     "no at": lambda root: (root / "expected.csv").write_text("scene,quantity\n"),
-    "a value of words": lambda root: _line(root, 3, "many"),
-    "no value": lambda root: _line(root, 3, ""),
     "a value of 1e999": lambda root: _line(root, 3, "1e999"),
     "low above high": lambda root: _line(root, 4, "1e6"),
-    "a tolerance of -1": lambda root: _line(root, 6, "-1"),
-    "an at of words": lambda root: _line(root, 2, "here"),
     "a strange quantity": lambda root: _line(root, 1, "=cmd()"),
-    "another's scene": lambda root: _line(root, 0, "2-none"),
     # what would pass any answer
     "no tolerance": lambda root: _unjudged(root, ""),
     "a tolerance of 10": lambda root: _unjudged(root, "10"),
@@ -385,18 +352,15 @@ HARMS: dict[str, Callable[[Path], object]] = {
         (root / INCLINE).rename(root.parent / "away")
     ),
     "a pipe": lambda root: _replace(root / INCLINE / "ask.csv", os.mkfifo),
-    "a directory for a table": lambda root: _replace(root / "expected.csv", Path.mkdir),
     "a program": lambda root: (root / INCLINE / "solver.py").write_text("1\n"),
     "a scene that is not listed": lambda root: shutil.copytree(root / INCLINE, root / "scenes/2-b"),
     "a scene that is not there": lambda root: shutil.rmtree(root / INCLINE),
     "more in the manifest": lambda root: _edit(root / pack.MANIFEST, more=1),
     "another schema": lambda root: _edit(root / pack.MANIFEST, schema=1),
     # files outside of the pack
-    "a study that is none": lambda root: (root / "study.toml").write_text("[[["),
     "bytes for a study": lambda root: (root / "study.toml").write_bytes(b"\xff\xfe\x00"),
     "a study of a file": lambda root: _study(root, 'bed = { profile = "/etc/passwd" }\n'),
     "a study of a sieve": lambda root: _study(root, 'group = [{ grain.sizes = "/etc/passwd" }]\n'),
-    "a study of another": lambda root: (root / "study.toml").write_text("title = 'mine'\n"),
 }
 
 
@@ -406,7 +370,8 @@ def test_a_hostile_pack_is_refused_by_one_line(
 ) -> None:
     monkeypatch.chdir(copy.parent)
     HARMS[name](copy)
-    _seal(copy)
+    if name not in TOUCHED:
+        _seal(copy)
     before = {path for path in copy.parent.rglob("*") if "results" not in path.parts}
     code = cli.main(["benchmark", "run", "pack", "--scene", "2-*", "--solver", "true {case} {out}"])
     printed = capsys.readouterr().err
@@ -416,38 +381,3 @@ def test_a_hostile_pack_is_refused_by_one_line(
     assert len(line) < 1500
     assert "root:" not in line
     assert {p for p in copy.parent.rglob("*") if "results" not in p.parts} == before
-
-
-VALUES = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner),
-    max_leaves=5,
-)
-CELLS = st.text(max_size=20) | st.floats().map(str) | st.sampled_from(["", '"', "1e999", "0x1"])
-
-
-@settings(
-    max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(data=st.data())
-def test_any_pack_is_read_or_refused(copy: Path, data: st.DataObject) -> None:
-    folder = min((copy / "scenes").glob(data.draw(st.sampled_from(["1-*", "2-*", "4-*", "5-*"]))))
-    paths = [folder / "scene.json", copy / "expected.csv", copy / pack.MANIFEST]
-    path = data.draw(st.sampled_from(paths))
-    text = path.read_text()
-    if path.suffix == ".json":
-        before = json.loads(text)
-        keys = st.sampled_from([*before]) | st.text(max_size=9)
-        changed = json.dumps(before | data.draw(st.dictionaries(keys, VALUES, min_size=1)))
-    else:
-        lines = [line.split(",") for line in text.splitlines()]
-        row = lines[data.draw(st.integers(0, len(lines) - 1))]
-        row[data.draw(st.integers(0, len(row) - 1))] = data.draw(CELLS)
-        changed = "\n".join(map(",".join, lines)).encode(errors="replace").decode()
-    path.write_text(changed)
-    if path.name != pack.MANIFEST:
-        _seal(copy)
-    with contextlib.suppress(InputError):
-        pack.read(copy)
-    path.write_text(text)
-    _seal(copy)
