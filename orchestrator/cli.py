@@ -6,7 +6,7 @@ import re
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,45 +68,39 @@ def _parser() -> Parser:
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
 
-    def add(name: str, run: Callable[[Namespace], int], text: str) -> Parser:
-        command: Parser = commands.add_parser(name, help=text)
-        command.set_defaults(run=run, command=name)
-        return command
-
-    def add_run(name: str, run: Callable[[Namespace], int], text: str, source: str = "") -> Parser:
-        command = add(name, run, text)
-        if source:
-            text = "default: %(default)s"
-            command.add_argument(
-                "source", nargs="?", default=source, metavar="FILE|PRESET", help=text
-            )
-        command.add_argument("--out", type=Path, metavar="DIR", help="default: results/NAME")
-        count, text = os.cpu_count() or 1, "cases at a time"
-        command.add_argument("--workers", type=_workers, default=count, metavar="N", help=text)
-        text = "say what would run, how long and how large, and end"
-        command.add_argument("--plan", action="store_true", help=text)
-        return command
-
-    study = add_run("study", _study, "run what is missing of a study, and draw it", "first-look")
-    text = "relative error that tau_c may have: cheapest models within it; 0: as the file asks"
-    study.add_argument("--tolerance", type=float, metavar="X", help=text)
-    text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
-    study.add_argument("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
-    calculator.add(commands)
-    for name, text in (
-        ("status", "what of a study is done, running, failed and why"),
-        ("report", "draw tables, figures and page of a study again"),
-        ("gallery", "one page over the studies that a directory holds"),
-        ("prune", "drop the large files of finished cases; a rerun makes them anew"),
+    for name, run, text in (
+        ("study", _study, "run what is missing of a study, and draw it"),
+        ("status", _on_directory, "what of a study is done, running, failed and why"),
+        ("report", _on_directory, "draw tables, figures and page of a study again"),
+        ("gallery", _on_directory, "one page over the studies that a directory holds"),
+        ("prune", _on_directory, "drop the large files of finished cases; a rerun makes them anew"),
+        ("ladder", _experiment, "what each model costs and how far it is off"),
+        ("budget", _experiment, "what the choices are worth that all models share"),
+        ("stability", _experiment, "maps of where each method fails"),
+        ("doctor", _doctor, "are the solvers here, can it draw; what to install"),
     ):
-        add(name, _on_directory, text).add_argument("directory", type=Path, metavar="DIR")
-    text = "what each model costs and how far it is off: speed against accuracy"
-    add_run("ladder", _experiment, text, "ladder")
-    text = "what the choices are worth that all models share: a tornado for each scene"
-    add_run("budget", _experiment, text, "budget")
-    add_run("stability", _experiment, "maps of where each method fails")
+        command = commands.add_parser(name, help=text)
+        command.set_defaults(run=run, command=name)
+        add = command.add_argument
+        if run == _on_directory:
+            add("directory", type=Path, metavar="DIR")
+        if run in (_study, _experiment):
+            if name != "stability":
+                default = "first-look" if name == "study" else name
+                text = f"default: {default}"
+                add("source", nargs="?", default=default, metavar="FILE|PRESET", help=text)
+            count = os.cpu_count() or 1
+            add("--out", type=Path, metavar="DIR", help="default: results/NAME")
+            add("--workers", type=_workers, default=count, metavar="N", help="cases at a time")
+            text = "say what would run, how long and how large, and end"
+            add("--plan", action="store_true", help=text)
+        if run == _study:
+            text = "error that tau_c may have: the cheapest models within it; 0: as the file asks"
+            add("--tolerance", type=float, metavar="X", help=text)
+            text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
+            add("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
+            calculator.add(commands)
     benchmark.add(commands)
-    add("doctor", _doctor, "are the solvers here, can it draw; what to install")
     return parser
 
 
