@@ -10,6 +10,7 @@ from tests.cluster.conftest import Start
 from tests.cluster.slurm import Slurm, until
 from tests.faults.bench import ORCHESTRATOR, ROOT, processes_in, tables
 
+Bytes = dict[str, bytes]
 ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--workers", "2")
 
 
@@ -25,9 +26,7 @@ def _end(driver: "subprocess.Popen[str]") -> None:
     assert "Traceback" not in said, said
 
 
-def test_two_nodes_give_the_bytes_of_one_machine(
-    start: Start, queue: Slurm, tmp_path: Path, local_tables: dict[str, bytes]
-) -> None:
+def test_two_nodes(start: Start, queue: Slurm, tmp_path: Path, local_tables: Bytes) -> None:
     _end(start(*ON_SLURM))
     assert tables(tmp_path / "out") == local_tables
     logs = "".join(path.read_text() for path in (tmp_path / "out" / "jobs").glob("*.err"))
@@ -37,9 +36,7 @@ def test_two_nodes_give_the_bytes_of_one_machine(
     until(lambda: not queue.jobs(), "the end of the jobs")
 
 
-def test_a_cancelled_job_is_made_up_for(
-    start: Start, queue: Slurm, tmp_path: Path, local_tables: dict[str, bytes]
-) -> None:
+def test_a_cancelled_job(start: Start, queue: Slurm, tmp_path: Path, local_tables: Bytes) -> None:
     cases = tmp_path / "out" / "cases"
     driver = start(*ON_SLURM)
     until(lambda: _at_work(cases), "a solver")
@@ -50,9 +47,7 @@ def test_a_cancelled_job_is_made_up_for(
     assert not processes_in(cases)
 
 
-def test_a_killed_driver_is_continued(
-    start: Start, tmp_path: Path, local_tables: dict[str, bytes]
-) -> None:
+def test_a_killed_driver(start: Start, tmp_path: Path, local_tables: Bytes) -> None:
     cases = tmp_path / "out" / "cases"
     driver = start(*ON_SLURM)
     until(lambda: list(cases.glob("pile-*/done.json")) and _at_work(cases), "a second solver")
@@ -75,9 +70,7 @@ def _refused(driver: "subprocess.Popen[str]", *words: str) -> None:
         assert word in lines[0]
 
 
-def test_a_directory_may_have_any_name(
-    start: Start, tmp_path: Path, local_tables: dict[str, bytes]
-) -> None:
+def test_a_directory_of_any_name(start: Start, tmp_path: Path, local_tables: Bytes) -> None:
     name, study = "it's a pâth of $HOME", tmp_path / "small.toml"
     command = ("study", "small.toml", "--out", name, *ON_SLURM[4:])
     _refused(start(*command), "cluster.log_directory", "'$'")
@@ -95,7 +88,7 @@ def test_a_directory_may_have_any_name(
         ('interface = "none0"', ["none0", "[cluster]"]),
     ],
 )
-def test_settings_that_make_no_jobs_are_refused(
+def test_settings_without_jobs(
     start: Start, tmp_path: Path, settings: str, words: list[str]
 ) -> None:
     path = tmp_path / "small.toml"

@@ -161,9 +161,7 @@ def test_files_of_others_in_every_directory(pile: Bench, outside: Path, command:
 @pytest.mark.parametrize(
     "place", ["tables", "cases", "tables/scenes.csv", "report.html", "study.json", ".lock", RECORD]
 )
-def test_links_out_of_a_study_are_refused(
-    finished: Bench, outside: Path, command: Command, place: str
-) -> None:
+def test_links_are_refused(finished: Bench, outside: Path, command: Command, place: str) -> None:
     path, target = finished.out / place, outside / "moved"
     if path.exists():
         shutil.move(path, target)

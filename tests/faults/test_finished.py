@@ -17,6 +17,8 @@ from orchestrator.study import study
 from tests.conftest import Mount
 from tests.faults.bench import HEAD, ORCHESTRATOR, PILE, ROOT, Bench, case_of, same_tables
 
+Capsys = pytest.CaptureFixture[str]
+
 
 def _lose_cases(out: Path) -> None:
     shutil.rmtree(out / "cases")
@@ -31,8 +33,8 @@ def _of_another_version(out: Path) -> None:
 
 
 @pytest.mark.parametrize("lose", [_lose_cases, _of_another_version])
-def test_tables_whose_cases_are_not_here_are_kept(
-    finished: Bench, lose: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+def test_tables_without_cases(
+    finished: Bench, lose: Callable[[Path], None], capsys: Capsys
 ) -> None:
     lose(finished.out)
     before = {path: path.read_bytes() for path in finished.out.rglob("*") if path.is_file()}
@@ -46,9 +48,7 @@ def _size(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
-def test_a_pruned_study_is_finished_and_its_page_is_the_same(
-    pile: Bench, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pruned_study_stays_finished(pile: Bench, capsys: Capsys) -> None:
     shutil.copytree(pile.undisturbed, pile.out)
     (cells,) = case_of(pile.out, "cells")
     assert cli.main(["status", str(pile.out)]) == 0
@@ -112,9 +112,7 @@ def test_a_marker_vouches_for_its_own_case_alone(finished: Bench) -> None:
     finished.check_finished()
 
 
-def test_two_files_of_one_name_do_not_share_a_directory(
-    finished: Bench, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_files_of_one_name(finished: Bench, capsys: Capsys) -> None:
     other = finished.folder / "b" / "small.toml"
     other.parent.mkdir()
     other.write_text(finished.source.read_text().replace("7e-4", "8e-4"))

@@ -87,7 +87,7 @@ NOHUP = ("nohup",)
         ([TERM, INT, signal.SIGXCPU], NOHUP),
     ],
 )
-def test_a_driver_that_is_ended_at_each_stage_in_turn(
+def test_an_ended_driver(
     pile: Bench, numbers: list[signal.Signals], under: tuple[str, ...]
 ) -> None:
     for number, stage in zip(itertools.cycle(numbers), STAGES, strict=False):

@@ -32,9 +32,7 @@ def test_a_full_disk(pile: Bench, disk: Mount, size: str) -> None:
     pile.check_finished()
 
 
-def test_a_disk_that_no_file_may_be_run_on_and_that_can_then_only_be_read(
-    pile: Bench, disk: Mount
-) -> None:
+def test_a_disk_without_rights_to_run_or_write(pile: Bench, disk: Mount) -> None:
     (disk("noexec,nosuid,nodev,size=100M") / "out").mkdir()
     pile.out.symlink_to(pile.folder / "disk" / "out")
     pile.check_finished()

@@ -146,9 +146,7 @@ def test_study_files_of_any_bytes(shell: Shell, content: bytes) -> None:
     length=st.integers(0, 30),
     text=st.text("[]{}=\"'.,#\n\\ae0-_", max_size=10),
 )
-def test_study_files_that_were_cut_or_mixed_up(
-    shell: Shell, at: int, length: int, text: str
-) -> None:
+def test_study_files_mixed_up(shell: Shell, at: int, length: int, text: str) -> None:
     shell.refuses(VALID[:at] + text + VALID[at + length :])
 
 
@@ -183,7 +181,7 @@ STATE = JSON | st.dictionaries(st.sampled_from(KEYS), JSON)
 
 @QUICK
 @given(about=STATE, identity=STATE, done=STATE, failed=STATE)
-def test_directories_with_any_state(
+def test_any_state(
     shell: Shell, about: object, identity: object, done: object, failed: object
 ) -> None:
     root = shell.folder / "out"

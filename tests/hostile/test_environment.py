@@ -49,9 +49,7 @@ def _drawn(out: Path) -> dict[str, bytes]:
     ],
     ids=str,
 )
-def test_no_setting_of_matplotlib_changes_a_figure(
-    finished: Path, tmp_path: Path, variables: dict[str, str]
-) -> None:
+def test_settings_of_matplotlib(finished: Path, tmp_path: Path, variables: dict[str, str]) -> None:
     before = _drawn(finished)
     (tmp_path / "rc").mkdir()
     for place in (tmp_path / "rc", tmp_path):

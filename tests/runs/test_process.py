@@ -18,6 +18,8 @@ from orchestrator.solvers import doctor, liggghts, openfoam, programs
 from tests.conftest import Mount
 
 ROOT = Path(__file__).parents[2]
+Put = Callable[[str], Path]
+Patch = pytest.MonkeyPatch
 
 
 def _sh(folder: Path, script: str, **options: object) -> Ended:
@@ -33,7 +35,7 @@ def _has_ended(pid: int) -> bool:
     return False
 
 
-def test_output_exit_code_and_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_output_exit_code_and_environment(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("FIRST", "1")
     monkeypatch.setenv("SECOND", "2")
     script = "echo $FIRST $SECOND $THIRD $PWD; echo err >&2; exit 3"
@@ -53,7 +55,7 @@ FAMILY = "sleep 60 & echo $! >child; trap '' TERM; wait; wait"
         ("sleep 60 & echo $! >child", {}, ""),
     ],
 )
-def test_nothing_that_a_program_started_is_left(
+def test_all_of_a_group_is_ended(
     tmp_path: Path, script: str, options: dict[str, float], over: str
 ) -> None:
     assert _sh(tmp_path, script, **options).over == over
@@ -66,9 +68,7 @@ def test_a_file_may_not_grow_beyond_its_limit(tmp_path: Path) -> None:
     assert (tmp_path / "file").stat().st_size <= 100_000
 
 
-def test_a_program_that_goes_on_while_the_disk_is_full_is_ended(
-    disk: Mount, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_ends_a_program(disk: Mount, monkeypatch: Patch) -> None:
     monkeypatch.setattr(process, "DISK_S", 0.2)
     script = "head -c 10000000 /dev/zero >file; while :; do sleep 0.1; done"
     assert _sh(disk("size=1M"), script).over == "disk"
@@ -103,9 +103,7 @@ def test_a_killed_driver_leaves_nothing_at_work(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("script", "runs"), [("kill -KILL $$", 3), ("exit 143", 3), ("kill -SEGV $$", 1), ("exit 1", 1)]
 )
-def test_a_program_that_is_killed_from_outside_runs_again(
-    tmp_path: Path, script: str, runs: int
-) -> None:
+def test_a_killed_program_runs_again(tmp_path: Path, script: str, runs: int) -> None:
     _sh(tmp_path, f"echo >>runs; {script}", tries=process.TRIES)
     assert len((tmp_path / "runs").read_text()) == runs
 
@@ -136,7 +134,7 @@ def name(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture
-def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+def put(tmp_path: Path, name: str, monkeypatch: Patch) -> Put:
     """Put a program of a name in front of the real one."""
 
     def put(script: str) -> Path:
@@ -150,26 +148,20 @@ def put(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> Callable[
 
 
 @pytest.mark.parametrize("script", ANSWERS)
-def test_a_version_is_read_whatever_else_is_printed(
-    put: Callable[[str], Path], name: str, script: str
-) -> None:
+def test_a_version_among_other_output(put: Put, name: str, script: str) -> None:
     put(script.format(stated=STATED[name]))
     assert VERSIONS[name]() in STATED[name]
 
 
 @pytest.mark.parametrize("script", REFUSALS)
-def test_a_program_without_a_version_is_refused_with_its_words(
-    put: Callable[[str], Path], name: str, script: str
-) -> None:
+def test_no_version_is_refused(put: Put, name: str, script: str) -> None:
     path = put(script)
     with pytest.raises(SolverError, match=REFUSALS[script]) as caught:
         VERSIONS[name]()
     assert str(caught.value).startswith(str(path))
 
 
-def test_a_program_that_does_not_answer_is_killed(
-    put: Callable[[str], Path], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_answer(put: Put, name: str, tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setattr(programs, "QUERY_S", 0.5)
     put(f"cd {tmp_path}; {FAMILY}")
     with pytest.raises(SolverError, match=r"did not end within 0\.5 s"):
@@ -177,9 +169,7 @@ def test_a_program_that_does_not_answer_is_killed(
     assert _has_ended(int((tmp_path / "child").read_text()))
 
 
-def test_the_environment_of_another_openfoam_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_home_of_another_openfoam(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("WM_PROJECT_DIR", str(tmp_path))
     with pytest.raises(SolverError, match=f"WM_PROJECT_DIR={tmp_path} .*unset WM_PROJECT_DIR"):
         VERSIONS["simpleFoam"]()
@@ -187,7 +177,7 @@ def test_the_environment_of_another_openfoam_is_named(
     assert VERSIONS["simpleFoam"]() in openfoam.TRIED
 
 
-def test_the_doctor_names_a_solver_that_is_broken(put: Callable[[str], Path], name: str) -> None:
+def test_the_doctor_names_a_solver_that_is_broken(put: Put, name: str) -> None:
     put("exit 1")
     openfoam.version.cache_clear()
     liggghts.version.cache_clear()
