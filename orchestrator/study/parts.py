@@ -30,15 +30,22 @@ else:
     ShapeName = Literal[tuple(SHAPES)]
 Range = Annotated[tuple[float, float], List]
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
+Update = Annotated[float, Field(ge=0, le=0.5)]
 File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
 BEDS = {
     "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
     "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
 }
+LAW_LABELS = {"paper": "Eq. 2 or Eq. 4 where each holds, both in the transition"}
+LAW_LABELS |= {name: law.label for name, law in LAWS.items()}
+COUNTED = {"windward": "on sides that rise", "all": "all"}
+SHAPE_MEANINGS = {name: shape.meaning for name, shape in SHAPES.items()}
 LEVEL = 4.0  # length of level bed with grains, over the height
 LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
 
 _pile = partial(field, scope="piles")
+_answer = partial(field, scope="piles", about="answer")
+_dune = partial(field, scope="dunes", since=True)
 _poured = partial(field, scope="poured beds")
 _solved = partial(field, scope="solved flows", about="answer")
 _dem = partial(field, scope="DEM", about="answer")
@@ -95,15 +102,7 @@ class Grain(Part):
 class Forces(Part):
     """How the grains feel the flow."""
 
-    law: str = field(
-        "bridged",
-        label="force law",
-        column="force_law",
-        choices={
-            "paper": "Eq. 2 or Eq. 4 where each holds, both in the transition",
-            **{name: law.label for name, law in LAWS.items()},
-        },
-    )
+    law: str = field("bridged", label="force law", column="force_law", choices=LAW_LABELS)
     """drag and lift on an exposed grain"""
     # from none to sixty times Saffman's
     lift_coefficient: float = field(LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100)
@@ -136,8 +135,8 @@ class Forces(Part):
     @field_validator("law")
     @classmethod
     def _is_in_registry(cls, value: str) -> str:
-        if value not in ("paper", *LAWS):
-            known = f"known: {', '.join(('paper', *LAWS))}"
+        if value not in LAW_LABELS:
+            known = f"known: {', '.join(LAW_LABELS)}"
             raise UnfitError("forces.law", f"unknown force law {value!r}", known)
         return value
 
@@ -164,15 +163,8 @@ class Protocol(Part):
     """fractions of the exposed grains at which the thresholds of a pile are reported"""
     time_step: float = _dem(0.2, unit="√(m/K)", ge=1e-3, le=2)
     """time step of the grains' integration"""
-    update: float = field(
-        0.0,
-        "",
-        "of N",
-        label="update of the bed",
-        scope="DEM and peeling of piles",
-        since=True,
-        ge=0,
-        le=0.5,
+    update: Update = field(
+        0.0, "", "of N", label="update of the bed", scope="DEM and peeling of piles", since=True
     )
     """part of the counted grains after which the bed line is drawn anew through the grains that are
     there, and the flow solved over it, until the last of the fractions; 0 keeps the flow of the
@@ -189,11 +181,10 @@ class Protocol(Part):
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
-    model: Literal["solve", "waves", "hill", "flat"] = _pile(
+    model: Literal["solve", "waves", "hill", "flat"] = _answer(
         "solve",
         label="flow model",
         column="flow_model",
-        about="answer",
         choices=[
             "OpenFOAM",
             "linear theory with A and B of each wavelength (Fourrière et al. 2010)",
@@ -222,13 +213,12 @@ class Flow(Part):
     expansion_ratio: float = _solved(1.1, ge=1.01, le=2)
     """ratio of neighbouring cells up from the bed and away from the pile, with 40 cells along a
     face; it follows their number"""
-    roughness: Roughness | None = _pile(
+    roughness: Roughness | None = _answer(
         None,
         "z_0",
         "m",
         "solve_z0_m",
         label="roughness length of the solve",
-        about="answer",
         read="solve_roughness",
     )
     """roughness length at which the flow is found, for beds of nearly the same one to share it; by
@@ -324,25 +314,16 @@ class PileBed(Bed):
     height: Height = _pile(0.02, "h", "m", "h_m")
     """height of the forms that the flow goes over; that of a profile follows from it, and over a
     flat bed with obstacles the flow is measured in the height of the tallest"""
-    shape: ShapeName = _pile(
-        "triangle",
-        column="bed_shape",
-        since=True,
-        choices={name: shape.meaning for name, shape in SHAPES.items()},
-    )
+    shape: ShapeName = _pile("triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS)
     """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
-    windward: Literal["straight", "curved"] = field(
-        "straight",
-        label="windward side",
-        scope="dunes",
-        since=True,
-        choices=["one slope", "half a wave of a cosine"],
+    windward: Literal["straight", "curved"] = _dune(
+        "straight", label="windward side", choices=["one slope", "half a wave of a cosine"]
     )
     """windward side of a dune"""
     lee_slope_deg: float | None = _pile(None, unit="°", since=True, gt=0, le=60)
     """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
     dune and a step down"""
-    brink_radius: float = field(0.0, "", "m", scope="dunes", since=True, ge=0, le=1e3)
+    brink_radius: float = _dune(0.0, "", "m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
     length: Length | None = field(None, "", "m", scope="beds with level parts", since=True)
     """length of level bed with grains: of a trapezoid's top, of a flat bed, before or behind a
@@ -360,10 +341,7 @@ class PileBed(Bed):
     """fences, blocks and half-cylinders on the bed, which carry no grains: tables with `kind`, `x`,
     `height` and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
-        None,
-        label="counted grains",
-        since=True,
-        choices={"windward": "on sides that rise", "all": "all"},
+        None, label="counted grains", since=True, choices=COUNTED
     )
     """exposed grains that are counted, or the range of x in which; by default those of windward
     sides, all of a flat bed, a step down and a profile"""
@@ -391,7 +369,7 @@ class PileBed(Bed):
     seed: int = field(0, scope="random beds and replicas", about="replica", ge=0, le=10**9)
     """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
     replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
-    mobile_layers: int = _pile(2, about="answer", ge=1, le=1000)
+    mobile_layers: int = _answer(2, ge=1, le=1000)
     """layers of the windward face that may move; below them the grains are fixed"""
 
     @property
