@@ -52,9 +52,9 @@ SAMPLING_INTERVAL = 0.5
 """Time between two samples of the grains, sqrt(d/g')."""
 REST_ENERGY = 1e-6
 """Kinetic energy of all mobile grains that have not passed the displacement criterion, W d, below
-which a load step ends, if it falls. On 25 of 26 lattices (3098 grains) the thresholds at 10 to 70 %
-are those of the waiting time alone; on a disordered one they move at any such energy, for there
-round-off decides. Of 1079 single grains none moves in another load step."""
+which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie in the same load step
+as with the waiting time alone, 23 in one beside it, 15 further off: most on level and disordered
+rows, where round-off decides. Of 1079 single grains none moves in another load step."""
 SETTLE = 10.0
 """Time in which the bed settles before the first load step, sqrt(d/g')."""
 POURED_DRAG = 2.0
