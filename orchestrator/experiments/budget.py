@@ -27,20 +27,11 @@ from orchestrator.experiments.experiment import (
     figure,
     label,
     piles,
-    texts,
 )
 from orchestrator.fidelity import calibration, limits
 from orchestrator.fidelity.calibration import FROZEN
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import (
-    AS_ASKED,
-    PEELING,
-    Fields,
-    Pair,
-    changed,
-    level,
-    value_of,
-)
+from orchestrator.fidelity.levels import AS_ASKED, PEELING, Fields, Pair, changed, level, value_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile import line as bed_line
 from orchestrator.grains.threshold import PileThreshold
@@ -165,8 +156,9 @@ def experiment(study: Study, out: Path) -> Experiment:
 
     def tables(runs: Runs) -> Tables:
         moved = measure(listed, runs)
-        shared = shares(moved)
-        return {"changes": moved, "shares": shared, "budget": known(shared)}
+        if moved.empty:
+            return {"changes": moved}
+        return {"changes": moved, "shares": (shared := shares(moved)), "budget": known(shared)}
 
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
     failing = {run.name for change in listed for run in planned.piles[change.base].runs}
@@ -222,7 +214,7 @@ def known(shared: pd.DataFrame) -> pd.DataFrame:
 
 def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]:
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
-    words, of = texts("budget"), runs.planned.piles
+    words, of = TEXTS["budget"], runs.planned.piles
     moved, shared = tables["changes"], tables["shares"]
     rows, tornados = [], []
     for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,9 @@ from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
 Tables = Mapping[str, pd.DataFrame]
+_FILE = Path(__file__).with_name("texts.toml")
+TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+"""The texts of the pages, by experiment and by what they are about."""
 
 
 @dataclass(frozen=True)
@@ -103,13 +105,6 @@ def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:
         what = f"there is no pile{' that is answered by DEM and is not poured' * by_dem}"
         raise InputError(what, where=study.name, remedy='give a group `bed.kind = "pile"`')
     return chosen
-
-
-@cache
-def texts(name: str) -> dict[str, str]:
-    """The texts of the page of an experiment, by what they are about."""
-    file = Path(__file__).with_name("texts.toml")
-    return dict(tomllib.loads(file.read_text(encoding="utf-8"))[name])
 
 
 def figure(name: str, title: str, canvas: Any, caption: str = "") -> Figure:

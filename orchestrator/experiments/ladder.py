@@ -34,7 +34,6 @@ from orchestrator.experiments.experiment import (
     figure,
     label,
     piles,
-    texts,
 )
 from orchestrator.fidelity import calibration, limits
 from orchestrator.fidelity.decision import Decision, as_asked, on_levels
@@ -103,7 +102,8 @@ def experiment(study: Study, out: Path) -> Experiment:
 
     def tables(runs: Runs) -> Tables:
         measured = points(pairs, runs)
-        compared = errors(measured)
+        if measured.empty or (compared := errors(measured)).empty:
+            return {"points": measured.iloc[:0]}
         front = together(compared)[["packing", *LEVEL_PAIR, "pareto"]]
         fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
         return {
@@ -252,18 +252,19 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     ):
         for scene_class, alike in table.groupby(f"class_{part}"):
             levels = {key: rows.set_index("scene_id") for key, rows in alike.groupby(name)}
-            for key, one in levels.items() if best in levels else ():
-                for column in one.filter(regex="^tau_"):
-                    base = levels[best][column]
-                    # a finer flow is run on small piles alone, other grains on every pile
-                    unsure = 0.0 if part == "flow" else math.inf
-                    row: Row = {"part": part, "level": key, "scene_class": scene_class}
-                    row |= {"fraction": float(str(column)[4:]), "error": _shift(one[column], base)}
-                    row["uncertainty"] = (
-                        _shift(levels[again][column], base) if again in levels else unsure
-                    )
-                    row |= {"cost_core_s": float(one[f"{part}_s"].mean()), "scenes": len(one)}
-                    rows.append(row)
+            if best not in levels:
+                continue
+            base = levels[best].filter(regex="^tau_")
+            # a finer flow is run on small piles alone, other grains on every pile
+            unsure = dict.fromkeys(base, 0.0 if part == "flow" else math.inf)
+            if again in levels:
+                unsure = {tau: _shift(levels[again][tau], base[tau]) for tau in base}
+            for key, one in levels.items():
+                row = {"part": part, "level": key, "scene_class": scene_class}
+                means = {"cost_core_s": float(one[f"{part}_s"].mean()), "scenes": len(one)}
+                for tau in base:
+                    error = {"error": _shift(one[tau], base[tau]), "uncertainty": unsure[tau]}
+                    rows.append({**row, "fraction": float(str(tau)[4:]), **error, **means})
     return pd.DataFrame(rows).sort_values(["part", "level", "scene_class", "fraction"])
 
 
@@ -312,7 +313,7 @@ def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
 
 
 def _sections(tables: Tables, runs: Runs) -> list[Section]:
-    words, pairs = texts("ladder"), together(tables["points"])
+    words, pairs = TEXTS["ladder"], together(tables["points"])
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
     heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
     means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))

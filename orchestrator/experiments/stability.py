@@ -19,7 +19,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
-from orchestrator.experiments.experiment import Experiment, Runs, Tables, figure, texts
+from orchestrator.experiments.experiment import TEXTS, Experiment, Runs, Tables, figure
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
@@ -128,7 +128,7 @@ def experiment(out: Path) -> Experiment:
     def sections(tables: Tables, runs: Runs) -> list[Section]:
         table = tables["maps"]
         sheet = figure("maps", TITLE, draw(maps, table))
-        sections = [Section("All maps", texts("stability")["maps"], (sheet,))]
+        sections = [Section("All maps", TEXTS["stability"]["maps"], (sheet,))]
         for one in maps:
             title, question = one.data["title"], one.data["question"]
             drawn = figure(f"map-{one.name}", title, draw([one], table))

@@ -18,8 +18,7 @@ from orchestrator.fidelity import calibration
 from orchestrator.fidelity.calibration import UNKNOWN, Known
 from orchestrator.fidelity.levels import (
     FLAT,
-    FLOW,
-    GRAINS,
+    LEVELS,
     PEELING,
     Level,
     Pair,
@@ -66,8 +65,8 @@ class Decision:
     @property
     def is_unchecked(self) -> bool:
         """Whether it is a pile that the tool chose to answer without DEM."""
-        method = self.scene.protocol.method
-        return self.levels is not None and not self.is_as_asked and method != "dem"
+        by_dem = self.scene.protocol.method == "dem"
+        return not (self.levels is None or self.is_as_asked or by_dem)
 
 
 class Bound(NamedTuple):
@@ -143,8 +142,9 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
         return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
     if name := calibration.unmeasured(scene):
         return (), f"no error is known for {name}: as the study asks"
-    levels = (tuple(level for level in part if level.takes(scene)) for part in (FLOW, GRAINS))
-    pairs, why = _good_enough(*levels, *calibration.scene_classes(scene), above, tolerance)
+    levels = (tuple(level for level in part if level.takes(scene)) for part in LEVELS.values())
+    classes = (calibration.classes(part, scene) for part in LEVELS)
+    pairs, why = _good_enough(*levels, *classes, above, tolerance)
     return pairs, f"{why}; {above.because}" if above.because else why
 
 

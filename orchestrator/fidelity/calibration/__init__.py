@@ -172,12 +172,7 @@ def known(pair: Pair, scene: Scene) -> Known:
                 x for x in reversed(part) if x.same_model and x.describes(scene, or_finer=True)
             )
             levels[place] = next(coarser, AS_ASKED)
-    return known_of_classes(*levels, *scene_classes(scene))
-
-
-def scene_classes(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The classes of a pile for the flow and for the grains."""
-    return classes("flow", scene), classes("grains", scene)
+    return known_of_classes(*levels, classes("flow", scene), classes("grains", scene))
 
 
 @cache  # a study has thousands of scenes of a few classes
