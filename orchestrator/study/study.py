@@ -54,8 +54,8 @@ Table = dict[str, Any]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
 
-class _Group(Part):
-    """The keys of a ``[[group]]``; its tables are validated scene by scene."""
+class _Tables(Part):
+    """The tables of a file or of a group, which are validated scene by scene."""
 
     fluid: Table = Field(default={})
     grain: Table = Field(default={})
@@ -65,10 +65,15 @@ class _Group(Part):
     protocol: Table = Field(default={})
     axes: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default={})
     seeds: int | None = Field(default=None, ge=0, le=1000)
+
+
+class _Group(_Tables):
+    """The keys of a ``[[group]]``."""
+
     name: str = ""
 
 
-class _File(_Group):
+class _File(_Tables):
     """The keys of a study file; a time limit is at most three years, s."""
 
     title: str = ""

@@ -119,6 +119,7 @@ BAD = [
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
     (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "bridged, "),
     ("[protocol]\ngravity = 3.7\n", "protocol.gravity", "did you mean fluid.gravity?"),
+    (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
     ("[fluid]\nslope = 3.7\n", "fluid.slope", "did you mean bed.slope_deg?"),
     ("[fluid]\ntolerance = 0.1\n", "fluid.tolerance", "tolerance, above the first table"),
