@@ -14,7 +14,7 @@ import numpy as np
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow.foam import SolvedFlow, start_from, write_poly_mesh
-from orchestrator.flow.mesh import NEAR, Grid, along, extended, growth_far, write_mesh
+from orchestrator.flow.mesh import NEAR, Grid, along, extended, growth_far, made_by_gmsh
 from orchestrator.flow.stress import WallStress, diagnostics
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, log_law_ustar
@@ -233,7 +233,7 @@ class FlowCase(Case):
             (directory / "profile.csv").write_text(self.profile.text, encoding="utf-8")
         types = {**PATCHES, "inlet": PATCHES["inlet"].format(-h)}
         types |= {"lid": "wall"} if closed else {}
-        middles = write_poly_mesh(write_mesh(directory), directory, types)
+        middles = write_poly_mesh(made_by_gmsh(directory), directory, types)
         x, z = middles[:, 0, 0], middles[..., 2]
         # a bed that changes has no flow on half the cells
         starts = [each for each in self.needs if (cases / each.name).is_dir()]

@@ -49,6 +49,12 @@ def read_list(path: Path, after: str = "") -> FloatArray:
     return np.fromstring(numbers, sep=" ").reshape(count, -1)
 
 
+def sides(directory: Path) -> FloatArray:
+    """Corners of the sides of the cells of a case, m, shape (n, 4, 3)."""
+    points, faces = (read_list(directory / f"constant/polyMesh/{n}") for n in ("points", "faces"))
+    return np.asarray(points[faces.astype(int)[:, 1:]])
+
+
 def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
     """Write the ``constant/polyMesh`` of a case from a `meshio.Mesh` of hexahedra one cell thick.
 
@@ -152,8 +158,7 @@ class SolvedFlow:
     @cached_property
     def _mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
         """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells."""
-        folder = self.directory / "constant/polyMesh"
-        corners = read_list(folder / "points")[read_list(folder / "faces").astype(int)[:, 1:]]
+        folder, corners = self.directory / "constant/polyMesh", sides(self.directory)
         files = (folder / name for name in ("owner", "neighbour"))
         owner, neighbour = (read_list(file).astype(int)[:, 0] for file in files)
         # the mean of a hexahedron's corners is that of the means of its sides

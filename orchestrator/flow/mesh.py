@@ -174,8 +174,8 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-def write_mesh(directory: Path) -> Any:
-    """Mesh a case: `pile.geo` with the files that it includes becomes `pile.msh`, binary.
+def made_by_gmsh(directory: Path) -> Any:
+    """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
     Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`.
 
@@ -215,4 +215,6 @@ def write_mesh(directory: Path) -> Any:
             raise SolverError(f"no usable mesh: {error}", where=where, remedy=remedy) from error
         finally:
             gmsh.finalize()
-    return meshio.read(directory / "pile.msh")
+    mesh = meshio.read(directory / "pile.msh")
+    (directory / "pile.msh").unlink()  # OpenFOAM's files hold the same
+    return mesh

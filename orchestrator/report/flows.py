@@ -5,7 +5,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
 
-import meshio
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -17,6 +16,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
 from orchestrator.bed.line import BedLine
+from orchestrator.flow.foam import sides
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, style
 from orchestrator.report.page import caption
@@ -309,11 +309,12 @@ def mesh(results: Results) -> Iterator[Figure]:
 
 def read_edges(case: Path) -> FloatArray:
     """The edges of a mesh one cell deep, seen across the flow: x and z of ends, (E, 2, 2), m."""
-    mesh = meshio.read(case / "pile.msh")
-    quads = mesh.cells_dict["quad"]
-    side = quads[(mesh.points[quads, 1] < mesh.points[:, 1].mean()).all(axis=1)]
-    ends = np.sort(np.stack([side, np.roll(side, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    return np.asarray(mesh.points[np.unique(ends, axis=0)][:, :, [0, 2]])
+    corners = sides(case)
+    front = corners[(corners[..., 1] < corners[..., 1].mean()).all(axis=1)]
+    places = front[..., 0] + 1j * front[..., 2]  # complex numbers have an order
+    ends = np.stack([places, np.roll(places, 1, axis=1)], axis=2).reshape(-1, 2)
+    edges = np.unique(np.sort(ends, axis=1), axis=0)
+    return np.stack([edges.real, edges.imag], axis=2)
 
 
 def where(results: Results) -> Iterator[Figure]:

@@ -13,7 +13,8 @@ from orchestrator.bed.line import between_flats, of_bed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.fidelity import limits
 from orchestrator.flow.case import FlowCase
-from orchestrator.flow.mesh import write_mesh
+from orchestrator.flow.foam import SolvedFlow
+from orchestrator.flow.mesh import made_by_gmsh
 from orchestrator.flow.model import model
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
@@ -45,19 +46,10 @@ def of_study(text: str) -> FlowCase:
 
 
 def first_cells(directory: Path) -> tuple[FloatArray, FloatArray]:
-    """Corners of the bed's faces (x, z) and heights of the cells on them, as another program reads.
-
-    The cells' upper corners lie on the same grid lines.
-    """
-    found = meshio.read(directory / "pile.msh")
-    tag = found.field_data["bed"][0]
-    faces = found.cells_dict["quad"][found.cell_data_dict["gmsh:physical"]["quad"] == tag]
-    hexahedra = found.cells_dict["hexahedron"]
-    on_bed = np.isin(hexahedra, faces)
-    lowest = on_bed.sum(axis=1) == 4
-    z = found.points[hexahedra[lowest], 2]
-    heights = np.where(on_bed[lowest], -z, z).sum(axis=1) / 4
-    corners = np.unique(np.round(found.points[np.unique(faces)][:, [0, 2]], 9), axis=0)
+    """Corners of the bed's faces (x, z), downstream, and mean heights of the cells on them."""
+    faces, cells, middles = SolvedFlow(directory)._mesh
+    heights = 2 * (middles[cells, 2] - faces[..., 2].mean(axis=1))
+    corners = np.unique(np.round(faces.reshape(-1, 3)[:, [0, 2]], 9), axis=0)
     return corners, heights
 
 
@@ -102,8 +94,7 @@ def test_a_thousand_corners_are_meshed(tmp_path: Path) -> None:
 
 def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
     given = meshio.read(template / "pile.msh").points
-    write_mesh(template)
-    np.testing.assert_allclose(meshio.read(template / "pile.msh").points, given, atol=1e-9)
+    np.testing.assert_allclose(made_by_gmsh(template).points, given, atol=1e-9)
     geometry = templates() / "openfoam/pile/pile.geo"
     assert (template / "pile.geo").read_bytes() == geometry.read_bytes()
 
@@ -134,7 +125,7 @@ def test_a_mesh_that_is_no_such_mesh(
 ) -> None:
     edit(template / file, old, new)
     with pytest.raises(SolverError, match=rf"pile\.msh: .*{cause}"):
-        write_mesh(template)
+        made_by_gmsh(template)
 
 
 def test_a_gentle_profile_has_a_mesh(tmp_path: Path) -> None:
