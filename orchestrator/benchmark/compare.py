@@ -37,14 +37,8 @@ ROUND = 1e-8
 """Relative rounding of a pack's tables."""
 LISTED = 10
 """Number of failures that the terminal lists."""
-LEVELS = {
-    1: "closed form",
-    2: "contact and one grain",
-    3: "flow",
-    4: "grains of a pile",
-    5: "flow and grains",
-}
-"""Names of the levels."""
+NAMES = ("closed form", "contact and one grain", "flow", "grains of a pile", "flow and grains")
+"""Names of the levels, 1 to 5."""
 OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
 """Words that are operators of a shell."""
 MEASURE = """
@@ -110,14 +104,12 @@ def run(root: Path, command: str, out: Path | None, choice: Choice, limits: Limi
     """
     chosen, words = pack.read(root.absolute()), split(command)
     names, digest = choice.names(chosen), chosen.manifest.sha256[pack.EXPECTED]
-    out = _place(out or _default(root), chosen)
+    out = _place(out, chosen)
     ours = Ours(chosen, names, out / OURS / "cases")
     with workspace.claimed(out, workspace.RESULTS, command) as folder:
         about = workspace.read_marker(out, workspace.RESULTS) or {}
         if about.get("pack", digest) != digest:
-            what = (
-                "the directory holds answers to another pack, or to an earlier export of this one"
-            )
+            what = "it holds answers to another pack, or to an earlier export of this one"
             raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
         folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest}))
         # runs of an earlier time were not in turn with the solver
@@ -151,7 +143,7 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
     about = workspace.read_marker(results[0], workspace.RESULTS) or {}
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
-    out = _place(out or (results[0] if is_of_run else _default(root)), chosen)
+    out = _place(out or (results[0] if is_of_run else None), chosen)
     is_same = is_of_run and out == results[0].absolute()
     kind = workspace.RESULTS if is_same else workspace.COMPARISON
     judged = judge(chosen, names, results)
@@ -159,12 +151,9 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, choice: Choic
         return _written(chosen, *judged, folder)
 
 
-def _default(root: Path) -> Path:
-    return Path("results") / f"benchmark-{root.absolute().name}"
-
-
-def _place(out: Path, chosen: Pack) -> Path:
+def _place(out: Path | None, chosen: Pack) -> Path:
     """The directory of the results, which is not in the pack."""
+    out = out or Path("results") / f"benchmark-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
     if out.name == OURS:
@@ -419,7 +408,7 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
             "CPU over ours": (of["cpu_ratio"].median(), ""),
             "peak, MiB": (of["peak_mib"].max(), ""),
         }
-        head = {"level": f"{level} {LEVELS[int(str(level))]}", "kind": kind, "solver": solver}
+        head = {"level": f"{level} {NAMES[int(str(level)) - 1]}", "kind": kind, "solver": solver}
         texts = {name: f"{x:.3g}{unit}" if x == x else "" for name, (x, unit) in numbers.items()}
         rows.append({**head, "scenes": len(of), "passed": of["passed"].sum(), **texts})
     return pd.DataFrame(rows)

@@ -123,7 +123,7 @@ class Problem:
 
 
 def csv(table: pd.DataFrame) -> str:
-    """The text of a table."""
+    """The text of a table of a pack."""
     return table.to_csv(index=False, float_format=NUMBER)
 
 
@@ -197,10 +197,9 @@ def _refuse(what: str, where: Path) -> NoReturn:
 
 
 def _check_file(path: Path) -> None:
-    try:
-        state = path.lstat()
-    except OSError as error:
-        _refuse(f"it cannot be read: {error.strerror}", path)
+    if not os.path.lexists(path):
+        _refuse("it is missing", path)
+    state = path.lstat()
     if not stat.S_ISREG(state.st_mode):
         _refuse("this is a link or no file", path)
     if state.st_size > MAX_BYTES:
@@ -292,21 +291,16 @@ def write(
         }
         for file, content in files.items():
             folder.put(file, content)
-        processor = re.search("(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"))
+        model = re.search("(?m)^model name.*: (.*)$", Path("/proc/cpuinfo").read_text("utf-8"))
+        processor, paths = model[1] if model else platform.machine(), [root / f for f in files]
         manifest = {
-            **about,
             "schema": SCHEMA,
             "scenes": [one.scene for one in listed],
             "programs": dict(programs),
-            "machine": {
-                "processor": processor[1] if processor else platform.machine(),
-                "cores": os.cpu_count(),
-            },
-            "sha256": digest_files(
-                [*(root / file for file in files), *scenes.glob("*/*")], root=root
-            ),
+            "machine": {"processor": processor, "cores": os.cpu_count()},
+            "sha256": digest_files([*paths, *scenes.glob("*/*")], root=root),
         }
-        folder.note(MANIFEST, text_of(manifest))
+        folder.note(MANIFEST, text_of(about | manifest))
     return len(listed)
 
 

@@ -45,14 +45,11 @@ round-off are up to 16 % beyond the interval of a threshold and 22 % of N beyond
 FLOWS = (0.5, 0.8, 1.1, 1.4)
 """Friction velocities at which the forces are asked, over that of the threshold."""
 DAMPINGS, INCLINES_DEG = (0.05, 0.1, 0.3), (5.0, 20.0, 45.0, 60.0, 70.0, 75.0)
-SPEEDS = (1.0, 2.0, 5.0)
-"""Starts of a sliding grain, sqrt(d g')."""
-MEETING = 0.1
-"""Speed of each of two colliding grains, sqrt(d g')."""
-PUSHES = (1.5, 2.0, 3.0)
-"""Forces on the grain that passes the criterion, over that at which it begins to roll."""
-PASSING_DEG, CRITERION = 60.0, 0.3
-"""Its entrainment angle, and its criterion (d)."""
+MEETING, SPEEDS = 0.1, (1.0, 2.0, 5.0)
+"""Speeds of each of two colliding grains, and of a grain that begins to slide, sqrt(d g')."""
+PASSING_DEG, CRITERION, PUSHES = 60.0, 0.3, (1.5, 2.0, 3.0)
+"""Of the grain that passes the criterion: its entrainment angle, its criterion (d), and the forces
+on it over that at which it begins to roll."""
 STIFFNESS, PASSING_STIFFNESS = 1e4, 1e5
 """K d/W of the check decks' grain; springs of 1e4 would start the one that passes 1 % early."""
 UNIT = float(np.sqrt(DIAMETER * GRAVITY))
@@ -67,9 +64,7 @@ _DEM = (
     *("phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step"),
     *("displacement_criterion", "waiting_time", "load_increment"),
 )
-_BED = (
-    *("h_m", "packing", "disorder", "seed", "flow_model", "stress", "update", "final_fraction"),
-)
+_BED = ("h_m", "packing", "disorder", "seed", "flow_model", "stress", "update", "final_fraction")
 _FLOW = (
     *("mobile_layers", "averaging_length", "loaded_grains", "solve_z0_m", "solve_nu_m2_s"),
     *("first_cell_m", "cells_per_face", "turbulence_model"),
@@ -230,9 +225,7 @@ def _flow_entries(pile: Pile) -> Row:
     """Entries about the flow of a pile."""
     case = pile.flow
     return {
-        "alpha_deg": case.slope_deg,
-        "h_m": case.height_m,
-        "z0_m": case.roughness_m,
+        **{"alpha_deg": case.slope_deg, "h_m": case.height_m, "z0_m": case.roughness_m},
         "u_e_m_s": case.settings.speed,
         "ustar0_m_s": case.ustar0_m_s,
         "u_e_height_m": SPEED_HEIGHT * case.height_m,

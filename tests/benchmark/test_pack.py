@@ -111,7 +111,7 @@ def test_levels_times_and_our_answers(all_levels: Path) -> None:
     margin = (judged["tolerance"] + 1e-8) * judged["value"].abs()
     assert judged["ours"].between(judged["low"] - margin, judged["high"] + margin).all()
     times = pd.read_csv(all_levels / "times.csv").set_index("scene")["seconds"]
-    assert set(times.index) == set(chosen.scenes)
+    assert set(times.index) == {name for name in chosen.scenes if name[0] != "1"}  # no formulas
     assert times.gt(0).all()
     for entries in chosen.scenes.values():
         if entries["kind"] == "flow":
