@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, limits
 from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
@@ -79,19 +78,13 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         decisions = by_default(study.scenes, bounds)
     else:
         decisions = decide(study.scenes, study.tolerance, bounds)
-    return of(decisions, study.name, study.tolerance, cases)
+    return of(decisions, study.tolerance, cases)
 
 
 def of(
-    decisions: Mapping[str, Decision],
-    name: str,
-    tolerance: float | None = None,
-    cases: Path | None = None,
+    decisions: Mapping[str, Decision], tolerance: float | None = None, cases: Path | None = None
 ) -> Plan:
-    """List the cases that some decisions need; `name` names the study in messages.
-
-    With a tolerance, answers without DEM are checked by it.
-    """
+    """List the cases that some decisions need; with a tolerance, those of checks by DEM too."""
 
     def piles_of(answers: Mapping[str, Decision]) -> dict[str, Pile]:
         scenes = {asked: answer.scene for asked, answer in answers.items()}
@@ -106,24 +99,22 @@ def of(
         if asked not in piles and answer.scene.protocol.method == "dem"
     }
     cells = tuple(batches(grains.values()))
-    try:
-        runs = [run for pile in (*piles.values(), *checks.values()) for run in pile.runs]
-    except InputError as error:
-        place = f"{name}: {error.where}"
-        raise InputError(error.what, where=place, remedy=error.remedy) from None
     listed: dict[str, Case] = {}
-    for run in (*runs, *cells):
-        _list(run, listed)
+
+    def add(case: Case) -> None:
+        """Add a case behind all whose results it needs."""
+        if case.name not in listed:
+            for need in case.needs:
+                add(need)
+            listed[case.name] = case
+
+    for pile in (*piles.values(), *checks.values()):
+        for run in pile.runs:
+            add(run)
+    for cell in cells:
+        add(cell)
     first = {name: case for name, case in listed.items() if not case.needs}
     return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
-
-
-def _list(case: Case, listed: dict[str, Case]) -> None:
-    """Add a case behind all whose results it needs."""
-    if case.name not in listed:
-        for need in case.needs:
-            _list(need, listed)
-        listed[case.name] = case
 
 
 def settled(study: Study, directory: Path) -> Plan:

@@ -152,7 +152,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     """What each shared choice is worth, changed alone on the piles of a study."""
     limits.check_study(study)
     listed, asked = changes(study)
-    planned = plan.of(asked, study.name, cases=out.absolute() / "cases")
+    planned = plan.of(asked, cases=out.absolute() / "cases")
 
     def tables(runs: Runs) -> Tables:
         moved = measure(listed, runs)

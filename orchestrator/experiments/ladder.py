@@ -98,7 +98,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     """What each level costs and how far it is off, on the piles of a study."""
     limits.check_study(study)
     routes, pairs = naive_routes(study), decisions(study)
-    planned = plan.of({**pairs, **routes}, study.name, cases=out.absolute() / "cases")
+    planned = plan.of({**pairs, **routes}, cases=out.absolute() / "cases")
 
     def tables(runs: Runs) -> Tables:
         measured = points(pairs, runs)

@@ -148,7 +148,7 @@ def planned_for(maps: Sequence[Map]) -> Plan:
         for place in one.places
         for scene in (*place.scenes, *(place.references if one.data["judge"] == "pile" else ()))
     }
-    return plan.of(scenes, "stability")
+    return plan.of(scenes)
 
 
 def judge(one: Map, runs: Runs) -> pd.DataFrame:

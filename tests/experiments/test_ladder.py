@@ -56,7 +56,7 @@ def test_the_naive_route_is_measured_on_the_lowest_pile_with_every_grain_mobile(
     stiffness = dearest.grain.stiffness * dearest.weight / dearest.grain.diameter
     assert stiffness == pytest.approx(1e6)  # N/m, the paper's
     assert softened.grain.stiffness == 1e4
-    planned = plan.of({**pairs, **routes}, "ladder")
+    planned = plan.of({**pairs, **routes})
     packing = planned.piles[next(iter(routes))].packing
     assert packing.mobile.sum() > 5 * packing.count
     # what did not run costs nothing that is known; what needs no run has no error by itself

@@ -132,7 +132,7 @@ def test_open_water_is_answered_at_any_tolerance(pile: MakePile) -> None:
     chosen = decide(pile(water), 0.3)
     assert chosen.levels
     assert chosen.scene.flow.model == "solve"
-    assert plan.of({"a": chosen}, "water").cases
+    assert plan.of({"a": chosen}).cases
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])

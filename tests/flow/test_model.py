@@ -31,7 +31,7 @@ WATER = 'model = "flat"\ntop = "open water"\ndepth = 0.3\n[protocol]\nmethod = "
 def piles(flow: str) -> list[Pile]:
     asked = study.parse(TEXT + flow, name="knobs", where="test")
     decisions = {scene.id: as_asked(scene) for scene in asked.scenes}
-    return list(plan.of(decisions, "knobs").piles.values())
+    return list(plan.of(decisions).piles.values())
 
 
 def test_a_theory_needs_no_case(tmp_path: Path) -> None:
