@@ -21,6 +21,7 @@ from matplotlib.patches import Patch
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import (
+    TEXTS,
     Experiment,
     Runs,
     Tables,

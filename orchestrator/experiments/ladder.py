@@ -28,6 +28,7 @@ from matplotlib.patheffects import Normal, Stroke
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
 from orchestrator.experiments.experiment import (
+    TEXTS,
     Experiment,
     Runs,
     Tables,
