@@ -24,16 +24,9 @@ def stress() -> WallStress:
     random = np.random.default_rng(7)
     length = random.uniform(1e-4, 3e-3, 60)
     tau, eq10 = random.normal(1.0, 1.0, (2, 60))
-    return WallStress(
-        s_m=np.cumsum(length) - length / 2.0 - length[:20].sum(),
-        x_m=random.normal(size=60),
-        z_m=random.normal(size=60),
-        length_m=length,
-        z_e_m=random.uniform(2e-4, 4e-4, 60),
-        tau_wall=tau,
-        ustar_over_ustar0_eq10=eq10,
-        ustar_over_ustar0_eq10_printed=1.04 * eq10,
-    )
+    s, z_e = np.cumsum(length) - length / 2 - length[:20].sum(), random.uniform(2e-4, 4e-4, 60)
+    x, z = random.normal(size=(2, 60))
+    return WallStress(s, x, z, length, z_e, tau, eq10, 1.04 * eq10)
 
 
 def overlap_mean(stress: WallStress, values: np.ndarray, s: float, length: float) -> float:
@@ -60,16 +53,8 @@ def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStre
     """A flat bed, then a slope from s = 0 on, of 20 faces each 1 mm long; tau of each from s."""
     s = np.arange(-19.5, 20) * 1e-3
     up = np.where(s > 0, np.radians(slope_deg), 0.0)
-    return WallStress(
-        s_m=s,
-        x_m=s * np.cos(up),
-        z_m=s * np.sin(up),
-        length_m=np.full(40, 1e-3),
-        z_e_m=np.full(40, 5e-4),
-        tau_wall=tau(s),
-        ustar_over_ustar0_eq10=tau(s),
-        ustar_over_ustar0_eq10_printed=tau(s),
-    )
+    lengths, tau_ = (np.full(40, 1e-3), np.full(40, 5e-4)), tau(s)
+    return WallStress(s, s * np.cos(up), s * np.sin(up), *lengths, tau_, tau_, tau_)
 
 
 @pytest.mark.parametrize("slope_deg", [0.0, 10.0, 35.0])
