@@ -181,7 +181,10 @@ def as_json(table: "pd.DataFrame") -> str:
         }
         for point in (rows[start : start + laws] for start in range(0, len(rows), laws))
     ]
-    return json.dumps(records if len(records) > 1 else records[0], indent=2, allow_nan=False)
+    if len(records) == 1:
+        return json.dumps(records[0], indent=2, allow_nan=False)
+    lines = ",\n".join(json.dumps(record, allow_nan=False) for record in records)
+    return f"[\n{lines}\n]"
 
 
 def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterator[str]:

@@ -36,9 +36,7 @@ NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 """Least distance of two points of a profile, over the diameter and over the height of the first
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
 a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
-ROUGHEST = 1 / 3
-"""Largest z0 over the diameter of the bed's grains; sparse spheres have about 1/7, the largest
-ratio measured."""
+ROUGHEST = 1 / 3  # largest z0 over the diameter of the bed's grains; measured are up to 1/7
 POURED = 'bed.packing = "poured", or leave it out'
 
 
