@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -55,6 +54,7 @@ SHOWN = {
     **{"ratio": "ratio", "cpu_ratio": "CPU ratio", "peak_mib": "MiB"},
 }
 """Columns of the table of scenes."""
+RE = r"$Re^\star = u^\star d/\nu$"
 Look = dict[str, Any]
 
 
@@ -73,9 +73,8 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
     moved = "Grains that have moved, "
     with settings.own(), warnings.catch_warnings():
-        # the name of a solver may have letters that the font has not, or be no formula
+        # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        matplotlib.rcParams["text.parse_math"] = False
         beds = [
             _panels(*(chosen, numbers, verdicts, kind), *(stem, title, panel))
             for kind, stem, title, panel in (
@@ -165,10 +164,16 @@ def _looks(table: pd.DataFrame) -> dict[str, Look]:
     return looks
 
 
+def _literal(text: str) -> str:
+    """A text of a stranger as matplotlib shows it: no formula."""
+    return text.replace("$", r"\$")
+
+
 def _canvas(height: float, looks: dict[str, Look], levels: Any, *samples: Line2D) -> Canvas:
     """A canvas with a legend of the solvers above, and one of levels and samples below."""
     canvas = Canvas(figsize=(7.0, height), layout="compressed")
-    names = [Line2D([], [], color=one["color"], lw=2.5, label=name) for name, one in looks.items()]
+    colours = {_literal(name): look["color"] for name, look in looks.items()}
+    names = [Line2D([], [], color=c, lw=2.5, label=name) for name, c in colours.items()]
     canvas.legend(handles=names, loc="outside upper center", ncols=6)
     marks: Look = {"color": "0.3", "mfc": "none", "ls": "none"}
     below = [Line2D([], [], marker=MARKERS[n], label=f"level {n}", **marks) for n in levels]
@@ -199,7 +204,8 @@ def _panels(
     axes = canvas.subplots(lines, columns, squeeze=False).ravel()
     for ax, name in zip(axes, drawn, strict=False):
         panel(ax, numbers[numbers["scene"] == name], looks)
-        ax.set_title(f"{textwrap.fill(name, 36)}\n{about(chosen, name)}", size=6.5)
+        head = f"{textwrap.fill(name, 36)}\n{about(chosen, name)}"
+        ax.set_title(_literal(head), size=6.5)
     for ax in axes[len(drawn) :]:
         ax.remove()
     caption = (
@@ -259,7 +265,7 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> Figure | None:
     groups: Any = table[table["solver"] != OURS].groupby(["solver", "level"])
     for (solver, level), rows in groups:
         ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
-    ax.set(xscale="log", yscale="log", xlabel="Re* = u* d/ν", ylabel="Shields number")
+    ax.set(xscale="log", yscale="log", xlabel=RE, ylabel="Shields number")
     ax.set_xlim(x.min() / 3, x.max() * 3)
     ax.set_ylim(max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
     caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
