@@ -10,14 +10,10 @@ from pydantic.fields import FieldInfo
 
 List = Field(strict=False)  # beside a type of tuples: a list of TOML is taken as one
 # Limits of nature, not of the methods, in SI units. Each has its extremes beside it.
-Roughness = Annotated[float, Field(ge=1e-12, le=10)]
-"""From far below any grain, where a wall is smooth, to the largest boulder."""
-Height = Annotated[float, Field(ge=1e-6, le=1e4)]
-"""From five of the smallest grains to the largest mountains."""
-Length = Annotated[float, Field(ge=1e-12, le=1e4)]
-"""From the least that the fields above allow to the largest mountains."""
-Viscosity = Annotated[float, Field(ge=1e-8, le=1e3)]
-"""Kinematic, from liquid helium, 2e-8, to thin gases and lava."""
+Roughness = Annotated[float, Field(ge=1e-12, le=10)]  # from smooth walls to the largest boulder
+Height = Annotated[float, Field(ge=1e-6, le=1e4)]  # from five of the smallest grains to mountains
+Length = Annotated[float, Field(ge=1e-12, le=1e4)]  # the least that the fields above allow
+Viscosity = Annotated[float, Field(ge=1e-8, le=1e3)]  # liquid helium, 2e-8, to thin gases and lava
 
 
 class UnfitError(ValueError):

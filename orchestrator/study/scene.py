@@ -20,10 +20,8 @@ from orchestrator.study.shapes import SHAPES
 from orchestrator.study.sizes import Sizes, extremes, percentile
 
 BUILDABLE_DEG = (2.0, 60.0)  # slopes of piles that can be meshed and packed
-SOLVE_VISCOSITY = 1e-5
-"""Kinematic viscosity at which flows are solved, m2/s, where it is low enough for their cells."""
-VISCOUS_CELLS = 2.5
-"""Height of the first cell over nu/(kappa u*_0): at its centre the flow is turbulent."""
+SOLVE_VISCOSITY = 1e-5  # at which flows are solved, m2/s, where it is low enough for their cells
+VISCOUS_CELLS = 2.5  # first cell over nu/(kappa u*_0): at its centre the flow is turbulent
 LEAST_DEPTH = 3.0
 """Least depth of a flow over the height of forms and obstacles: the rows of its mesh are level at
 half of it."""
