@@ -173,6 +173,10 @@ class Geometry:
         tau = stress.mean_over(s * d, length, how.stress)
         return Loads(self, np.where(self._unloaded, 0, np.sign(tau) * np.sqrt(np.abs(tau))))
 
+    def loads(self, cases: Path) -> "Loads":
+        """The grains under the flow of the whole bed, from the directory of the finished runs."""
+        return self.under(self.model.stress(cases))
+
     @property
     def _unloaded(self) -> BoolArray:
         """Grains that go without the flow's force though they are exposed."""
@@ -194,11 +198,6 @@ class Loads:
 
     geometry: Geometry
     ratio: FloatArray
-
-    @property
-    def speed(self) -> FloatArray:
-        """The ratio of the counted grains, shape (N,)."""
-        return np.asarray(self.ratio[self.geometry.packing.windward])
 
     @cached_property
     def loading(self) -> Loading:
@@ -225,8 +224,8 @@ class Loads:
         InputError
             If no grain feels a flow.
         """
-        bed, speed = self.geometry, self.speed
-        counted = bed.packing.windward
+        bed, counted = self.geometry, self.geometry.packing.windward
+        speed = self.ratio[counted]
         if not np.any(speed != 0):
             where, remedy = f"scene {bed.scene.id}: flow", "the mesh or the stress is wrong"
             raise InputError("no counted grain feels a flow", where=where, remedy=remedy)

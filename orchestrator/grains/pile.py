@@ -382,7 +382,7 @@ class PileCase(GrainCase):
         """The grains under the flow when the run begins."""
         geometry = Geometry(self.scene, cases)
         if self.flow is None:
-            return geometry.under(geometry.model.stress(cases)), Worn.whole(geometry.packing)
+            return geometry.loads(cases), Worn.whole(geometry.packing)
         return _loads(geometry, self.flow, cases), grains(geometry, self.flow, cases)
 
 
@@ -465,10 +465,6 @@ class Method:
         """Motion of the counted grains; `cases` is the directory of the finished runs."""
         raise NotImplementedError
 
-    def loads(self, cases: Path) -> Loads:
-        """The grains under the flow of the whole pile."""
-        return self.geometry.under(self.geometry.model.stress(cases))
-
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
         raise NotImplementedError
@@ -479,7 +475,7 @@ class Pivot(Method):
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows of Eq. 3 or 5."""
-        return Motion.of_flows(self.loads(cases).alone())
+        return Motion.of_flows(self.geometry.loads(cases).alone())
 
 
 class Peeling(Method):
@@ -498,7 +494,7 @@ class Peeling(Method):
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
         if self.geometry.scene.protocol.update:
             return Motion.of_flows(self.last(cases).left[self.geometry.packing.windward])
-        return Motion.of_flows(self.loads(cases).leaving())
+        return Motion.of_flows(self.geometry.loads(cases).leaving())
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""
@@ -587,10 +583,6 @@ class Pile(Geometry):
     def stress(self, cases: Path) -> WallStress:
         """The stress along the whole bed; `cases` is the directory of the finished runs."""
         return self.model.stress(cases)
-
-    def loads(self, cases: Path) -> Loads:
-        """Its grains under the flow of the whole pile."""
-        return self.method.loads(cases)
 
     def speed(self, cases: Path) -> FloatArray:
         """Signed local friction velocity of the counted grains over the undisturbed one, (N,).

@@ -71,16 +71,6 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
         assert found.ustar0 == pytest.approx(expected, rel=0.03)
 
 
-def test_it_empties_from_the_crest_down(slow: Pile, cases: Path) -> None:
-    motion, packed = Motion.from_csv(cases / slow.case.name), slow.packing
-    moved = motion.level > 0
-    # from the crest to the toe no grain moves in an earlier load step than the one above it
-    downward = np.argsort(-packed.arc_length[packed.windward][moved])
-    load_steps = motion.level[moved][downward]
-    assert load_steps[0] == load_steps.min()
-    assert np.mean(np.diff(load_steps) >= 0) > 0.9
-
-
 def test_tables_reconcile(slow: Pile, cases: Path) -> None:
     asked = _study(step=0.01)
     planned = plan.make(asked)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from orchestrator import pipeline, plan, tables
-from orchestrator.flow.case import FlowCase
 from orchestrator.grains import pile as wear
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.pile import Pile, Worn
@@ -158,11 +157,3 @@ def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str
     assert [step for step, _ in bed.data(steps, steps.first(0.5))["lines"]] == starts
     frozen = worn[f"{method}, frozen"]
     assert "lines" not in bed.data(bed.read(frozen.pile, cases), 0)
-
-
-def test_a_frozen_bed_keeps_its_identity() -> None:
-    frozen, changing = _scene(), _scene("update = 0.1")
-    assert "update" not in frozen.model_dump()["protocol"]
-    assert frozen.id == _scene("update = 0.0").id != changing.id
-    assert Pile(frozen).flow.name == Pile(changing).flow.name
-    assert all(isinstance(flow, FlowCase) for flow in Pile(frozen).flows)
