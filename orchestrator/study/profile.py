@@ -123,7 +123,12 @@ def read_columns(
         try:
             if len(row) != len(header):
                 raise ValueError(f"{len(row)} values under a header of {len(header)}")
-            first, second = values[index] = [float(row[place]) for place in places]
+            cells = [row[place] for place in places]
+            if "_" in "".join(cells) or not "".join(cells).isascii():
+                raise ValueError(
+                    f"{cells} are not two numbers"
+                )  # float() reads them: 1_0, Arabic digits
+            first, second = values[index] = [float(cell) for cell in cells]
             if not (abs(first) <= LARGEST_NUMBER and abs(second) <= LARGEST_NUMBER):
                 raise ValueError(f"a number is not within {LARGEST_NUMBER:g}")
         except ValueError as error:

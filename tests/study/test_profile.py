@@ -57,6 +57,7 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "level": (points("0,0.3", "1,0.3", "2,0.3"), "level: it has no height"),
     "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), "4000 points, more than"),
     "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), "not a readable text file"),
+    "underscore": (points("0,0", "1_0e-2,0.01", "0.2,0"), "are not two numbers"),
     "binary": (b"\x7fELF\0\0\x01\0", "binary, not text"),
     "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, "larger than 20 MiB"),
 }
