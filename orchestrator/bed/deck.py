@@ -189,18 +189,10 @@ def write(
 ) -> None:
     """Write grains, parameters, flows and forces into a copy of the template ``liggghts/bed``.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Each becomes a variable of the deck.
-    flows : ndarray, shape (load steps + 1,)
-        The flow of the settling, then of each load step.
-    force : ndarray, shape (load steps + 1, n, 2)
-        The flow's force on each grain at these flows, N; only pushed grains feel one.
-    margin : float
-        Distance from the outermost grains to the walls of the box, m; beyond them a grain is gone.
-    ranks : int
-        Processes that share the grains.
+    Each parameter becomes a variable of the deck. `flows` has the flow of the settling, then of
+    each of s load steps, `force` the flow's force on each grain at these flows, N, shape
+    (s + 1, n, 2); only pushed grains feel one. `margin` is the distance from the outermost grains
+    to the walls of the box, m; beyond them a grain is gone. `ranks` processes share the grains.
     """
     present = np.flatnonzero(grains.kind != GONE)
     places = grains.position[present]
@@ -293,14 +285,9 @@ def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
 
 
 def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
-    """Read a text dump of some columns.
+    """Read a text dump of some columns: the time step of each frame, and a row for each grain.
 
-    Returns
-    -------
-    steps : ndarray of int
-        Time step of each frame, also of those without a grain.
-    rows : DataFrame
-        A row for each grain and frame, with the frame's time step in the column ``step``.
+    Frames without a grain have a time step too; each row has that of its frame in ``step``.
 
     Raises
     ------

@@ -96,22 +96,13 @@ def across(distance: FloatArray, width: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Packing:
-    """The grains of a pile, n of them, lengths in diameters.
+    """The grains of a pile, n of them, lengths in diameters; arrays of shape (n,).
 
-    Attributes
-    ----------
-    centres : ndarray, shape (n, 2)
-        x and z of each centre.
-    sizes : ndarray, shape (n,)
-        Diameter of each grain.
-    mobile : ndarray of bool, shape (n,)
-        May move; the others are fixed.
-    windward, lee : ndarray of bool, shape (n,)
-        Exposed and counted, by default on windward sides; exposed elsewhere.
-    arc_length : ndarray, shape (n,)
-        Position along the bed line; it means something for exposed grains.
-    across, width
-        y of each centre, and the width of a strip with periodic sides; both 0 in one plane.
+    `centres`, shape (n, 2), has x and z of each centre. `mobile` grains may move, the others are
+    fixed. `windward` ones are exposed and counted, by default on windward sides, `lee` ones exposed
+    elsewhere. `arc_length` is the position along the bed line, which means something for exposed
+    grains. `across` is y of each centre and `width` that of a strip with periodic sides; both are 0
+    in one plane.
     """
 
     centres: FloatArray
@@ -143,20 +134,10 @@ class Packing:
 class Lattice:
     """How the grains of a bed that is not poured are laid; lengths in diameters.
 
-    Attributes
-    ----------
-    entrainment_angle_deg : float
-        beta of the lattice.
-    gap : float
-        Height of the exposed grains' lowest points over the bed line, z0/d.
-    pattern : {"aligned", "horizontal", "disordered"}
-        Rows along the bed, or level; or along it with random gaps.
-    mobile_layers : int
-        Layers that may move.
-    disorder : float
-        Largest gap in the row below the mobile ones of a disordered packing.
-    seed : int
-        Chooses one disordered packing of many; on a lattice 0 is itself, others are its replicas.
+    beta of the lattice; `gap`, the height z0/d of the exposed grains' lowest points over the bed
+    line; rows along the bed ("aligned"), level ("horizontal"), or along it with random gaps
+    ("disordered"); layers that may move; the largest random gap in the row below them; a seed that
+    chooses one disordered packing of many: on a lattice 0 is itself, others are its replicas.
     """
 
     entrainment_angle_deg: float

@@ -62,24 +62,11 @@ LOCAL = 5.0
 class PouredBed(Case):
     """The run that pours a bed into a mould of a bed line; all scenes with this bed share it.
 
-    Attributes
-    ----------
-    line : BedLine
-        Bed line of the flow.
-    depth : float
-        Depth of the row of fixed grains under the line, along the vertical.
-    surface : float
-        Height over the line, normal to it, above which no centre lies after the cut.
-    sizes : LogNormal, sequence of classes, or None
-        Sizes of the grains; None for equal ones.
-    diameter : float
-        The d of a sieve table, m; 1 otherwise, for such a bed has no scale.
-    friction_angle_deg : float
-        Friction angle of the grains.
-    seed : int
-        Chooses one bed of many.
-    width : float
-        Width of a strip with periodic sides; 0 of a bed in one plane.
+    Lengths are in d. `depth` is that of the row of fixed grains under the line, along the vertical;
+    `surface` the height over the line, normal to it, above which no centre lies after the cut;
+    `sizes` those of the grains, None for equal ones; `diameter` the d of a sieve table, m, else 1,
+    for such a bed has no scale. The seed chooses one bed of many; `width` is that of a strip with
+    periodic sides, 0 in one plane.
     """
 
     line: BedLine

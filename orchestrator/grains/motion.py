@@ -215,19 +215,11 @@ def count(
 ) -> Count:
     """Apply the counting rule to the tracks of grains.
 
-    Parameters
-    ----------
-    travel : ndarray, shape (T, N)
-        Displacement along the bed since the settling, downstream positive, d; NaN for a grain
-        that is gone.
-    criterion : float
-        Displacement that counts as motion, d.
-    falls_out : bool
-        Whether a grain that is gone and was not seen beyond the criterion fell upstream: from the
-        two neighbours of a single grain it did, for no bed is behind them; only lift can have
-        taken it from a pile.
-    aside : ndarray, shape (T, N), or 0
-        Displacement across the flow, d; 0 of grains in one plane.
+    `travel` is the displacement along the bed since the settling, downstream positive, d, shape
+    (T, N), NaN for a grain that is gone; `aside` that across the flow, 0 in one plane; `criterion`
+    the displacement that counts as motion, d. `falls_out` says whether a grain that is gone and was
+    not seen beyond the criterion fell upstream: from the two neighbours of a single grain it did,
+    for no bed is behind them; only lift can have taken it from a pile.
     """
     ahead, back = _ever((travel >= criterion) | (aside >= criterion)), _ever(travel <= -criterion)
     vanished = _ever(np.isnan(travel) & ~ahead)

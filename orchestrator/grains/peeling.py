@@ -206,22 +206,11 @@ def flows(
 ) -> FloatArray:
     """The flow (u*_0, m/s) at which each of n grains in one plane leaves by peeling, shape (n,).
 
-    It is infinite for grains that never leave.
-
-    Parameters
-    ----------
-    places : Places
-        In one unit of length d.
-    sizes : ndarray, shape (n,)
-        Diameter of each grain, d.
-    loading : Loading
-        The forces; grains that carry one may leave.
-    tables : sequence of ForceTable
-        For each grain its force law over its own submerged weight.
-    criterion : float
-        Displacement along the bed that counts as motion, of the grain's own diameter.
-    present : ndarray of bool, shape (n,), optional
-        The grains that have not left yet; by default all.
+    It is infinite for grains that never leave. The places and the diameters, shape (n,), are in one
+    unit of length; grains that carry a force may leave; each has a table of its force law over its
+    own submerged weight. The criterion is the displacement along the bed that counts as motion, of
+    the grain's own diameter. `present`, shape (n,), has the grains that have not left yet; by
+    default all.
     """
     present = np.ones(len(sizes), bool) if present is None else present.copy()
     rollers = dict(_rollers(places, sizes, loading, tables, present))
