@@ -50,7 +50,7 @@ FAULTS = {
     # answers that are not whole
     "no text": ("out.write_bytes(b'\\xff\\xfe')", "answer.csv cannot be read"),
     "no head": (AFTER + "out.write_text(text[18:])", "does not begin with quantity,at,value"),
-    "a line cut short": (AFTER + "out.write_text(text[:text.rindex(',')])", "line 2: "),
+    "a short line": (AFTER + "out.write_text(text[:text.rindex(',')] + '\\n')", "line 2: "),
     "a file cut short": (AFTER + "out.write_text(text[:-3])", "its last line has no end"),
     "infinite": ("out.write_text('quantity,at,value\\na,,-inf\\n')", "finite number"),
     "twice": (AFTER + "out.write_text(text + text[18:])", "answers acceleration_over_g twice"),

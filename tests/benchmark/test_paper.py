@@ -9,7 +9,6 @@ import pytest
 
 from orchestrator import plan, tables
 from orchestrator.benchmark import scenes
-from orchestrator.benchmark.compare import place_of
 from orchestrator.benchmark.export import scene_names
 from orchestrator.paper import PRESETS
 from orchestrator.runs import case, engine
@@ -64,12 +63,12 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
     for pile in planned.piles.values():
         for problem in (scenes.flow(pile, results), scenes.bed("pile", pile, results, tmp_path)):
             scene = f"{problem.scene[0]}-{names[problem.name]}"
-            stated, fresh = (
-                table.assign(place=table["at"].map(place_of))
-                for table in (expected[expected["scene"] == scene], problem.expected)
-            )
-            fresh = fresh.merge(stated, on=["quantity", "place"])
-            assert len(fresh) == len(problem.expected)
-            margin = 1e-4 * fresh["value_x"].abs()
-            assert (fresh["ours_x"] >= fresh["low_y"] - margin).all(), scene
-            assert (fresh["ours_x"] <= fresh["high_y"] + margin).all(), scene
+            fresh = problem.expected
+            stated = expected[expected["scene"] == scene].set_index(fresh.index)
+            assert (fresh["quantity"] == stated["quantity"]).all()
+            at, stated_at = (pd.to_numeric(table["at"]) for table in (fresh, stated))
+            assert at.to_numpy() == pytest.approx(stated_at.to_numpy(), rel=1e-6, nan_ok=True)
+            # another start of the iterations and another mesh change the stress by 0.5 %
+            margin = (5e-3 if problem.kind == "flow" else 1e-4) * stated["value"].abs()
+            is_held = fresh["ours"].between(stated["low"] - margin, stated["high"] + margin)
+            assert is_held[stated["tolerance"].notna()].all(), scene
