@@ -191,16 +191,17 @@ def draw_points(
     Hollow where a threshold is not usable. Returns the rows of each group of markers.
     """
     rows = rows[rows[columns[1]].notna()]
-    x, low, high = (rows[columns[at]].to_numpy(float) for at in (0, 2, 3))
+    x, y, low, high = (rows[column].to_numpy(float) for column in columns)
     # as one line with gaps: bars and caps by themselves take three times as long
     ends = np.column_stack([low, high, np.full_like(low, np.nan)]).ravel()
     look: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "gid": "intervals"}
     ax.plot(np.repeat(x, 3), ends, marker="_", ms=size + 0.8, mew=0.7, zorder=2.5, **look)
-    drawn = []
-    for (marker, solid), group in split(rows.assign(solid=valid(rows)), SHAPE, "solid"):
+    drawn, markers, usable = [], rows[SHAPE].to_numpy(str), valid(rows).to_numpy()
+    for marker, solid in sorted(set(zip(markers.tolist(), usable.tolist(), strict=True))):
+        at = (markers == marker) & (usable == solid)
         look = {"ls": "", "marker": marker, "ms": size, "mec": colour, "mew": 0.8, "zorder": 3}
         look |= {"mfc": colour, "gid": RESULT[1]} if solid else {"mfc": "white", "gid": RESULT[2]}
-        drawn.append((ax.plot(group[columns[0]], group[columns[1]], **look)[0], group))
+        drawn.append((ax.plot(x[at], y[at], **look)[0], rows[at]))
     return drawn
 
 

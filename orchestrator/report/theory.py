@@ -148,9 +148,11 @@ def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
-    groups = split(scenes[[*GRAIN, "force_law"]], "force_law")
-    every = (thresholds(group, str(law)) for (law,), group in groups)
-    reynolds = np.array([item.reynolds for items in every for item in items], float)
+    grains: dict[str, list[tuple[float, ...]]] = {}  # without groupby: it is asked for each line
+    for law, *grain in set(scenes[["force_law", *GRAIN]].itertuples(index=False, name=None)):
+        grains.setdefault(law, []).append(tuple(grain))
+    every = (item for law, alike in grains.items() for item in closed_form.thresholds(law, alike))
+    reynolds = np.array([item.reynolds for item in every], float)
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min()), float(reynolds.max())
 

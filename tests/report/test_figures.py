@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
-from orchestrator.report import flows, piles, shields, style
+from orchestrator.report import bed, flows, piles, shields, style
 from orchestrator.report import grains as singles
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
-from tests.report.conftest import only
+from tests.report.conftest import axes_of, changed, copies, legend_of, only
 
 LINE, SOLID, HOLLOW = shields.RESULT
 Points = set[tuple[float, float]]
@@ -31,12 +31,7 @@ def single_figures(results: Results) -> Iterator[Figure]:
 
 
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
-    found = {}
-    for figure in figures:
-        assert figure.canvas is not None
-        figure.canvas.draw_without_rendering()
-        found[figure.name] = figure.canvas.axes
-    return found
+    return {figure.name: axes_of(figure) for figure in figures}
 
 
 def marked(ax: Axes, *marks: str) -> list[Line2D]:
@@ -164,19 +159,17 @@ def test_friction_velocity_is_that_of_the_flow(results: Results) -> None:
 def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None:
     none = {name: pd.DataFrame() for name in results.tables}
     empty = replace(results, tables={**none, "scenes": results.tables["scenes"]})
-    assert {figure.name for figure in single_figures(empty)} == {
-        "closed-form-horizontal", "closed-form-slope-beta60",
-    }  # fmt: skip
-    assert list(pile_figures(empty)) == list(flows.stress(empty)) == []
+    names = {"closed-form-horizontal", "closed-form-slope-beta60"}
+    assert {figure.name for figure in single_figures(empty)} == names
+    assert list(pile_figures(empty)) == list(flows.stress(empty)) == list(bed.draw(empty)) == []
 
 
-def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
-    several_piles: Results,
-) -> None:
-    figures = [*piles.fractions(several_piles), *piles.extended(several_piles)]
+def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: Results) -> None:
+    several = copies(results, *({"averaging_length": i + 1.0} for i in range(7)))
+    figures = [*piles.fractions(several), *piles.extended(several)]
     assert [figure.fold for figure in figures] == [False, True, False, True]
     for figure in figures:
-        axes = drawn([figure])[figure.name]
+        axes = axes_of(figure)
         assert 0 < len(axes) <= style.PANELS
         numbered = {}
         for ax in axes:
@@ -184,20 +177,50 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(
             assert place is not None
             numbered[place.colspan.start] = any(t.get_visible() for t in ax.get_xticklabels())
         assert all(numbered.values())
-    count = sum(len(drawn([figure])[figure.name]) for figure in figures[2:])
-    assert count == 7
+    assert sum(len(axes_of(figure)) for figure in figures[2:]) == 7
 
 
-@pytest.fixture
-def several_piles(results: Results) -> Results:
-    """The study's pile at seven settings of what parts panels."""
-    heap = only(results, "pile")
-    tables = {}
-    for name, own in heap.tables.items():
-        if "scene_id" in own:
-            copies = [own.assign(scene_id=f"copy {i}") for i in range(7)]
-            if name == "scenes":
-                copies = [one.assign(averaging_length=i + 1.0) for i, one in enumerate(copies)]
-            own = pd.concat(copies, ignore_index=True)
-        tables[name] = own
-    return replace(heap, tables=tables)
+def test_curves_and_points_of_two_layers_are_told_apart(results: Results) -> None:
+    two = copies(results, {}, {"mobile_layers": 2, "answered_mobile_layers": 2})
+    for figure in pile_figures(two):
+        (ax,) = axes_of(figure)
+        lines = marked(ax, *two.scenes["scene_id"], SOLID, HOLLOW)
+        assert {line.get_marker() for line in lines} == {"s", "D"}
+        assert {"mobile layers = 1", "mobile layers = 2"} <= set(legend_of(figure))
+
+
+@pytest.mark.parametrize("value", [0.0, -0.01, np.nan, np.inf])
+@pytest.mark.parametrize("rows", [1, 4])
+def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
+    results: Results, value: float, rows: int
+) -> None:
+    own, curve = results.tables["pile_threshold"].copy(), results.tables["pile_curve"].copy()
+    own.loc[own.index[:rows], ["shields", "shields_low", "shields_high", "reynolds"]] = value
+    curve.loc[curve.index[: 3 if rows == 1 else None], ["shields", "reynolds"]] = value
+    heap = only(changed(results, pile_threshold=own, pile_curve=curve), "pile")
+    assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (3 if rows == 1 else 1)
+
+
+def test_the_stress_on_grains_is_not_joined_across_a_gap(results: Results) -> None:
+    grains = results.tables["pile_grain"].sort_values("s_m")
+    gap = grains.drop(grains.index[10:20])
+    (figure,) = flows.stress(changed(results, pile_grain=gap))
+    (line,) = marked(axes_of(figure)[0], "grains")
+    felt = np.asarray(line.get_ydata(), float)
+    assert np.isnan(felt).sum() == 1
+    assert len(felt) == len(gap) + 1
+
+
+def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
+    two = copies(results, {}, {"turbulence_model": "RNGkEpsilon"})
+    pile = two.plan.piles["copy 0"]
+    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon"})
+    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
+    stress = two.tables["wall_stress"]
+    theirs = stress.assign(flow_case=other.flow.name)
+    plan = replace(two.plan, piles={"copy 0": pile, "copy 1": other})
+    both = changed(two, wall_stress=pd.concat([stress, theirs], ignore_index=True))
+    (figure,) = flows.stress(replace(both, plan=plan))
+    titles = [ax.get_title(loc="left") for ax in axes_of(figure)]
+    assert [title.rpartition(", ")[2] for title in titles if title] == ["RNG k-ε", "k-ε"]
+    assert len(figure.cases) == 2

@@ -1,8 +1,10 @@
 """The page: well formed, in need of nothing else, with links that lead somewhere."""
 
 import base64
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 from html.parser import HTMLParser
@@ -10,11 +12,19 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote, urljoin, urlparse
 
+import numpy as np
 import pandas as pd
 import pytest
 
+import orchestrator
+from orchestrator import gallery, tables
+from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.report import bed, document, style
 from orchestrator.report import page as page_module
+from orchestrator.report.document import Section
 from orchestrator.report.results import Results
+from orchestrator.report.style import Figure
+from orchestrator.runs.files import Folder
 from tests.report.conftest import only, write
 from tests.small_study import TITLE
 
@@ -75,9 +85,7 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
     assert '"DejaVu Sans", sans-serif' in style
     assert not any("://" in href for href in parsed.all("a", "href"))
     assert "default-src 'none'" in html
-
-
-def test_only_the_pages_own_script_may_run(html: str) -> None:
+    # no other script than the page's own may run
     script = html[html.rindex("<script>") + 8 : html.rindex("</script>")]
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
     assert f"script-src 'sha256-{digest}'" in html
@@ -159,3 +167,146 @@ def test_symbols_have_an_index_and_names_of_columns_none() -> None:
     assert typeset("column frozen_bed") == "column frozen_bed"
     assert typeset("why_not; Re_p, U_e") == "why_not; Re<sub>p</sub>, U<sub>e</sub>"
     assert typeset("`--tolerance 0` runs") == "<code>--tolerance 0</code> runs"
+
+
+@pytest.mark.parametrize("error", [MemoryError, ValueError])
+def test_a_figure_that_fails_costs_that_figure_and_a_line(
+    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Callable[..., object]
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error("26.5 GiB for <an array>")  # type: ignore[misc]
+
+    monkeypatch.setattr(bed, "read", fail)
+    (tmp_path / "cases").symlink_to(results.cases)
+    html = write(only(results, "pile"), tmp_path, {}).read_text(encoding="utf-8")
+    assert 'id="shields"' in html
+    assert 'id="bed-alpha15"' not in html
+    assert "26.5 GiB for &lt;an array&gt;" in html
+    assert "times the stress of a single one" in html
+
+
+BROWSER = shutil.which("chromium")
+PROBE = """<script>addEventListener("load", () => {
+  const slider = document.querySelector("input[type=range]");
+  slider.value = slider.max; slider.dispatchEvent(new Event("input"));
+  const use = document.querySelector("#shields-0 use"), svg = use.ownerSVGElement;
+  const at = new DOMPoint(+use.getAttribute("x"), +use.getAttribute("y"))
+    .matrixTransform(svg.getScreenCTM());
+  svg.dispatchEvent(new PointerEvent("pointermove", {clientX: at.x, clientY: at.y}));
+  const figure = document.querySelector("figure svg").getBoundingClientRect();
+  document.documentElement.dataset.top = Math.round(figure.top);
+  document.documentElement.dataset.height = document.documentElement.scrollHeight;
+  const folds = () => document.querySelectorAll("figcaption > details:not([open])").length;
+  const closed = folds();
+  dispatchEvent(new Event("beforeprint"));
+  document.documentElement.dataset.printed = `${closed} ${folds()}`;
+  dispatchEvent(new Event("afterprint"));
+  document.documentElement.dataset.after = folds() === closed;
+});</script>"""
+
+
+@pytest.mark.skipif(not BROWSER, reason="no chromium here")
+def test_in_a_browser_the_slider_moves_grains_and_a_point_answers(
+    page: Path, results: Results, tmp_path: Path
+) -> None:
+    html = page.read_text(encoding="utf-8")
+    # the policy lets no other script run: the probe comes without it
+    start, end = html.index("<meta http-equiv"), html.index('<meta name="viewport"')
+    (tmp_path / "page.html").write_text(html[:start] + PROBE + html[end:], encoding="utf-8")
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
+               "--window-size=1280,900", f"--user-data-dir={tmp_path / 'profile'}",
+               (tmp_path / "page.html").as_uri()]  # fmt: skip
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+    steps, moved = (results.tables["pile_curve"][name].max() for name in ("load_step", "moved"))
+    assert f"load step {steps} of {steps}: " in dom
+    assert f"n/N = {moved}/" in dom
+    tip = dom[dom.index('<div class="tip"') :]
+    assert "τ_c = " in tip[: tip.index("<script")]
+    assert "hidden" not in tip[: tip.index(">")]
+    closed, printed = map(int, dom.split('data-printed="')[1].split('"')[0].split())
+    assert closed == html.count("<figcaption>")
+    assert printed == 0
+    assert 'data-after="true"' in dom
+    top = int(dom.split('data-top="')[1].split('"')[0])
+    assert top < 900
+
+
+GRAIN = "grain = { diameter = 1e-3 }\nprotocol = { method = 'pivot' }\n"
+
+
+@pytest.fixture
+def studies(tmp_path: Path) -> Path:
+    """A directory with two finished studies."""
+    for name in ("one", "two & more"):
+        (tmp_path / "study.toml").write_text(f"title = '{name}'\n{GRAIN}")
+        orchestrator.run(tmp_path / "study.toml", out=tmp_path / "all" / name)
+    return tmp_path / "all"
+
+
+def test_gallery_of_studies_keeps_a_page_of_the_users(studies: Path) -> None:
+    (studies / gallery.NAME).write_text("mine")
+    with pytest.warns(UserWarning, match=f"kept as kept/{gallery.NAME}"):
+        gallery.write(studies)
+    assert (studies / "kept" / gallery.NAME).read_text() == "mine"
+    html = (studies / gallery.NAME).read_text("utf-8")
+    assert '<a href="two%20%26%20more/report.html">two &amp; more</a>' in html
+    gallery.write(studies)
+    assert (studies / gallery.NAME).read_text("utf-8") == html
+    assert [path.name for path in (studies / "kept").iterdir()] == [gallery.NAME]
+    with pytest.raises(InputError, match="no study with a page"):
+        gallery.write(studies / "kept")
+
+
+@pytest.mark.parametrize("column", ["usable", "alpha_deg", "answered_method"])
+def test_a_study_of_another_version_costs_its_own_sentences(studies: Path, column: str) -> None:
+    found = orchestrator.open(studies / "one").tables
+    older = {name: table.drop(columns=column, errors="ignore") for name, table in found.items()}
+    tables.write(older, Folder(studies / "one"), "tables")
+    with pytest.raises(OrchestratorError, match="another version of this program"):
+        _ = orchestrator.open(studies / "one").answer
+    html = gallery.write(studies).read_text(encoding="utf-8")
+    assert html.count("<article>") == 2
+    assert html.count("another version of this program wrote them") == 1
+    assert html.count("One grain of 1 mm on 0° starts to move at u* ") == 1
+
+
+SPEED = "Speed & <accuracy>"
+
+
+@pytest.fixture
+def experiment(tmp_path: Path) -> Path:
+    figures = []
+    for name in ("first", "second"):
+        canvas = style.canvas(1.0)
+        canvas.subplots().plot([0, 1])
+        figures.append(Figure(name, f"The {name}", f"What <{name}> shows.", (), canvas))
+    table = pd.DataFrame({"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
+    sections = [
+        Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
+        Section("Found", "", figures[1:], [document.sheet(table)], ["No more than <this>."]),
+    ]
+    document.write(SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
+    return tmp_path / "page.html"
+
+
+def test_page_holds_all_of_its_sections(experiment: Path) -> None:
+    parsed = Page(experiment.read_text(encoding="utf-8"))
+    assert parsed.texts["title"] == parsed.texts["h1"] == SPEED
+    assert parsed.texts["h2"] == "What was runFoundBehind this page"
+    assert parsed.texts["h3"] == "Figure 1. The firstFigure 2. The second"
+    for said in ("Another <b>paragraph</b>.", "What <second> shows.", "No more than <this>."):
+        assert said in parsed.text
+    cells = parsed.texts["td"]
+    assert cells.startswith("a0.1235yesb—no")
+    assert "liggghts3.8" in cells
+    assert "matplotlib" in cells
+
+
+def test_page_of_an_experiment_needs_nothing_else(experiment: Path) -> None:
+    html = experiment.read_text(encoding="utf-8")
+    parsed = Page(html)
+    assert [src.split(",")[0] for src in parsed.all("img", "src")] == ["data:image/png;base64"] * 2
+    assert "default-src 'none'" in html
+    assert not any("://" in href for href in parsed.all("a", "href"))
+    files = {path.name for path in (experiment.parent / "figures").iterdir()}
+    assert files == {"first.png", "first.svg", "second.png", "second.svg"}

@@ -1,18 +1,77 @@
-"""Pictures of the flow, of its mesh, and of the bed with its grains."""
+"""Pictures of flow, mesh, bed and hills, from their study file to what is drawn."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
+from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
 from orchestrator.report import bed, flows
 from orchestrator.report.bed import Steps
-from orchestrator.report.results import Results
+from orchestrator.report.results import FRACTION, Results
 from orchestrator.report.style import Figure
-from tests.report.conftest import only
+from tests import small_study
+
+LEVEL = """
+title = "A level bed"
+grain = { diameter = 1e-3 }
+bed = { kind = "pile", shape = "flat", length = 0.05 }
+flow = { model = "flat" }
+protocol = { method = "peeling" }
+"""
+
+
+TRAIN = """
+title = "Two ripples"
+grain = { diameter = 1e-3 }
+protocol = { method = "peeling" }
+flow = { cells_per_face = 10 }
+[bed]
+kind = "pile"
+shape = "dune"
+slope_deg = 15.0
+height = 0.01
+forms = 2
+mobile_layers = 1
+obstacles = [{ kind = "fence", x = -0.03, height = 0.004 }]
+"""
+
+
+STEEP = """
+title = "A hill"
+grain = { diameter = 4.71e-3 }
+protocol = { method = "pivot" }
+[bed]
+kind = "pile"
+shape = "rushil"
+slope_deg = 26.175
+height = 0.117
+roughness = 1.57e-4
+[flow]
+cells_per_face = 12
+[axes]
+"flow.turbulence_model" = ["kEpsilon", "RNGkEpsilon"]
+"""
+
+
+Studies = pytest.TempPathFactory
+
+
+@pytest.fixture(scope="module")
+def level(tmp_path_factory: Studies) -> Results:
+    return small_study.run(tmp_path_factory.mktemp("level"), LEVEL)
+
+
+@pytest.fixture(scope="module")
+def train(tmp_path_factory: Studies) -> Results:
+    return small_study.run(tmp_path_factory.mktemp("train"), TRAIN)
+
+
+@pytest.fixture(scope="module")
+def hills(tmp_path_factory: Studies) -> Results:
+    return small_study.run(tmp_path_factory.mktemp("hills"), STEEP)
 
 
 def test_field_is_that_of_the_flow(results: Results) -> None:
@@ -106,7 +165,126 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 
-def test_a_bed_without_results_has_no_picture(results: Results) -> None:
-    assert list(bed.draw(only(results, "grain"))) == []
-    none = replace(results, tables={**results.tables, "pile_threshold": pd.DataFrame()})
-    assert list(bed.draw(none)) == []
+@pytest.mark.parametrize(
+    ("x", "z", "marks"),
+    [
+        ((-5, 0, 4, 6, 10), (0, 0, 1, 0, 0), {"toe": 0, "crest": 4, "lee toe": 6}),
+        ((-5, 0, 4, 10), (0, 0, 1, 1), {"toe": 0, "crest": 4}),
+        ((-5, 0, 4, 10), (0, 0, -1, -1), {"crest": 0, "lee toe": 4}),
+        ((-5, 0, 10), (0, 0, 0), {}),
+    ],
+)
+def test_marks_are_where_the_form_is(
+    x: tuple[float, ...], z: tuple[float, ...], marks: dict[str, float]
+) -> None:
+    line = BedLine(x, z, 1.0)
+    assert {name: line.x[at] for name, at in flows.corners(line).items()} == marks
+
+
+def test_the_lee_toe_of_a_noisy_profile_is_not_the_end_of_its_file() -> None:
+    x = np.linspace(0, 20, 401)
+    noise = np.random.default_rng(0).normal(0, 0.01, len(x))
+    z = np.interp(x, [0, 3, 14.5, 17, 20], [0, 0, 1, 0, 0]) + noise
+    line = BedLine((-5, *x, 25), (z[0], *z, z[-1]), 1.0)
+    marks = {name: line.x[at] for name, at in flows.corners(line).items()}
+    assert marks == pytest.approx({"toe": 3, "crest": 14.5, "lee toe": 17}, abs=0.6)
+
+
+def test_no_program_is_named_that_did_not_run(level: Results, results: Results) -> None:
+    (figure,) = bed.draw(level)
+    assert "OpenFOAM" not in figure.caption
+    assert "blue" not in figure.caption
+    (pile,) = results.plan.piles.values()
+    assert "OpenFOAM" in bed.words(results, pile)
+
+
+def test_the_slider_of_a_long_bed_has_few_stops(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (pile,) = results.plan.piles.values()
+    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
+    pile = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+    every = bed.read(pile, results.cases)
+    monkeypatch.setattr(bed, "STOPS", 5)
+    few = bed.read(pile, results.cases)
+    assert len(few.places) <= 6 < len(every.places)
+    assert few.moved(len(few.places) - 1) == every.moved(len(every.places) - 1)
+    share = pile.packing.count * FRACTION
+    at = few.first(FRACTION)
+    assert few.moved(at) == every.moved(every.first(FRACTION)) >= share
+    assert ((few.level > 0) & (few.level <= at)).sum() == few.moved(at)
+
+
+def test_the_speed_of_the_flow_is_that_at_ten_heights(results: Results) -> None:
+    """|u|/U_e is 1 at 10 h far upstream; at the lid it is a quarter more."""
+    (pile,) = results.plan.piles.values()
+    window = (-60.0, -59.0, 10.0, 10.1)
+    speed = np.linalg.norm(flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1)
+    assert np.nanmean(speed) == pytest.approx(1, abs=0.02)
+    (figure,) = flows.flow(results)
+    assert figure.canvas
+    assert "at 10 h" in figure.canvas.axes[-1].get_xlabel()
+    assert "lid" not in figure.canvas.axes[-1].get_xlabel()
+
+
+def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:
+    table = train.tables["form"]
+    assert list(table["form"].unique()) == [1, 2]
+    assert table["count"].sum() / 4 == train.tables["pile_threshold"]["count"].iloc[0]
+    first, second = (table[table["form"] == form].set_index("fraction") for form in (1, 2))
+    assert (first["over_first_form"] == 1).all()
+    np.testing.assert_allclose(
+        second["over_first_form"], second["ustar0_m_s"] / first["ustar0_m_s"]
+    )
+    assert (np.diff(first["ustar0_m_s"]) >= 0).all()
+
+
+def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
+    (figure,) = flows.where(train)
+    grains = train.tables["pile_grain"]
+    (dots,) = (
+        artist
+        for part in figure.canvas.subfigs  # type: ignore[union-attr]
+        for axes in part.axes
+        for artist in axes.collections
+        if artist.get_gid() == "thresholds"
+    )
+    shown = np.asarray(dots.get_offsets())
+    goes = grains[grains["ustar0_m_s"].notna()]
+    np.testing.assert_allclose(shown[:, 0], goes["x_m"] / 0.01)
+    np.testing.assert_allclose(shown[:, 1], goes["ustar0_m_s"])
+
+
+def test_the_picture_of_a_long_train_shows_single_grains(train: Results) -> None:
+    (pile,) = train.plan.piles.values()
+    assert "Shown" not in bed.words(train, pile)
+    five = pile.scene.model_copy(update={"bed": pile.bed.model_copy(update={"forms": 20})})
+    long = replace(pile, scene=five)
+    assert float(long.line.toe[0]) > bed.WHOLE * bed.LONG
+    left, right, *_ = bed.window(long)
+    assert right - left == pytest.approx(bed.LONG)
+    assert left < float(long.line.crest[0]) < right
+    assert "of the first form" in bed.words(train, long)
+
+
+def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None:
+    """On a coarse mesh too, the flow leaves behind the top and is back within 4 to 9 heights."""
+    table = hills.tables["flow"]
+    assert (table["measured_reattachment_over_h"] == 6.5).all()
+    assert not table["measured_verified"].any()
+    assert table["measured_source"].str.contains("unverified").all()
+    assert table["separation_over_h"].between(0.1, 2).all()
+    assert table["reattachment_over_h"].between(4, 9).all()
+    assert table["ustar_mean"].between(1.2, 1.5).all()
+
+
+def test_computed_stands_beside_measured(hills: Results) -> None:
+    (figure,) = flows.hills(hills)
+    assert figure.canvas
+    lines = [line for axes in figure.canvas.axes for line in axes.lines]
+    (measured_,) = (line for line in lines if line.get_gid() == "measured")
+    np.testing.assert_array_equal(np.asarray(measured_.get_xdata()), 6.5)
+    ends = [np.asarray(one.get_xdata())[1] for one in lines if one.get_gid() == "reversed flow"]
+    np.testing.assert_allclose(ends, hills.tables["flow"]["reattachment_over_h"])
+    tops = [np.max(np.asarray(one.get_ydata())) for one in lines if one.get_gid() == "stress"]
+    np.testing.assert_allclose(tops, hills.tables["flow"]["ustar_largest"])

@@ -1,0 +1,183 @@
+"""The answer in words and tables: every row has its scene, its interval and its doubts."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.report import bed, labels, shields, words
+from orchestrator.report.results import Results
+from orchestrator.report.shields import SHAPE
+from orchestrator.study import fields
+from tests.report.conftest import changed, copies, legend_of, only
+
+SHOWN = ("alpha_deg", "d_m")
+LAYERS: tuple[dict[str, Any], ...] = ({}, {"mobile_layers": 2, "answered_mobile_layers": 2})
+
+
+@pytest.fixture
+def table() -> pd.DataFrame:
+    """Piles of two slopes, by two numbers of layers and two stiffnesses."""
+    return pd.DataFrame(
+        {
+            "alpha_deg": [15.0, 15.0, 15.0, 25.0],
+            "d_m": 1e-3,
+            "force_law": "high",
+            "mobile_layers": [1, 2, 1, 1],
+            "stiffness": [1e3, 1e3, 1e4, 1e3],
+            "load_increment": [0.02, 0.03, 0.02, 0.02],
+            "seed": [1, 2, 3, 4],
+        }
+    )
+
+
+def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
+    assert labels.varying(table, *SHOWN) == ["stiffness", "mobile_layers"]
+    assert labels.varying(table, *SHOWN, "mobile_layers") == ["stiffness"]
+    assert labels.varying(table.iloc[[0, 3]], *SHOWN) == []
+    # the method comes before the fields that it alone has
+    methods = {
+        "alpha_deg": 0.0,
+        "rho_f_kg_m3": [1000.0, 1000.0, 1.2, 1000.0],
+        "stiffness": [np.nan, np.nan, np.nan, 1e3],
+        "method": ["pivot", "peeling", "peeling", "dem"],
+        "update": [np.nan, 0.0, 0.0, 0.0],
+    }
+    assert labels.varying(pd.DataFrame(methods), "alpha_deg") == ["rho_f_kg_m3", "method"]
+
+
+def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
+    asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
+    panels, rows, entries = shields.parted(asked, *SHOWN)
+    assert panels == ["packing"]
+    assert rows[SHAPE].tolist() == ["s", "D", "s", "s"]
+    names = [one[0].get_label() for one in entries if isinstance(one, tuple)]
+    assert names == ["mobile layers = 1", "mobile layers = 2"]
+
+
+def test_rows_of_two_layers_are_told_apart(results: Results) -> None:
+    sheet = words.piles(copies(results, *LAYERS))
+    assert sheet is not None
+    assert set(sheet["mobile layers"]) == {"1", "2"}
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("alpha_deg", 10.463, "α = 10.46°"),
+        ("z0_over_d", 0.033333333, "z₀ = d/30"),
+        ("d_m", 7e-4, "d = 0.7 mm"),
+        ("convection_scheme", "upwind", "convection scheme upwind"),
+        ("waiting_time", 6.0, "waiting time = 6 √(d/g′)"),
+        ("averaging_length", 0.05, "averaging length = h/20"),
+        ("fraction", 0.3, "n/N = 30 %"),
+    ],
+)
+def test_values_with_their_symbols(column: str, value: object, said: str) -> None:
+    assert labels.plain(column, value) == said
+
+
+def test_page_lists_every_parameter(results: Results) -> None:
+    rows = {row[2]: row[3:] for row in words.parameters(results).to_numpy().tolist()}
+    used = [column for column in fields.COLUMNS if results.scenes[column].notna().any()]
+    assert rows.keys() >= {fields.COLUMNS[column].name or column for column in used}
+    assert rows["flow.turbulence_model"] == ["kEpsilon", ""]
+    asked, answered = rows["flow.first_cell_height"]
+    assert asked == "default"
+    assert float(answered) > 0
+
+
+def test_the_picture_is_of_the_scene_that_the_sentence_is_about(results: Results) -> None:
+    """Of a pile in water that is usable and one in air that is not, whatever their order."""
+    air = {"rho_f_kg_m3": 1.2, "usable": False, "why_not": "smooth", "answered_method": "dem"}
+    water = {"rho_f_kg_m3": 1e3, "usable": True, "why_not": "", "answered_method": "peeling"}
+    for both in ((air, water), (water, air)):
+        study = copies(results, *both)
+        row, _ = next(bed.chosen(study))
+        assert row["rho_f_kg_m3"] == 1e3
+        (figure,) = bed.draw(study)
+        assert "1000 kg/m³" in figure.title
+        assert any("1000 kg/m³" in sentence for sentence in words.sentences(study))
+
+
+def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
+    fluids: list[dict[str, Any]] = [
+        {"rho_f_kg_m3": rho, "d_m": 1e-3 * (1 + n), "usable": True}
+        for rho in (1.2, 1e3)
+        for n in range(words.FEW)
+    ]
+    study = copies(results, *fluids)
+    sheet, said = words.short(study), " ".join(words.sentences(study))
+    assert sheet is not None
+    assert len(sheet) == 2
+    assert "1.2 kg/m³" in said
+    assert "1000 kg/m³" in said
+
+
+def test_seeds_are_one_row_with_their_range(results: Results) -> None:
+    thetas = (0.04, 0.05, 0.09)
+    seeds = ({"seed": n, "packing": "disordered", "shields": t} for n, t in enumerate(thetas))
+    study = copies(results, *seeds)
+    sheet = words.short(study)
+    assert sheet is not None
+    (row,) = sheet.to_numpy().tolist()
+    assert {"3 of 3", "0.0400 … 0.0900"} <= set(row)
+    first, *_ = words.sentences(study)
+    assert "τ_c = 0.06 in the mean of 3 seeds (0.04 … 0.09)" in first
+
+
+def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
+    grains = only(results, "grain")
+    assert words.sentences(grains)[0].startswith("One grain of 0.05 mm on 0° starts to move at u* ")
+    without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
+    exact = changed(grains, single_grain=without)
+    sheet = words.short(exact)
+    assert sheet is not None
+    assert set(sheet["by"]) == {"closed form"}
+    assert "One grain" in words.sentences(exact)[0]
+
+
+def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
+    bad = results.tables["pile_threshold"].assign(usable=False, why_not="Re* 2 is below 30")
+    study = changed(results, pile_threshold=bad)
+    first, *others = words.sentences(study)
+    assert first.endswith("(not usable: Re* 2 is below 30).")
+    assert others[0] == "Usable: 0 of 4 thresholds."
+    sheet = words.short(study)
+    assert sheet is not None
+    assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
+
+
+def test_of_many_piles_one_fraction_is_drawn(results: Results) -> None:
+    many = copies(results, *[{}] * (shields.FEW + 1))
+    shown = shields.shown_piles(many)
+    assert set(shown["fraction"]) == {0.3}
+    assert len(shown) == shields.FEW + 1
+    heap = only(results, "pile")
+    assert len(shields.shown_piles(heap)) == len(heap.tables["pile_threshold"])
+
+
+def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
+    (figure,) = shields.draw(results)
+    assert figure.canvas is not None
+    (ax,) = figure.canvas.axes
+    drawn = {line.get_gid(): line for line in ax.lines}
+    said = [text for group in figure.data.values() for text in group]
+    piles, grains = results.tables["pile_threshold"], results.tables["single_grain"]
+    assert len(said) == len(piles) + (grains["alpha_deg"] == 0).sum()
+    for gid, group in figure.data.items():
+        assert len(np.asarray(drawn[gid].get_xdata())) == len(group)
+    for row in piles.to_dict("records"):
+        value = f"τ_c = {row['shields']:.4g} ({row['shields_low']:.4g} … {row['shields_high']:.4g})"
+        (text,) = [one for one in said if one[1].startswith(value)]
+        assert text[0].startswith("α = 15°, d = 1 mm, z₀ = d/30")
+        assert text[2:] == [row["why_not"], row["case"]]
+
+
+def test_the_lines_beside_piles_have_the_roughness_of_the_piles(results: Results) -> None:
+    """Single grains on d/10 fit the measurements better; the piles are on d/30."""
+    (figure,) = shields.draw(results)
+    lines = [text for text in legend_of(figure) if text.startswith("Eq.")]
+    assert len(lines) == 2
+    assert all(text.endswith("β = 60°, z₀ = d/30") for text in lines)
