@@ -11,7 +11,7 @@ from orchestrator.fidelity import decision, limits
 from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
-from orchestrator.runs.case import Case, done_state, failure
+from orchestrator.runs.case import Case, done_state, failure, is_whole
 from orchestrator.runs.progress import human
 from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
@@ -57,7 +57,10 @@ class Plan:
     def missing(self, directory: Path) -> dict[str, Case]:
         """The cases that are not done yet, by name."""
         done = self.done(directory)
-        return {name: case for name, case in self.cases.items() if name not in done}
+        missing = {name: case for name, case in self.cases.items() if name not in done}
+        # a flow on a fine mesh starts from fields that `prune` may have dropped
+        alike = (need for each in missing.values() for need in each.needs if need.kind == each.kind)
+        return {each.name: each for each in alike if not is_whole(each, directory)} | missing
 
 
 def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:

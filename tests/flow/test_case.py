@@ -15,6 +15,7 @@ from orchestrator.errors import Exploded, SolverError, Stalled
 from orchestrator.flow.case import DIAGNOSTICS, FINE, WALL_STRESS, FlowCase
 from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import APPROACH_ERROR, WallStress, bubble
+from orchestrator.plan import Plan
 from orchestrator.runs import case
 from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
@@ -231,6 +232,16 @@ def test_a_fine_flow_starts_near_where_it_ends(solve: Solve) -> None:
     assert f"[{coarser.name!r}]" == str(read_json(fine_ / "case.json")["needs"])
     iterations = [openfoam.check_log(directory) for directory in (fine_, coarse)]
     assert iterations[0] < 1.2 * iterations[1]
+
+
+def test_a_pruned_flow_runs_again_for_a_finer_one(solve: Solve, tmp_path: Path) -> None:
+    fine = replace(changed(PILE, cells_per_face=FINE, lid=10.0), slope_deg=25.0)
+    (coarser,) = fine.needs
+    shutil.copytree(solve(coarser), tmp_path / coarser.name)
+    planned = Plan({}, {}, (), {}, {coarser.name: coarser, fine.name: fine})
+    assert set(planned.missing(tmp_path)) == {fine.name}
+    case.prune(coarser, tmp_path)
+    assert set(planned.missing(tmp_path)) == {coarser.name, fine.name}
 
 
 def test_the_stress_scales_with_the_size(solve: Solve) -> None:
