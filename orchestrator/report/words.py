@@ -181,7 +181,7 @@ def _thresholds(
 ) -> pd.DataFrame:
     """A row for all thresholds that agree in some columns: the ranges of the usable ones.
 
-    Of none that is usable the range of all is told. `more` are columns to be told at the end.
+    Of single piles of which none is usable all are told. `more` are columns at the end.
     """
     ranges = "d_m" not in keys
     if ranges:  # fluids are never merged
@@ -190,12 +190,12 @@ def _thresholds(
     by = [rows[key] for key in keys]
     groups = rows.groupby(by, dropna=False, sort=False)
     count, usable, first = groups.size(), groups["usable"].sum(), groups.first()
-    told = rows["usable"] | ~groups["usable"].transform("any")
+    told = rows["usable"] | (~groups["usable"].transform("any") & (not ranges))
     shown = rows.select_dtypes("number").where(told).groupby(by, dropna=False, sort=False)
     low, high = shown.min(), shown.max()
 
-    def span(form: str, *columns: str, scale: float = 1.0) -> list[str]:
-        values = pd.concat([low[list(columns)], high[list(columns)]], axis=1).to_numpy() * scale
+    def span(form: str, *columns: str) -> list[str]:
+        values = pd.concat([low[list(columns)], high[list(columns)]], axis=1).to_numpy()
         ends = zip(values.min(axis=1), values.max(axis=1), strict=True)
         texts = (dict.fromkeys(format(float(end), form) for end in pair) for pair in ends)
         return ["—" if "nan" in text else " … ".join(text) for text in texts]
@@ -203,7 +203,9 @@ def _thresholds(
     index = first.index.to_frame(index=False)
     table = {labels.words(key).label: [labels.value(key, v) for v in index[key]] for key in keys}
     if ranges:
-        table["diameter, mm"] = span("g", "d_m", scale=1e3)
+        sizes = zip(groups["d_m"].min(), groups["d_m"].max(), strict=True)
+        texts = (dict.fromkeys(f"{1e3 * d:g}" for d in ends) for ends in sizes)
+        table["diameter, mm"] = [" … ".join(text) for text in texts]
     table[tau] = span(".4f", "shields")
     table["interval"] = span(".4f", "shields_low", "shields_high")
     if "shields_model_low" in rows and not ranges:
@@ -213,7 +215,8 @@ def _thresholds(
     table["u*₀, m/s"] = span(".3f", "ustar0_m_s")
     ends = zip(usable, count, first["why_not"], strict=True)
     table["usable"] = [
-        f"no: {why}" if not n else "yes" if of == 1 else f"{n} of {of}" for n, of, why in ends
+        f"{n} of {of}" if ranges or (n and of > 1) else "yes" if n else f"no: {why}"
+        for n, of, why in ends
     ]
     return pd.DataFrame({**table, **{name: first[name].map(str).tolist() for name in more}})
 
