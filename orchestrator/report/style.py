@@ -47,26 +47,11 @@ NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 
 @dataclass(frozen=True)
 class Figure:
-    """A drawing with its heading and its caption.
+    """A drawing: its file's stem, heading, caption and the directories of the cases behind it.
 
-    Attributes
-    ----------
-    name : str
-        Stem of the names of its files.
-    title, caption : str
-        A heading, and what the figure shows, by which equations and with which uncertainty.
-    cases : tuple of str
-        Directories of the cases behind it.
-    canvas : matplotlib.figure.Figure or None
-        The drawing; None once its files are written.
-    image : bytes
-        The picture that the page shows, SVG or PNG, once it is made.
-    data : object
-        Data of the page's script for a pointer or a slider, as JSON; None if there are none.
-    fold : bool
-        Whether the page shows it on demand alone.
-    first : bool
-        Whether it answers the study's question and stands before all others.
+    `canvas` is None once the files are written, and `image` (SVG or PNG) is what the page shows.
+    `data` are for the page's script, a pointer or a slider; None if there are none. The page shows
+    a figure with `fold` on demand alone, and one with `first` before all others.
     """
 
     name: str

@@ -375,10 +375,7 @@ SHEETS: tuple[Callable[[Results], Any], ...] = (
 def contents(
     results: Results, timings: pd.DataFrame, failures: Mapping[str, str]
 ) -> dict[str, Any]:
-    """The words and numbers of the page beside its figures, by the names of its template.
-
-    `timings` are the wall times of the finished cases, `failures` the causes by name of case.
-    """
+    """The words and numbers of the page beside its figures, by the names of its template."""
     from orchestrator.report import flows, measured  # both import what draws
 
     methods, root = set(results.scenes["answered_method"]), results.cases
