@@ -215,6 +215,6 @@ def made_by_gmsh(directory: Path) -> Any:
             raise SolverError(f"no usable mesh: {error}", where=where, remedy=remedy) from error
         finally:
             gmsh.finalize()
-    mesh = meshio.read(directory / "pile.msh")
+    mesh = meshio.read(directory / "pile.msh", file_format="gmsh")
     (directory / "pile.msh").unlink()  # OpenFOAM's files hold the same
     return mesh
