@@ -217,7 +217,12 @@ def model_class(scene: Scene) -> str:
 
 def spread(scene: Scene, fraction: float) -> Spread:
     """The spread of the threshold of a pile at a fraction of its grains."""
-    shares = _shares(model_class(scene), fraction)
+    return _spread(model_class(scene), fraction)
+
+
+@cache
+def _spread(model: str, fraction: float) -> Spread:
+    shares = _shares(model, fraction)
     if shares.empty:
         return Spread(math.nan, math.nan, "")
     widest = (shares["shields_low"] + shares["shields_high"]).to_numpy().argmax()
@@ -241,7 +246,12 @@ def frozen_bed(scene: Scene, fraction: float) -> float:
     """
     if scene.protocol.update or scene.flow.model != "solve":
         return math.nan
-    shares = _shares(model_class(scene), fraction)
+    return _frozen_bed(model_class(scene), fraction)
+
+
+@cache
+def _frozen_bed(model: str, fraction: float) -> float:
+    shares = _shares(model, fraction)
     ends = shares.loc[shares["choice"] == FROZEN, ["shields_low", "shields_high"]]
     return math.nan if ends.empty else float(ends.to_numpy().max())
 
