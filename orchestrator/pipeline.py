@@ -58,19 +58,20 @@ def run(
         If the study cannot be answered or the directory not be used; if a solver is missing or too
         old; if the user stopped it: then every child has ended.
     """
-    plan.make(study)  # what cannot be answered is refused before anything is written
     space = Workspace(out.absolute())
+    # what cannot be answered is refused before anything is written
+    first = plan.make(study, cases=space.cases)
     with claimed(space.root, STUDY, study.name):
-        planned = plan.settled(study, space.cases)
+        planned = plan.settled(study, space.cases, first)
         changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
         failures: dict[str, OrchestratorError] = {}
-        while names := [name for name in planned.cases if name not in {**states, **failures}]:
-            started += len(names)
-            todo, limit_s = {name: planned.cases[name] for name in names}, study.time_limit_s
+        limit_s = study.time_limit_s
+        while todo := planned.missing(space.cases, {**states, **failures}):
+            started += len(todo)
             failures |= complete(todo, space, workers, limit_s, queue, planned.drawing_s)
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
-            planned = plan.settled(study, space.cases)
+            planned = plan.settled(study, space.cases, first)
             _describe(space, study, planned)
             states |= planned.done(space.cases, but=states)
         answer = space.answer(_ids(planned))

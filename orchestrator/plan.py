@@ -54,13 +54,14 @@ class Plan:
             states = list(pool.map(lambda case: done_state(case, directory), cases))
         return {case.name: state for case, state in zip(cases, states, strict=True) if state}
 
-    def missing(self, directory: Path) -> dict[str, Case]:
-        """The cases that are not done yet, by name."""
-        done = self.done(directory)
+    def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
+        """The cases to be run, by name: those that are not done, and those pruned that they need.
+
+        `done` has the names of those that are done.
+        """
         missing = {name: case for name, case in self.cases.items() if name not in done}
-        # a flow on a fine mesh starts from fields that `prune` may have dropped
-        alike = (need for each in missing.values() for need in each.needs if need.kind == each.kind)
-        return {each.name: each for each in alike if not is_whole(each, directory)} | missing
+        starts = (need for case in missing.values() if case.needs_bulky for need in case.needs)
+        return {case.name: case for case in starts if not is_whole(case, directory)} | missing
 
 
 def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
@@ -120,11 +121,14 @@ def of(
     return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
 
 
-def settled(study: Study, directory: Path) -> Plan:
-    """The plan after the runs that are done: dearer levels where one failed or DEM overrules it."""
+def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
+    """The plan after the runs that are done: dearer levels where one failed or DEM overrules it.
+
+    `first` is the plan for the same directory before any run, where it is known.
+    """
     above: dict[str, Bound] = {}
+    plan = first or make(study, above, directory)
     while True:
-        plan = make(study, above, directory)
         more = {
             asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
             for asked, answer in plan.decisions.items()
@@ -137,6 +141,7 @@ def settled(study: Study, directory: Path) -> Plan:
         if not more:
             return plan
         above |= more
+        plan = make(study, above, directory)
 
 
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
@@ -161,7 +166,7 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 
 def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: the cases of a plan by kind, expected time and disk."""
-    missing = plan.missing(directory).values()
+    missing = plan.missing(directory, plan.done(directory)).values()
     todo = Counter(case.kind for case in missing)
     yield f"{_number(len(plan.cases), 'case')}, {len(missing)} to run"
     for kind, times in Counter(case.kind for case in plan.cases.values()).items():

@@ -72,7 +72,7 @@ class Experiment:
         space, planned = Workspace(out.absolute()), self.planned
         with claimed(space.root, EXPERIMENT, self.name) as folder:
             space.describe(EXPERIMENT, self.name, list(planned.cases))
-            missing = planned.missing(space.cases).items()
+            missing = planned.missing(space.cases, planned.done(space.cases)).items()
             ends = {name: case.ended(space.cases / name)[0] for name, _ in missing}
             todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
             failures = pipeline.complete(todo, space, workers=workers, limit_s=self.limit_s)

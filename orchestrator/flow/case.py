@@ -86,6 +86,7 @@ class FlowCase(Case):
         "[1-9]*/uniform/functionObjects/functionObjectProperties",
         "postProcessing/wallShearStress/*/wallShearStress.dat",
     )
+    needs_bulky: ClassVar[bool] = True
     made: ClassVar[tuple[str, ...]] = ("log.simpleFoam",)
 
     @property

@@ -79,6 +79,8 @@ class Case(ABC):
     """Tables that `collect` makes of the results; not the solver's own."""
     bulky: ClassVar[tuple[str, ...]] = ()
     """Large files that the run leaves and no table is made of: `prune` drops them."""
+    needs_bulky: ClassVar[bool] = False
+    """Whether its inputs are made of the bulky files, too, of the cases that it needs."""
     made: ClassVar[tuple[str, ...]] = ()
     """Patterns of other files that a run writes or leaves; files that fit none are not its own."""
 

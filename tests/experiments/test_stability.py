@@ -46,7 +46,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     planned = stability.planned_for([one])
     space = Workspace(tmp_path / "out")
     with claimed(space.root, EXPERIMENT, "stability"):
-        pipeline.complete(planned.missing(space.cases), space, workers=2, limit_s=120)
+        pipeline.complete(planned.missing(space.cases, ()), space, workers=2, limit_s=120)
     runs = Runs(planned, space.cases, planned.done(space.cases), {})
     good, bad = stability.judge(one, runs).sort_values("x").to_dict("records")
     assert good["verdict"] == "good"

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestrator import pipeline, plan
 from orchestrator.bed.line import between_flats
 from orchestrator.errors import Exploded, SolverError, Stalled
 from orchestrator.flow.case import DIAGNOSTICS, FINE, WALL_STRESS, FlowCase
 from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.stress import APPROACH_ERROR, WallStress, bubble
-from orchestrator.plan import Plan
 from orchestrator.runs import case
 from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
 from orchestrator.study.scene import default_first_cell_height
+from orchestrator.study.study import parse
 from tests.flow.conftest import OPEN, PILE, SLOW, Solve, allrun, changed, edit
 
 MESH_FILES = ("points", "faces", "owner", "neighbour", "boundary")
@@ -234,14 +235,30 @@ def test_a_fine_flow_starts_near_where_it_ends(solve: Solve) -> None:
     assert iterations[0] < 1.2 * iterations[1]
 
 
-def test_a_pruned_flow_runs_again_for_a_finer_one(solve: Solve, tmp_path: Path) -> None:
-    fine = replace(changed(PILE, cells_per_face=FINE, lid=10.0), slope_deg=25.0)
-    (coarser,) = fine.needs
-    shutil.copytree(solve(coarser), tmp_path / coarser.name)
-    planned = Plan({}, {}, (), {}, {coarser.name: coarser, fine.name: fine})
-    assert set(planned.missing(tmp_path)) == {fine.name}
-    case.prune(coarser, tmp_path)
-    assert set(planned.missing(tmp_path)) == {coarser.name, fine.name}
+@pytest.mark.parametrize("pruned", [True, False])
+def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) -> None:
+    """A finished flow runs once: again only where a finer one starts from what prune dropped."""
+    text = """
+        [grain]
+        diameter = 1e-3
+        [bed]
+        kind = "pile"
+        slope_deg = 15.0
+        [flow]
+        lid = 10.0
+        upstream = 10.0
+        downstream = 20.0
+        cells_per_face = {}
+        [protocol]
+        method = "pivot"
+    """
+    coarse, fine = (parse(text.format(n), name="a", where="a") for n in (FINE // 2, FINE))
+    pipeline.run(coarse, tmp_path, workers=1)
+    if pruned:
+        (flow,) = plan.make(coarse).cases.values()
+        case.prune(flow, tmp_path / "cases")
+    finished = pipeline.run(fine, tmp_path, workers=1)
+    assert (finished.started, finished.failures) == (1 + pruned, {})
 
 
 def test_the_stress_scales_with_the_size(solve: Solve) -> None:
