@@ -193,9 +193,9 @@ class Plots:
 
     def shields(self) -> "Figure":
         """The extended Shields diagram of the page; an `OrchestratorError` if there is none."""
-        from orchestrator.report import settings, shields
+        from orchestrator.report import shields, style
 
-        with settings.own():
+        with style.settings():
             for figure in shields.draw(self._results):
                 if figure.canvas:
                     return figure.canvas

@@ -1,6 +1,5 @@
 """One page over several studies: a card each, with its answer and its picture."""
 
-import base64
 from pathlib import Path
 from urllib.parse import quote
 
@@ -33,7 +32,7 @@ def write(directory: Path) -> Path:
         except OrchestratorError as error:
             title, says = study.name, (error.what,)
         figures = [path for name in PICTURES for path in sorted((study / FIGURES).glob(name))]
-        image = base64.b64encode(figures[0].read_bytes()).decode("ascii") if figures else ""
+        image = figures[0].read_bytes() if figures else b""
         link = quote(f"{study.name}/{PAGE}")
         cards.append({"title": title, "link": link, "says": says, "image": image})
     if not cards:

@@ -16,8 +16,8 @@ from orchestrator.benchmark.compare import OURS
 from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
 from orchestrator.physics import curves
-from orchestrator.report import document, settings
-from orchestrator.report.document import Section, sheet
+from orchestrator.report import page, style
+from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, WATER, Figure
 from orchestrator.runs.files import Folder
 
@@ -72,7 +72,7 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
     moved = "Grains that have moved, "
-    with settings.own(), warnings.catch_warnings():
+    with style.settings(), warnings.catch_warnings():
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         beds = [
@@ -93,12 +93,12 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
         ]
         title = f"Against the pack “{printable(chosen.root.name)}”: {', '.join(names)}"
         shown = [part for part in sections if part.figures or any(map(len, part.tables))]
-        document.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
+        page.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
 
 
 def _sheet(table: pd.DataFrame) -> pd.DataFrame:
     # heads are typeset: an underscore of a solver's name would lower the letters after it
-    return sheet(table.rename(columns=lambda name: name.replace("_", " ")))
+    return table.rename(columns=lambda name: name.replace("_", " "))
 
 
 def about(chosen: Pack, scene: str) -> str:

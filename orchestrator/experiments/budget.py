@@ -38,7 +38,7 @@ from orchestrator.grains.pile import line as bed_line
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
-from orchestrator.report.document import Section, sheet
+from orchestrator.report.page import Section
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
@@ -234,8 +234,8 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
             "share", "choice", "head", aggfunc="first", sort=False
         )
         chart = figure(f"tornado-{number}", name, tornado(largest), words["scene"])
-        tornados.append(Section(name, "", (chart,), [sheet(wide.reset_index())]))
-    title, all_scenes = "All choices together", sheet(pd.DataFrame(rows))
+        tornados.append(Section(name, "", (chart,), [wide.reset_index()]))
+    title, all_scenes = "All choices together", pd.DataFrame(rows)
     sections = [Section(title, words["together"], (), [all_scenes], [words["limit"]])]
     frozen = moved[moved["choice"] == FROZEN]
     if len(frozen):
@@ -249,15 +249,15 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
         drawn = curves(worn[:MOST_PILES], runs.cases)
         chart = figure("wear", "Frozen bed and bed that changes", drawn, words["wear"])
         title = "The bed that changes"
-        sections.append(Section(title, words["changing"], (chart,), [sheet(table)]))
+        sections.append(Section(title, words["changing"], (chart,), [table]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
-    sheets = [sheet(pd.DataFrame(kept, columns=["choice", "alternatives", "why"]))]
+    sheets = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
     columns = ["scene", "choice", "alternative"]
     lost = [c for c in listed if not runs.are_done(c.other)]  # a flow model may refuse a bed
     if lost:
         refused = [(label(c.scene), c.choice.name, c.alternative) for c in lost]
-        sheets.append(sheet(pd.DataFrame(refused, columns=columns)))
+        sheets.append(pd.DataFrame(refused, columns=columns))
     text = "The alternatives of the second table have no answer." * bool(lost)
     last = Section("The choices and their alternatives", text, tables=sheets)
     return [*sections, *tornados, last]

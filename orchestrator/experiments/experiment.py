@@ -12,8 +12,8 @@ from orchestrator import pipeline
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
-from orchestrator.report import document, settings
-from orchestrator.report.document import Section
+from orchestrator.report import page, style
+from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
 from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace, claimed
@@ -82,12 +82,12 @@ class Experiment:
                 remedy = "`orchestrator status` names the causes; the same command continues"
                 what = "no reference ran to its end: nothing is known"
                 raise OrchestratorError(what, where=str(out), remedy=remedy)
-            with settings.own(), folder.renewed(but=MARKERS):
+            with style.settings(), folder.renewed(but=MARKERS):
                 for key, table in tables.items():
                     folder.put(f"tables/{key}.csv", csv(table))
                 solvers = case.programs(space.cases, planned.cases)
                 sections = self.sections(tables, runs)
-                document.write(self.title, sections, folder, space.page.name, solvers)
+                page.write(self.title, sections, folder, space.page.name, solvers)
         if self.failing is not None:
             failures = {name: error for name, error in failures.items() if name in self.failing}
         return Finished(space.page, len(todo), failures)

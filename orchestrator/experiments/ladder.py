@@ -54,7 +54,7 @@ from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
-from orchestrator.report.document import Section, sheet
+from orchestrator.report.page import Section
 from orchestrator.report.style import Look
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
@@ -338,14 +338,14 @@ def _sections(tables: Tables, runs: Runs) -> list[Section]:
     ]
     gained, title = figure("gains", "Factors gained", gains(tables["naive"])), "The fidelity levels"
     known_title = f"{title}, and what is known of them"
-    known_tables = [sheet(meanings), sheet(known)]
+    known_tables = [meanings, known]
     return [
-        Section("Speed against accuracy", words["accuracy"], charts, [sheet(means)]),
+        Section("Speed against accuracy", words["accuracy"], charts, [means]),
         Section(
             "What is gained over the naive route",
             words["naive"],
             [gained],
-            [sheet(tables["naive"])],
+            [tables["naive"]],
         ),
         Section(known_title, words["levels"], (), known_tables, [words["limit"]]),
     ]

@@ -25,7 +25,7 @@ from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
 from orchestrator.report import style
-from orchestrator.report.document import Section
+from orchestrator.report.page import Section
 from orchestrator.report.style import Look
 from orchestrator.runs import case
 from orchestrator.study.closed_form import resolved

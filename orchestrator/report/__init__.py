@@ -1,8 +1,7 @@
 """Figures and page of a study."""
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator.errors import OrchestratorError
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from orchestrator.report.results import Results
-    from orchestrator.report.style import Figure
     from orchestrator.runs.case import Case
     from orchestrator.runs.files import Folder
     from orchestrator.study.study import Study
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
 
 PAGE = "report.html"
 FIGURES = "figures"
-
-
 Guest = Callable[["Study", "Tables", Sequence[str]], tuple["Markup", Mapping[str, str]] | None]
 """Given a study, its tables and the names of its figures in their order, the part of the page that
 a guest adds, if any: a section, and the texts of files beside the page by their names."""
@@ -38,47 +34,33 @@ def write(
     """Draw the figures of a study and write its page into its directory.
 
     `timings` are the wall times of the finished cases, `failures` the cases that failed, with why.
+    A figure that fails, for any cause such as too little memory, costs a line of the page.
     """
-    from orchestrator.report import page, settings, words
+    from orchestrator.report import bed, flows, grains, page, piles, shields, style, words
 
+    figures: list[style.Figure] = []
     faults: list[str] = []
-    with settings.own():
-        figures = list(_drawn(results, folder, faults))
-    for fault in faults:
-        print(f"a figure could not be drawn: {fault}", file=sys.stderr)
+    with style.settings():
+        for draw in (
+            *(bed.draw, shields.draw, grains.draw, piles.extended, piles.fractions, piles.wear),
+            *(grains.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
+            *(flows.where, flows.hills),
+        ):
+            try:
+                for figure in draw(results):
+                    figures.append(style.saved(figure, folder))
+            except Exception as error:
+                faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
+                print(f"a figure could not be drawn: {faults[-1]}", file=sys.stderr)
+            terminal.check()
     figures.sort(key=lambda figure: (not figure.first, not figure.leads))
     names = [figure.name for figure in figures]
     added = [part for guest in guests if (part := guest(results.study, results.tables, names))]
     for name, text in (item for _, files in added for item in files.items()):
         folder.put(name, text)
-    parts = {**words.contents(results, timings, failures), "faults": faults}
-    parts["sections"] = [section for section, _ in added]
-    entries = [{**page.entry(figure), "number": n} for n, figure in enumerate(figures, 1)]
+    parts = {**words.contents(results, timings, failures), "faults": faults, "figures": figures}
     terminal.check()
-    folder.put(PAGE, page.fill("page.html.j2", **parts, figures=entries))
-
-
-def _drawn(results: "Results", folder: "Folder", faults: list[str]) -> "Iterator[Figure]":
-    """The figures of a study with their images, in the order of the page; their files are put.
-
-    The answer does not depend on the figures: one that fails, for any cause such as too little
-    memory, costs a line in `faults`.
-    """
-    from orchestrator.report import bed, flows, grains, piles, shields, style
-
-    for draw in (
-        *(bed.draw, shields.draw, grains.draw, piles.extended, piles.fractions, piles.wear),
-        *(grains.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
-        *(flows.where, flows.hills),
-    ):
-        try:
-            for figure in draw(results):
-                image = style.svg(figure.canvas) if figure.canvas else figure.image
-                folder.put(f"{FIGURES}/{figure.name}.svg", image)
-                yield replace(figure, canvas=None, image=image)
-        except Exception as error:
-            faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
-        terminal.check()
+    folder.put(PAGE, page.fill("page.html.j2", **parts, sections=[text for text, _ in added]))
 
 
 def drawn_from(results: "Results") -> "list[Case]":

@@ -1,25 +1,30 @@
-"""The templates: pages, captions, and values in HTML."""
+"""Pages: templates, captions, values in HTML, and the page of an experiment in sections."""
 
 import base64
 import json
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
+
+from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
-FOLDER = Path(__file__).parent
+HERE = Path(__file__).parent
 
 
-def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
+def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
     """The text of a template, by default of one beside this file."""
-    css, script = (Markup((FOLDER / name).read_text("utf-8")) for name in ("page.css", "page.js"))
+    css, script = (Markup((HERE / name).read_text("utf-8")) for name in ("page.css", "page.js"))
     digest = base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
     given = {"css": css, "script": script, "script_digest": f"sha256-{digest}", **values}
     return _templates(folder).get_template(template).render(**given)
@@ -27,7 +32,7 @@ def fill(template: str, folder: Path = FOLDER, /, **values: Any) -> str:
 
 def caption(name: str, /, **values: Any) -> str:
     """A caption or a sentence from its macro in ``captions.j2``, as plain text on one line."""
-    macro = getattr(_templates(FOLDER, autoescape=False).get_template("captions.j2").module, name)
+    macro = getattr(_templates(HERE, autoescape=False).get_template("captions.j2").module, name)
     return " ".join(str(macro(**values)).split())
 
 
@@ -39,9 +44,8 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
         undefined=StrictUndefined,
         trim_blocks=True,
     )
-    environment.filters["typeset"] = typeset
-    environment.filters["json"] = _json
-    environment.filters["n"] = format  # a number by a format specification
+    filters = {"typeset": typeset, "json": _json, "n": format, "address": address}
+    environment.filters.update({**filters, "inline": _inline, "cell": _cell})
     return environment
 
 
@@ -58,17 +62,57 @@ def _json(data: Any) -> Markup:
     return Markup(text.replace("<", "\\u003c"))
 
 
-def entry(figure: "Figure") -> dict[str, Any]:
-    """The values of a figure for the templates, with its image; an interactive one is inline."""
-    names = ("name", "title", "caption", "cases", "data", "fold", "leads")
-    values = {name: getattr(figure, name) for name in names}
-    is_svg = figure.image.lstrip().startswith((b"<svg", b"<?xml"))
-    values["type"] = "svg+xml" if is_svg else "png"
-    if figure.data is None:
-        return {**values, "base64": base64.b64encode(figure.image).decode("ascii")}
-    # a part of the page: without prolog and metadata, with a title
-    text = figure.image.decode("utf-8")
-    svg = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+def address(image: bytes) -> str:
+    """A PNG or SVG image as the address of a picture in a page."""
+    kind = "png" if image.startswith(b"\x89PNG") else "svg+xml"
+    return f"data:image/{kind};base64,{base64.b64encode(image).decode('ascii')}"
+
+
+def _inline(figure: "Figure") -> Markup:
+    """The SVG of a figure as a part of the page: without prolog and metadata, with a title."""
+    svg = figure.image.decode("utf-8")
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     label = f'<svg role="img" aria-label="{escape(figure.title)}"'
-    svg = svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1)
-    return {**values, "svg": Markup(svg)}
+    return Markup(svg if 'role="img"' in svg[:400] else svg.replace("<svg", label, 1))
+
+
+def _cell(value: Any) -> str:
+    """A value of a table: a number to four digits, a dash for a missing value."""
+    if pd.isna(value):
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page of an experiment: heading, paragraphs of text, figures and tables.
+
+    The canvases of the figures are made under `style.settings`; `limits` say what a reader must
+    not conclude.
+    """
+
+    title: str
+    text: str = ""
+    figures: Sequence["Figure"] = ()
+    tables: Sequence[pd.DataFrame] = ()
+    limits: Sequence[str] = ()
+
+
+def write(
+    title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
+) -> None:
+    """Put the page of an experiment into a directory as a file `name`, and its figures beside it.
+
+    The figures are written as PNG and SVG; `solvers` are the programs that ran, with their
+    versions.
+    """
+    from orchestrator.report import style, words  # style imports matplotlib
+
+    shown = [
+        replace(part, figures=[style.saved(figure, folder, png=True) for figure in part.figures])
+        for part in sections
+    ]
+    values = {"sections": shown, "programs": words.versions(solvers), "links": {}}
+    folder.put(name, fill("document.html.j2", title=title, **values))

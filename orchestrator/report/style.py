@@ -1,15 +1,19 @@
-"""How all figures look: sizes, colours by meaning, legends, files."""
+"""How all figures look: settings of matplotlib, sizes, colours by meaning, legends, files."""
 
+import contextlib
+import logging
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import Any, Literal, TypeVar
 
+import matplotlib
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
@@ -20,6 +24,23 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from orchestrator.report import FIGURES
 from orchestrator.runs.files import Folder
 
+RC: dict[Any, Any] = {
+    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize"), 8),
+    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 7),
+    # numbers at minor ticks stand in line with those at major ones
+    **dict.fromkeys(("xtick.minor.pad", "ytick.minor.pad"), 5),
+    "font.sans-serif": ["DejaVu Sans"],  # which matplotlib brings: no font of the machine is used
+    "axes.linewidth": 0.6,
+    "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.2,
+    "mathtext.fontset": "dejavusans",
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "svg.hashsalt": "orchestrator",
+    "figure.dpi": 200,
+}
+"""Settings that differ from matplotlib's defaults."""
 WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""
 PANELS = 6
@@ -49,9 +70,9 @@ NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 class Figure:
     """A drawing: its file's stem, heading, caption and the directories of the cases behind it.
 
-    `canvas` is None once the files are written, and `image` (SVG or PNG) is what the page shows.
-    `data` are for the page's script, a pointer or a slider; None if there are none. The page shows
-    a figure with `fold` on demand alone, and one with `first` before all others.
+    `image` (SVG or PNG) is what a page shows; until it is made `canvas` holds the drawing. `data`
+    are for the page's script, a pointer or a slider; None if there are none. The page shows a
+    figure with `fold` on demand alone, and one with `first` before all others.
     """
 
     name: str
@@ -68,6 +89,21 @@ class Figure:
     def leads(self) -> bool:
         """Whether it stands at the head of the page."""
         return self.first or (self.data is not None and not self.fold)
+
+
+@contextlib.contextmanager
+def settings() -> Iterator[None]:
+    """Draw by matplotlib's defaults and `RC` alone while the block runs, not by a matplotlibrc."""
+    log = logging.getLogger("matplotlib")
+    level = log.level
+    log.setLevel(logging.ERROR)  # a cache that cannot be kept is of no concern to the user
+    defaults: dict[Any, Any] = dict(matplotlib.rcParamsDefault)
+    del defaults["backend"]  # figures are made without a window
+    try:
+        with matplotlib.rc_context({**defaults, **RC}):
+            yield
+    finally:
+        log.setLevel(level)
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:
@@ -136,20 +172,19 @@ def plain_ticks(axis: Axis) -> None:
     axis.set_minor_formatter("{x:g}" if high < 200 * low else NullFormatter())
 
 
-def svg(figure: Canvas) -> bytes:
-    """A figure as SVG, without a date in it."""
-    out = BytesIO()
-    # `savefig` would draw twice, once for the layout alone
-    FigureCanvasSVG(figure).print_svg(out, metadata={"Date": None})  # type: ignore[no-untyped-call]
-    # hundredths of a point are enough; a scale stays as it is
-    return re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
-
-
-def save(figure: Canvas, folder: Folder, name: str) -> bytes:
-    """Put a figure as PNG and SVG, without dates in them, and return the PNG."""
-    png = BytesIO()
-    figure.savefig(png, format="png", metadata={"Software": None})
-    figure.set_layout_engine("none")  # it is laid out now
-    folder.put(f"{FIGURES}/{name}.png", png.getvalue())
-    folder.put(f"{FIGURES}/{name}.svg", svg(figure))
-    return png.getvalue()
+def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
+    """A figure with its image, put as SVG; with `png` as PNG too, which is the image then."""
+    images = {"svg": figure.image}
+    if drawn := figure.canvas:  # `savefig` would draw twice, once for the layout alone
+        if png:
+            agg: Any = FigureCanvasAgg(drawn)
+            agg.print_png(raster := BytesIO(), metadata={"Software": None})
+            images["png"] = raster.getvalue()
+            drawn.set_layout_engine("none")  # it is laid out now
+        svg: Any = FigureCanvasSVG(drawn)
+        svg.print_svg(out := BytesIO(), metadata={"Date": None})
+        # hundredths of a point are enough; a scale stays as it is
+        images["svg"] = re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
+    for ending, image in images.items():
+        folder.put(f"{FIGURES}/{figure.name}.{ending}", image)
+    return replace(figure, canvas=None, image=image)

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from orchestrator import report, tables
-from orchestrator.report import settings
+from orchestrator.report import style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
@@ -24,7 +24,7 @@ def page(results: Results) -> Path:
 
 @pytest.fixture(autouse=True)
 def styled() -> Iterator[None]:
-    with settings.own():
+    with style.settings():
         yield
 
 

@@ -19,9 +19,9 @@ import pytest
 import orchestrator
 from orchestrator import gallery, tables
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.report import bed, document, style
+from orchestrator.report import bed, style
 from orchestrator.report import page as page_module
-from orchestrator.report.document import Section
+from orchestrator.report.page import Section
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from orchestrator.runs.files import Folder
@@ -283,9 +283,9 @@ def experiment(tmp_path: Path) -> Path:
     table = pd.DataFrame({"level": ["a", "b"], "tau_c": [0.123456, np.nan], "same": [True, False]})
     sections = [
         Section("What was run", "One V_f.\n\nAnother <b>paragraph</b>.", figures[:1]),
-        Section("Found", "", figures[1:], [document.sheet(table)], ["No more than <this>."]),
+        Section("Found", "", figures[1:], [table], ["No more than <this>."]),
     ]
-    document.write(SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
+    page_module.write(SPEED, sections, Folder(tmp_path), "page.html", {"liggghts": "3.8"})
     return tmp_path / "page.html"
 
 
