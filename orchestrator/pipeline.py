@@ -19,8 +19,7 @@ from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import text_of
-from orchestrator.runs.progress import Display
-from orchestrator.runs.workspace import MARKERS, STATE, STUDY, Workspace, claimed, read_marker
+from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed, read_marker
 from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
@@ -114,8 +113,7 @@ def complete(
         return {}
     make_pool = partial(cluster.pool, queue) if queue else engine.local
     opened = make_pool(space.cases, workers=workers, limit_s=limit_s)
-    with opened as pool, Display(todo.values(), space.cases, workers, after_s) as display:
-        engine.check_solvers(todo.values(), pool)
+    with opened as pool, engine.Display(todo.values(), space.cases, workers, after_s) as display:
         return engine.run(todo, pool, display, display.watch)
 
 
@@ -138,7 +136,7 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
     with claimed(space.root, STUDY, study.name, new=False):
         states = planned.done(space.cases)
         space.check_cases_of_tables(states)
-        causes = {name: case.failure(space.cases / name) for name in planned.cases}
+        causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
         answer = _draw(study, planned, space, states, failures, guests)
         return Finished(space.page, 0, failures, answer=answer)
@@ -171,7 +169,7 @@ def _draw(
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
     causes = {name: str(error) for name, error in failures.items()}
-    with space.renewed(but=MARKERS):
+    with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
         report.write(results, times, causes, space, guests)
@@ -182,7 +180,7 @@ def _draw(
             limits.check_study(study)
         texts = [str(each.message) for each in caught]
         marker = {**space.drawn_of(_ids(planned)), "answer": answer, "warnings": texts}
-        space.put(STATE, text_of(marker))
+        space.note(STATE, text_of(marker))
     return answer
 
 

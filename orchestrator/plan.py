@@ -12,7 +12,7 @@ from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure, is_whole
-from orchestrator.runs.progress import human
+from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
@@ -133,7 +133,7 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
             asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
             for asked, answer in plan.decisions.items()
             if answer.levels and not answer.is_as_asked and asked in plan.piles
-            if any(failure(directory / run.name) for run in plan.piles[asked].runs)
+            if any(failure(directory / run.name)[1] for run in plan.piles[asked].runs)
         }
         if study.tolerance:
             answers, done = (plan.decisions, plan.piles, plan.checks), plan.done(directory)

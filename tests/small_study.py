@@ -46,7 +46,7 @@ def run(out: Path, text: str = TEXT) -> Results:
     done = planned.done(cases)
     todo = {name: one for name, one in planned.cases.items() if name not in done}
     with engine.local(cases, workers=2, limit_s=300.0) as pool:
-        assert not engine.run(todo, pool, lambda outcome: None)
+        assert not engine.run(todo, pool, lambda *_: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, cases)
 

@@ -27,7 +27,7 @@ from orchestrator.types import Row
 ANSWER, LOG, USED, OURS = "answer.csv", "log.txt", "used.json", "ours"
 """Files of a scene in the results: the answer, the output, and the times. The answers of our
 solvers lie in a directory beside those of the solver; they are those of the solver `OURS`."""
-PAGE, NUMBERS, VERDICTS, FIGURES = "comparison.html", "comparison.csv", "verdicts.csv", "figures"
+PAGE, NUMBERS, VERDICTS = "comparison.html", "comparison.csv", "verdicts.csv"
 STEPS = "steps"
 """Quantity that a solver may add to any answer: its number of time steps."""
 MIB = 2**20
@@ -420,7 +420,7 @@ def _written(
     """Put tables, figures and page of a comparison into a directory."""
     theirs = verdicts[verdicts["solver"] != OURS]
     tables = {NUMBERS: (numbers[numbers["solver"] != OURS], "%.9g"), VERDICTS: (theirs, "%.6g")}
-    with folder.renewed(NUMBERS, VERDICTS, PAGE, FIGURES):
+    with folder.renewed():
         for name, (table, digits) in tables.items():
             columns = ["solver", *table.columns.drop("solver")]
             folder.put(name, text_of_table(table[columns], digits))

@@ -16,7 +16,7 @@ from orchestrator.report import page, style
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
 from orchestrator.runs import case
-from orchestrator.runs.workspace import EXPERIMENT, MARKERS, Workspace, claimed
+from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import TIME_LIMIT_S, Study
@@ -73,7 +73,7 @@ class Experiment:
         with claimed(space.root, EXPERIMENT, self.name) as folder:
             space.describe(EXPERIMENT, self.name, list(planned.cases))
             missing = planned.missing(space.cases, planned.done(space.cases)).items()
-            ends = {name: case.ended(space.cases / name)[0] for name, _ in missing}
+            ends = {name: case.failure(space.cases / name)[0] for name, _ in missing}
             todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
             failures = pipeline.complete(todo, space, workers=workers, limit_s=self.limit_s)
             runs = Runs(planned, space.cases, planned.done(space.cases), failures)
@@ -82,7 +82,7 @@ class Experiment:
                 remedy = "`orchestrator status` names the causes; the same command continues"
                 what = "no reference ran to its end: nothing is known"
                 raise OrchestratorError(what, where=str(out), remedy=remedy)
-            with style.settings(), folder.renewed(but=MARKERS):
+            with style.settings(), folder.renewed():
                 for key, table in tables.items():
                     folder.put(f"tables/{key}.csv", csv(table))
                 solvers = case.programs(space.cases, planned.cases)

@@ -181,7 +181,7 @@ def _failure(scene: Scene, runs: Runs) -> tuple[str, str] | None:
     lost = next((run.name for run in needed if run.name not in runs.done), None)
     if lost is None:
         return None
-    verdict, why = case.ended(runs.cases / lost)
+    verdict, why = case.failure(runs.cases / lost)
     why = why.replace(f"{runs.cases}/", "") or "it did not run"
     return verdict if verdict in NOTICED else "stalled", why
 

@@ -54,7 +54,7 @@ def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
 
 
 @cache
-def template_digest(name: str) -> str:
+def _template_digest(name: str) -> str:
     """One digest of every file of a template, names included."""
     digests = {path: sha256(content).hexdigest() for path, _, content in template_files(name)}
     return digest_text(canonical_json(digests))
@@ -126,7 +126,7 @@ class Case(ABC):
         depends = {
             "kind": self.kind,
             "recipe": self.recipe,
-            "template": template_digest(self.template),
+            "template": _template_digest(self.template),
             "parameters": self.parameters,
             "needs": [case.id for case in self.needs],
         }
@@ -167,7 +167,7 @@ def prepare(case: Case, cases: Path) -> Path:
     written = [path for path in directory.rglob("*") if path.is_file()]
     identity = {
         **{"id": case.id, "kind": case.kind, "recipe": case.recipe, "template": case.template},
-        "template_sha256": template_digest(case.template),
+        "template_sha256": _template_digest(case.template),
         "parameters": case.parameters,
         "needs": [need.name for need in case.needs],
         "inputs_sha256": files.digest_files(written, root=directory),
@@ -202,20 +202,11 @@ def fail(directory: Path, error: SolverError) -> None:
         write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
 
 
-def ended(directory: Path) -> tuple[str, str]:
+def failure(directory: Path) -> tuple[str, str]:
     """In which way the case in a directory failed, and why; empty if it is not known to have."""
-    if not os.path.isfile(directory / FAILED):  # nor where it cannot be seen
-        return "", ""
     state = read_json(directory / FAILED)
-    if not isinstance(state, dict):
-        return "", "its note of failure cannot be read"
-    return str(state.get("ended", "")), str(state.get("cause", ""))
-
-
-def failure(directory: Path) -> str | None:
-    """Why the case in a directory failed, or None if it is not known to have failed."""
-    word, cause = ended(directory)
-    return (cause if word in ("", SolverError.ended) else f"{word}: {cause}") or None
+    about = state if isinstance(state, dict) else {}
+    return str(about.get("ended", "")), str(about.get("cause", ""))
 
 
 def done_state(case: Case, cases: Path) -> dict[str, Any] | None:
@@ -276,14 +267,15 @@ def prune(case: Case, cases: Path) -> None:
             write_json(directory / DONE, {**state, "bytes": size_without_marker})
 
 
-def size(directory: Path, state: Any) -> int:
-    """Bytes on disk of the case in a directory; its marker, if it is one, has those at its end."""
+def size(directory: Path) -> int:
+    """Bytes on disk of the case in a directory; the marker has those of a finished one."""
+    state = read_json(directory / DONE)
     size = state.get("bytes") if isinstance(state, dict) else None
     return size + files.size_of(directory / DONE) if type(size) is int else files.size_of(directory)
 
 
 def names_in(cases: Path) -> list[str]:
-    """Names of the directories of cases that are there, whichever study asked for them."""
+    """Names of the directories of cases, whichever study asked for them."""
     return sorted(path.name for path in cases.glob("*-*") if NAME.fullmatch(path.name))
 
 

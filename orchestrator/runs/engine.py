@@ -1,34 +1,31 @@
-"""Run what is missing of a plan's cases: many at a time, wherever a pool runs them, none twice."""
+"""Run what is missing of a plan's cases, many at a time and none twice, and show the progress."""
 
 import concurrent.futures
 import contextlib
 import heapq
+import math
+import sys
 import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from functools import partial
 from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import Self
 
 from orchestrator.errors import Interrupted, OrchestratorError, SolverError, of_exception
 from orchestrator.runs import case as case_states
 from orchestrator.runs import process
 from orchestrator.runs.case import Case
 
-POLL_S = 0.2
+POLL_S, LOOK_S = 0.2, 1.0
+"""Time between two looks at the pool, and at how far the running cases are, s."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """Threads of a solver's process: solvers hold all cores, and more threads would take others'."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a case ended, in how many seconds (0: not known); without an error, it is done."""
-
-    case: Case
-    seconds: float = 0.0
-    error: OrchestratorError | None = None
+Report = Callable[[Case, float, OrchestratorError | None], None]
+"""Takes a case that has ended, its time, s (0: not known), and why it failed, if it did."""
 
 
 @dataclass(frozen=True)
@@ -103,21 +100,12 @@ def execute(
     began = time.monotonic()
     directory = case_states.prepare(case, cases)
     outside_s, log = time.monotonic() - began, directory / case_states.LOG
+    # sh: a disk may forbid to run files, or know no right to
+    start = partial(process.run, ["sh", "Allrun"], cwd=directory, log=log, env=ONE_THREAD)
     try:
         with cores.held(case.ranks) if cores else contextlib.nullcontext():
-            ended = process.run(
-                ["sh", "Allrun"],  # a disk may forbid to run files, or know no right to
-                cwd=directory,
-                log=log,
-                limit_s=limit_s,
-                stop=stop,
-                env=ONE_THREAD,
-                tries=process.TRIES,
-            )
+            ended = start(limit_s=limit_s, stop=stop, tries=process.TRIES)
         began = time.monotonic()
-        if ended.over == "disk":
-            what = "no space is left on the disk, and the solver did not end"
-            raise SolverError(what, str(directory), "make room, then the same command continues")
         if ended.over:
             what = f"the solver did not end within {limit_s:g} s and was killed"
             remedy = "see its logs; raise time_limit in the study file if it was still at work"
@@ -135,28 +123,18 @@ def execute(
     return wall_s
 
 
-def check_solvers(cases: Iterable[Case], pool: Pool) -> None:
-    """See that the programs of some cases are where a pool runs them; else SolverError."""
-    kinds = {case.kind: case for case in cases}.values()
-    for future in [pool.executor.submit(case.versions) for case in kinds]:
-        try:
-            future.result()
-        except pool.lost as error:
-            raise _loss(error, "the first look at the solvers") from None
-
-
 def run(
     todo: Mapping[str, Case],
     pool: Pool,
-    report: Callable[[Outcome], None],
+    report: Report,
     watch: Callable[[Collection[Case]], None] = lambda _: None,
 ) -> dict[str, OrchestratorError]:
     """Run cases that are not done yet; return those that failed, or need one that did, with why.
 
     A case, by name in `todo`, starts once those that it needs have ended. Of the cases that may
     start, the one with the most expensive chain of cases behind it is the first. `report` receives
-    the outcome of each case, and `watch`, a few times a second, the cases that run. Interrupted is
-    raised if the pool is stopped.
+    each case that has ended, and `watch`, a few times a second, the cases that run. SolverError is
+    raised if the pool lacks a program, and Interrupted if it is stopped.
     """
     needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
     behind, chains = dict.fromkeys(todo, 0.0), {}  # costs, s, of the cases that wait for each
@@ -171,40 +149,126 @@ def run(
     running: dict[Future[float], Case] = {}
     failed: dict[str, OrchestratorError] = {}
 
+    def lost(error: BaseException, where: str) -> SolverError:
+        what = f"the processes that ran it were lost: {error}"
+        return SolverError(what, where, "the logs of their jobs say more: out of memory, or time?")
+
     def settle(case: Case, seconds: float = 0.0, error: OrchestratorError | None = None) -> None:
         if error:
             failed[case.name] = error
-        report(Outcome(case, seconds, error))
+        report(case, seconds, error)
         sorter.done(case.name)
 
+    kinds = {case.kind: case for case in todo.values()}.values()
+    for looked in [pool.executor.submit(case.versions) for case in kinds]:
+        try:
+            looked.result()
+        except pool.lost as fault:
+            raise lost(fault, "the first look at the solvers") from None
     while sorter.is_active():
         for name in sorter.get_ready():
             heapq.heappush(ready, (-chains[name], places[name], name))
         while ready and len(running) < pool.places:
             case = todo[heapq.heappop(ready)[-1]]
-            lost = next((need.name for need in case.needs if need.name in failed), None)
-            if lost:
-                settle(case, error=SolverError(f"it needs {lost}, which failed", case.name))
+            if need_failed := next((n.name for n in case.needs if n.name in failed), None):
+                why = f"it needs {need_failed}, which failed"
+                settle(case, error=SolverError(why, case.name))
             else:
                 running[pool.executor.submit(pool.task, case)] = case
         if running:
             # a wait without a limit would not let the main thread see a signal
-            ended, _ = concurrent.futures.wait(
-                running, timeout=POLL_S, return_when=concurrent.futures.FIRST_COMPLETED
-            )
+            first = concurrent.futures.FIRST_COMPLETED
+            ended, _ = concurrent.futures.wait(running, timeout=POLL_S, return_when=first)
             watch(running.values())
             for future in ended:
-                case, fault = running.pop(future), future.exception()
-                if isinstance(fault, pool.lost):
-                    settle(case, error=_loss(fault, case.name))
-                elif isinstance(fault, Exception) and not isinstance(fault, Interrupted):
+                case, error = running.pop(future), future.exception()
+                if isinstance(error, pool.lost):
+                    settle(case, error=lost(error, case.name))
+                elif isinstance(error, Exception) and not isinstance(error, Interrupted):
                     # a fault in the reading of one case costs that case, not the study
-                    settle(case, error=of_exception(fault, case.name))
+                    settle(case, error=of_exception(error, case.name))
                 else:
                     settle(case, future.result())
     return failed
 
 
-def _loss(error: Exception, where: str) -> SolverError:
-    what = f"the processes that ran it were lost: {error}"
-    return SolverError(what, where, "the logs of their jobs say more: out of memory, or of time?")
+class Display:
+    """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends.
+
+    The cases share so many cores as `workers`; `after_s` is expected after the last of them, s.
+    """
+
+    def __init__(
+        self, todo: Collection[Case], cases: Path, workers: int, after_s: float = 0.0
+    ) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        self._cases, self._workers, self._after_s = cases, workers, after_s
+        self._left = sum(case.cost_s for case in todo)
+        self._whole = self._left / workers + after_s
+        self._expected = self._took = 0.0  # costs and times of the cases that have ended, s
+        self._going: dict[str, float] = {}
+        self._count, self._ended, self._looked = len(todo), 0, -math.inf
+        self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+        cases_column = TextColumn("{task.fields[ended]} cases")
+        text_column = TextColumn("{task.description}")
+        self._bar = Progress(cases_column, BarColumn(), text_column, console=self._console)
+        self._task = self._bar.add_task("", total=1.0, ended="")
+        self._show()
+
+    def __enter__(self) -> Self:
+        if sys.stderr.isatty():
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar.live.is_started:
+            self._bar.stop()
+
+    def __call__(self, case: Case, seconds: float, error: OrchestratorError | None) -> None:
+        """Take note of a case that has ended."""
+        self._ended += 1
+        self._going.pop(case.name, None)
+        self._left -= case.cost_s
+        if not error:
+            self._expected += case.cost_s
+            self._took += seconds * case.ranks
+        state, text = "failed" if error else "done", self._show()
+        self._console.print(f"[{self._ended}/{self._count}] {state}  {case.name}  {text}")
+        if error:
+            self._console.print(f"  {error}")
+
+    def watch(self, running: Collection[Case]) -> None:
+        """Look how far the running cases are, once a second, for the bar of a terminal."""
+        if sys.stderr.isatty() and time.monotonic() > self._looked + LOOK_S:
+            self._looked = time.monotonic()
+            shares = {case: case.share(self._cases / case.name) for case in running}
+            self._going = {case.name: share * case.cost_s for case, share in shares.items()}
+            self._show()
+
+    @property
+    def done(self) -> float:
+        """Share of the work that is done, 0 to 1."""
+        return 1 - self.left_s(1.0) / self._whole if self._whole else 1.0
+
+    def left_s(self, pace: float | None = None) -> float:
+        """Time until all is done, s, at a pace: that of the cases so far, over their costs."""
+        if pace is None:
+            pace = self._took / self._expected if self._took else 1.0
+        left = max(0.0, self._left - sum(self._going.values()))
+        return pace * left / self._workers + self._after_s
+
+    def _show(self) -> str:
+        """Show on the bar how far the study is; the same in words."""
+        text = f"{self.done:.0%} of the work, about {human(self.left_s())} left"
+        ended = f"{self._ended}/{self._count}"
+        self._bar.update(self._task, completed=self.done, ended=ended, description=text)
+        return text
+
+
+def human(seconds: float) -> str:
+    """A time for people."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

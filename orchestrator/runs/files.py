@@ -9,7 +9,7 @@ import os
 import re
 import stat
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -81,8 +81,6 @@ def write_durably(path: Path, content: str | bytes) -> None:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()
             os.fsync(stream.fileno())
-        if path.is_dir() and not path.is_symlink():
-            path.rmdir()
         os.replace(temporary, path)
         handle = os.open(path.parent, os.O_RDONLY)
         os.fsync(handle)  # the name, too, survives a crash
@@ -137,8 +135,8 @@ class Folder:
         write_durably(self._place(name, is_ours=True), content)
 
     def drop(self, name: str) -> None:
-        """Remove a file; one that was not put, or has changed since, is kept aside."""
-        self._place(name).unlink(missing_ok=True)
+        """Remove a file whose name is this program's whatever it holds."""
+        self._place(name, is_ours=True).unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
         """Make way for a sub-directory, and return its place; files of others are kept aside.
@@ -155,39 +153,32 @@ class Folder:
         return self._place(name)
 
     @contextlib.contextmanager
-    def renewed(self, *places: str, but: Sequence[str] = ()) -> Iterator[None]:
-        """Put all files anew within the block, except for `but`; files not put again are removed.
+    def renewed(self) -> Iterator[None]:
+        """Put all files anew within the block; files that are not put again are removed.
 
-        Where places are named, only files of these names and in these sub-directories count. A
-        file that has changed since stays, and so do all where the block ends with an exception.
+        A file that has changed since stays, and so do all where the block ends with an exception.
         """
         before = self._listed()
         yield
         new = self._listed()[len(before) :]
-        old = {
-            (digest, name)
-            for digest, name in before
-            if name not in but and (not places or PurePosixPath(name).parts[0] in places)
-        }
         again = {name for _, name in new}
-        for digest, name in old:
+        for digest, name in before:
             if name not in again and self._digest(name) == digest:
                 self.drop(name)
-        self._record(dict.fromkeys([*(line for line in before if line not in old), *new]))
+        self._record(dict.fromkeys(new))
 
-    def written(self, but: Sequence[str] = ()) -> dict[str, str]:
-        """Digests of all files that were put, except for `but`, by name."""
-        return {name: digest for digest, name in self._listed() if name not in but}
+    def written(self) -> dict[str, str]:
+        """Digests of all files that were put, by name."""
+        return {name: digest for digest, name in self._listed()}
 
-    def is_whole(self, but: Sequence[str] = ()) -> bool:
-        """Whether all files that were put, except for `but`, are unchanged."""
-        return all(self._digest(name) == digest for name, digest in self.written(but).items())
+    def is_whole(self) -> bool:
+        """Whether all files that were put are unchanged."""
+        return all(self._digest(name) == digest for name, digest in self.written().items())
 
     def read(self, name: str) -> bytes:
         """Read a file that was put; OrchestratorError if it is not there as it was put."""
         path = self.path(name)
-        with opened(path) as stream:
-            data = stream.read()
+        data = path.read_bytes()
         if hashlib.sha256(data).hexdigest() != self.written().get(name):
             remedy = "`orchestrator report` writes it again"
             raise OrchestratorError("it is not as it was written", where=str(path), remedy=remedy)
@@ -231,7 +222,8 @@ class Folder:
         """Digests and names of the record, as far as it can be read."""
         record = self.path(RECORD)
         text = os.fsdecode(record.read_bytes()) if record.is_file() else ""
-        return re.findall(r"(?m)^([0-9a-f]{64})  (.+)$", text)
+        # former versions listed the markers, too, which are JSON
+        return re.findall(r"(?m)^([0-9a-f]{64})  (.+)(?<!\.json)$", text)
 
     def _record(self, lines: Iterable[tuple[str, str]]) -> None:
         """Write the record; a name has several lines while its file is being replaced."""

@@ -1,25 +1,21 @@
 """External programs: one run in a process group of its own, limited, logged, never orphaned."""
 
 import contextlib
-import errno
 import os
 import resource
 import select
 import signal
 import subprocess
-import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from orchestrator.errors import Interrupted
 
 POLL_S, GRACE_S = 0.1, 2.0
 """Time between two looks at a program, and between SIGTERM and SIGKILL."""
-DISK_S = 5.0
-"""Time between two looks at the space on the disk; a program is ended if two find it full."""
 TRIES = 3
 """Runs of a program that is killed from outside. One killed three times is out of memory, say."""
 TAIL = 2**16
@@ -38,20 +34,17 @@ exec "$@"
 holds: a process beside the program reads it, and kills the group when the driver has ended."""
 
 
-@dataclass(frozen=True)
-class Ended:
+class Ended(NamedTuple):
     """How a program ended: `returncode` as `subprocess` gives it, and `seconds` of wall time.
 
-    `over` is the limit at which it was killed, "time", "output" or "disk", or empty. `cpu_s` is the
-    processor time of the program and all that it waited for, s, and `peak_mib` the memory of its
-    largest process, MiB; both are 0 if it was killed.
+    `cpu_s` is the processor time of the program and all that it waited for, s; 0 if it was killed.
+    `over` is the limit at which it was killed, "time" or "output", or empty.
     """
 
     returncode: int
     seconds: float
     cpu_s: float
     over: str = ""
-    peak_mib: float = 0.0
 
 
 def run(
@@ -90,8 +83,7 @@ def run(
     given = {**os.environ, "PATH": path, "PWD": str(cwd), **(env or {})}
     blocks = "" if file_limit is None else str(file_limit // 512)
     for _ in range(tries):
-        began, over, cpu_s, peak_mib = time.monotonic(), "", 0.0, 0.0
-        looked, was_full = began, False
+        began, over, cpu_s = time.monotonic(), "", 0.0
         with log.open("wb") as stream, contextlib.ExitStack() as stack:
             process = subprocess.Popen(
                 ["sh", "-c", _GUARD, "sh", blocks, *command],
@@ -109,34 +101,20 @@ def run(
             while not over and not end.poll(1000 * POLL_S):
                 if stop is not None and stop.is_set():
                     raise Interrupted("stopped", remedy="the same command continues")
-                now = time.monotonic()
-                if now > began + limit_s:
+                if time.monotonic() > began + limit_s:
                     over = "time"
                 elif os.fstat(stream.fileno()).st_size > output_limit:
                     over = "output"
-                elif now > looked + DISK_S:
-                    looked, before, was_full = now, was_full, _is_full(cwd)
-                    over = "disk" if before and was_full else ""
             if not over:
                 _, status, usage = os.wait4(process.pid, 0)
                 process.returncode = os.waitstatus_to_exitcode(status)
-                cpu_s, peak_mib = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
-        ended = Ended(process.returncode, time.monotonic() - began, cpu_s, over, peak_mib)
+                cpu_s = usage.ru_utime + usage.ru_stime
+        ended = Ended(process.returncode, time.monotonic() - began, cpu_s, over)
         # a shell reports 128 + n of a program that signal n ended
         code = -ended.returncode if ended.returncode < 0 else ended.returncode - 128
         if over or code not in _OUTSIDE:
             break
     return ended
-
-
-def _is_full(folder: Path) -> bool:
-    """Whether no room is left on the disk, or within the quota, of a folder."""
-    try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            os.posix_fallocate(file.fileno(), 0, 2**16)
-    except OSError as error:
-        return error.errno in (errno.ENOSPC, errno.EDQUOT)
-    return False
 
 
 def _end_group(process: "subprocess.Popen[bytes]") -> None:

@@ -18,18 +18,9 @@ from filelock import FileLock, Timeout
 from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
-from orchestrator.runs import process
+from orchestrator.runs import files, process
 from orchestrator.runs.case import DONE, Case, failure, names_in, size
-from orchestrator.runs.files import (
-    RECORD,
-    Folder,
-    canonical_json,
-    digest_text,
-    opened,
-    read_json,
-    size_of,
-    text_of,
-)
+from orchestrator.runs.files import RECORD, Folder, canonical_json, digest_text, read_json
 
 LOCK = ".lock"
 WAIT_S = 1.0
@@ -53,8 +44,6 @@ PACK = Kind("benchmark pack", "manifest.json")
 KINDS = (STUDY, EXPERIMENT, RESULTS, COMPARISON, PACK)
 STATE = "report.json"
 """Marker that what is drawn was finished, and of which cases."""
-MARKERS = (STUDY.marker, STATE)
-"""Files that are not made anew with tables, figures and page."""
 
 
 @contextlib.contextmanager
@@ -93,7 +82,7 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
             (root / LOCK).write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
         _check(folder, kind, name)  # another process may have been first
         if new and read_marker(root, kind) is None:
-            folder.put(kind.marker, text_of({"kind": kind.word, "name": name}))
+            folder.note(kind.marker, files.text_of({"kind": kind.word, "name": name}))
         yield folder
     finally:
         with contextlib.suppress(OSError):
@@ -109,26 +98,21 @@ def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
 
 def _check(folder: Folder, kind: Kind, name: str) -> None:
     """See that a directory holds nothing but what is claimed, and no links."""
-    root, what = folder.root, ""
-    for other in KINDS:
-        marker = read_marker(root, other)
-        if marker and (marker["kind"], marker["name"]) != (kind.word, name):
+    root, remedy = folder.root, "choose an empty or a new one: --out"
+    for marker in filter(None, (read_marker(root, other) for other in KINDS)):
+        if (marker["kind"], marker["name"]) != (kind.word, name):
             holds = f"the directory holds the {marker['kind']} {marker['name']}"
-            what = f"{holds}, not the {kind.word} {name}"
+            raise InputError(f"{holds}, not the {kind.word} {name}", str(root), remedy)
     # a study whose marker is lost still has its cases
     has_cases = kind.marker == STUDY.marker and names_in(root / "cases")
     if read_marker(root, kind) is None and not has_cases:
         for path in sorted(root.iterdir()):
-            # a claim that was ended at once leaves these
-            is_nothing = path.name in (LOCK, RECORD) or path.name.endswith(".tmp")
-            if path.is_dir() and not path.is_symlink():
-                is_nothing = not any(path.iterdir())
-            if not is_nothing:
-                holds = "the output directory holds something that is not a"
-                what = what or f"{holds} {kind.word}: {path.name}"
-    if what:
-        raise InputError(what, str(root), remedy="choose an empty or a new one: --out")
-    for place in (LOCK, RECORD, kind.marker, "cases", *folder.written()):
+            # a claim that was ended at once leaves these, and empty directories
+            is_left = path.name in (LOCK, RECORD) or path.suffix == ".tmp"
+            if not is_left and (not path.is_dir() or any(path.iterdir())):
+                what = f"the output directory holds something that is not a {kind.word}"
+                raise InputError(f"{what}: {path.name}", str(root), remedy)
+    for place in (LOCK, RECORD, STATE, kind.marker, "cases", *folder.written()):
         folder.path(place)
 
 
@@ -145,7 +129,7 @@ class Workspace(Folder):
     def is_held(self) -> bool:
         """Whether a running process holds the study; nothing is written."""
         try:
-            with opened(self.root / LOCK) as stream:
+            with files.opened(self.root / LOCK) as stream:
                 fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except OSError as error:
             return isinstance(error, BlockingIOError)
@@ -156,7 +140,7 @@ class Workspace(Folder):
         whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
         value = {**whose, **about, "cases": cases}
         if read_marker(self.root, kind) != value:
-            self.put(kind.marker, text_of(value))
+            self.note(kind.marker, files.text_of(value))
 
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote; InputError if the directory holds no study."""
@@ -174,13 +158,13 @@ class Workspace(Folder):
         about = self.description()
         question = digest_text(canonical_json([about.get("study"), about.get("tolerance")]))
         made_of = {"question": question, "cases": dict(ids), "code": _code_digest()}
-        return {**made_of, "sha256": self.written(MARKERS)}
+        return {**made_of, "sha256": self.written()}
 
     def answer(self, ids: Mapping[str, str]) -> str | None:
         """The answer on the page of these cases; None where it is not finished, or has changed."""
         marker = read_json(self.drawn)
         is_drawn = isinstance(marker, dict) and {**marker, **self.drawn_of(ids)} == marker
-        return str(marker["answer"]) if is_drawn and self.is_whole(MARKERS) else None
+        return str(marker["answer"]) if is_drawn and self.is_whole() else None
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """The cases that are there without being asked for: an earlier study file did."""
@@ -205,8 +189,8 @@ def _code_digest() -> str:
     roots = (case_states.PACKAGE, case_states.templates())
     folders = (each for root in roots for each in os.walk(root))
     paths = sorted(Path(place, name) for place, _, names in folders for name in names)
-    files = {str(path): path.stat() for path in paths if path.suffix != ".pyc"}
-    stamps = [(name, file.st_size, file.st_mtime_ns) for name, file in files.items()]
+    states = {str(path): path.stat() for path in paths if path.suffix != ".pyc"}
+    stamps = [(name, state.st_size, state.st_mtime_ns) for name, state in states.items()]
     return digest_text(canonical_json(stamps))
 
 
@@ -245,24 +229,24 @@ def status(directory: Path) -> tuple[str, bool]:
     """How far a study came, for people, and whether a case has failed; from its directory alone."""
     space = Workspace(directory.absolute())
     about, is_running = space.description(), space.is_held()
-    asked = [name for name in about["cases"] if (space.cases / name).is_dir()]
-    states = {name: read_json(space.cases / name / DONE) for name in asked}
-    causes = {name: failure(space.cases / name) for name in asked if not states[name]}
-    failed = [f"  failed: {name}: {cause}" for name, cause in causes.items() if cause is not None]
-    begun = [name for name, cause in causes.items() if cause is None]
+    begun = [name for name in about["cases"] if (space.cases / name).is_dir()]
+    undone = [name for name in begun if not read_json(space.cases / name / DONE)]
+    causes = {name: cause for name in undone if (cause := failure(space.cases / name)[1])}
     word, (sizes, *left) = "running" if is_running else "unfinished", _sizes(space)
     lines = [
-        f"study {about['name']}: {len(asked) - len(causes)} done, {len(begun)} {word}, "
-        f"{len(about['cases']) - len(asked)} not begun, {len(failed)} failed",
-        *(f"  {word}: {name}" for name in begun),
-        *(*failed, f"size: {sizes}", *left),
+        f"study {about['name']}: {len(begun) - len(undone)} done, "
+        f"{len(undone) - len(causes)} {word}, {len(about['cases']) - len(begun)} not begun, "
+        f"{len(causes)} failed",
+        *(f"  {word}: {name}" for name in undone if name not in causes),
+        *(f"  failed: {name}: {cause}" for name, cause in causes.items()),
+        *(f"size: {sizes}", *left),
     ]
     if space.drawn.is_file() and space.page.is_file():
         lines.append(f"page: {space.page}")
     elif not is_running:
         lines.append("the same study command continues it")
     # a study's name may come from anywhere
-    return "\n".join(map(printable, lines)), bool(failed)
+    return "\n".join(map(printable, lines)), bool(causes)
 
 
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
@@ -278,12 +262,9 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
         case_states.prune(case, space.cases)
     after, *left = _sizes(space)
     whole = ", ".join(name for name in done if name in shown)
-    lines = [
-        f"before: {before}",
-        f"after:  {after}",
-        f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew",
-    ]
-    return "\n".join([*lines, f"whole, for the pictures of the page: {whole or 'none'}", *left])
+    ran = f"pruned: {len(pruned)} cases; ./Allrun in one of them makes its files anew"
+    shows = f"whole, for the pictures of the page: {whole or 'none'}"
+    return "\n".join([f"before: {before}", f"after:  {after}", ran, shows, *left])
 
 
 def _sizes(space: Workspace) -> list[str]:
@@ -292,25 +273,18 @@ def _sizes(space: Workspace) -> list[str]:
     The size of a finished case is that at its end, or after it was pruned. A second line has the
     cases that an earlier study file asked for, if any.
     """
-    states = {name: read_json(space.cases / name / DONE) for name in names_in(space.cases)}
-    cases = {name: size(space.cases / name, state) for name, state in states.items()}
+    from rich.filesize import decimal
+
+    cases = {name: size(space.cases / name) for name in names_in(space.cases)}
     kinds: Counter[str] = Counter()
     for name, count in cases.items():
         kinds[f"{name.partition('-')[0]} cases"] += count
     beside = (path for path in space.root.iterdir() if path != space.cases)
-    kinds["tables, figures and page"] = sum(map(size_of, beside))
-    named = ", ".join(f"{_human(count)} {kind}" for kind, count in kinds.most_common() if count)
-    lines = [f"{_human(kinds.total())} ({named})"]
+    kinds["tables, figures and page"] = sum(map(files.size_of, beside))
+    named = ", ".join(f"{decimal(count)} {kind}" for kind, count in kinds.most_common() if count)
+    lines = [f"{decimal(kinds.total())} ({named})"]
     if left := space.left(space.description()["cases"]):
-        total, names = _human(sum(cases[name] for name in left)), ", ".join(left[:NAMED])
+        total, names = decimal(sum(cases[name] for name in left)), ", ".join(left[:NAMED])
         what = f"{len(left)} cases of an earlier study file, {total}, such as {names}"
         lines.append(f"not asked for: {what}; they stay until you remove them")
     return lines
-
-
-def _human(size: float) -> str:
-    for unit in ("bytes", "kB", "MB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} GB"

@@ -1,15 +1,14 @@
 """LIGGGHTS: which version is here, and what the end of a run means."""
 
 import re
-import warnings
 from functools import cache
 from pathlib import Path
 
+from orchestrator import solvers
 from orchestrator.errors import SolverError
-from orchestrator.solvers.programs import ask, find
 
 PROGRAM = "liggghts"
-TRIED = (3, 8)
+TRIED = "3.8"
 INSTALL = "install it: apt-get install --no-install-recommends liggghts"
 ENVIRONMENT = {
     "OMPI_MCA_ess_singleton_isolated": "1",
@@ -27,27 +26,12 @@ LAST_WORDS = "the protocol has ended"
 
 @cache
 def version() -> str:
-    """Version of the LIGGGHTS on the path, such as ``3.8.0``.
-
-    Raises
-    ------
-    SolverError
-        If it is missing, does not say its version, or is older than any that works.
-    """
-    path = find(PROGRAM, remedy=INSTALL)
-    # without the option it leaves a log wherever the user happens to be
-    reply = ask(path, "-h", "-log", "none", env=ENVIRONMENT)
-    match = re.search(r"LIGGGHTS-\w+ (\d+)\.(\d+)\.(\d+)", reply.text)
-    if not match:
-        what = f"{path} does not say that it is a LIGGGHTS: {reply.gist}"
-        raise SolverError(what, remedy=f"try `{path} -h` by hand; if it is broken, install it anew")
-    what = f"{path} is version {match[1]}.{match[2]}"
-    number = (int(match[1]), int(match[2]))
-    if number < TRIED:
-        raise SolverError(f"{what}, older than the decks need", remedy="install LIGGGHTS 3.8")
-    if number > TRIED:
-        warnings.warn(f"{what}; the decks were tried with 3.8", stacklevel=2)
-    return ".".join(match.groups())
+    """Version of the LIGGGHTS on the path, such as ``3.8.0``; SolverError if none works."""
+    # without -log it leaves a log wherever the user happens to be
+    command, pattern = f"{PROGRAM} -h -log none", r"LIGGGHTS-\w+ (\d+\.\d+\.\d+)"
+    return solvers.version(
+        "LIGGGHTS", command, pattern, tried=TRIED, env=ENVIRONMENT, remedy=INSTALL
+    )
 
 
 def ranks(grains: float) -> int:
@@ -61,7 +45,7 @@ def ranks(grains: float) -> int:
 def programs(ranks: int) -> dict[str, str]:
     """The programs that run a deck with so many processes, with versions; else SolverError."""
     if ranks > 1:
-        find("mpirun", remedy="install it: apt-get install openmpi-bin")
+        solvers.find("mpirun", "install it: apt-get install openmpi-bin")
     return {PROGRAM: version()}
 
 
@@ -71,8 +55,7 @@ def check_log(directory: Path) -> None:
     text = log.read_text(errors="replace") if log.is_file() else ""
     # the message of an error follows a banner of MPI; the deck's own words hold no such line, and
     # the linker's are of libraries that were asked for in vain
-    error = re.search(r"^ERROR(?!: ld\.so:).*$", text, re.MULTILINE)
-    if error:
+    if error := re.search(r"(?m)^ERROR(?!: ld\.so:).*$", text):
         raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
     if LAST_WORDS not in text:
         what = "LIGGGHTS ended before its protocol did"

@@ -2,59 +2,36 @@
 
 import os
 import re
-import warnings
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from orchestrator import solvers
 from orchestrator.errors import Exploded, SolverError, Stalled
-from orchestrator.solvers.programs import ask, find
 
 if TYPE_CHECKING:
     import pyvista
 
 PROGRAM = "simpleFoam"
-TRIED = ("1912",)
-"""Versions that the tests ran with."""
-INSTALL = "install the Debian package `openfoam`"
+TRIED = "1912"
+"""Version that the tests ran with. Later ones may lack the bed's nutkAtmRoughWallFunction."""
+INSTALL = "install Debian's package `openfoam`, and put it first in PATH"
 
 _HOME = "/usr/share/openfoam"
-_STATED = re.compile(r"Using: OpenFOAM-(?:v(?P<named>\d{4})|\S* \((?P<api>\d{4})\))")
-_FATAL = re.compile(r"--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\Z)", re.DOTALL)
-_CONVERGED = re.compile(r"^SIMPLE solution converged in (\d+) iterations$", re.MULTILINE)
-_RESIDUAL = re.compile(r"Solving for Ux, Initial residual = (\S+),")
+_STATED = r"Using: OpenFOAM-(?:v(\d{4})|\S* \((\d{4})\))"
+_FATAL = r"(?s)--> FOAM FATAL (?:IO )?ERROR[^\n]*\n(.*?)(?:\n\s*\n|\Z)"
+_CONVERGED = r"(?m)^SIMPLE solution converged in (\d+) iterations$"
+_RESIDUAL = r"Solving for Ux, Initial residual = (\S+),"
 
 
 @cache
 def version() -> str:
-    """Version of the OpenFOAM that is found first, as its program states it, such as "1912".
-
-    Raises
-    ------
-    SolverError
-        If the program is missing, does not start, or is of a version that the case cannot run with.
-    """
-    path = find(PROGRAM, remedy=INSTALL)
+    """Version of the OpenFOAM on the path, such as "1912"; SolverError if none works."""
     home = os.environ.get("WM_PROJECT_DIR") or _HOME
-    reply = ask(path, "-help", env={"WM_PROJECT_DIR": home})
-    match = _STATED.search(reply.text)
-    if match is None:
-        raise SolverError(
-            f"{path} with WM_PROJECT_DIR={home} is not of the openfoam.com line: "
-            f"{_line_with('Using:', reply.text) or reply.gist}",
-            remedy="put Debian's `openfoam` first in PATH, and unset WM_PROJECT_DIR",
-        )
-    number = str(match["named"] or match["api"])
-    if int(number) < int(TRIED[0]):
-        what = f"OpenFOAM {number} is older than {TRIED[0]}, which the cases are written for"
-        raise SolverError(what, remedy=INSTALL)
-    if number not in TRIED:
-        warnings.warn(
-            f"OpenFOAM {number} has not been tried, {', '.join(TRIED)} has; "
-            "later versions call the bed's nutkAtmRoughWallFunction atmNutkWallFunction",
-            stacklevel=2,
-        )
-    return number
+    env, other = {"WM_PROJECT_DIR": home}, f"unset WM_PROJECT_DIR, which is {home}"
+    remedy = INSTALL if home == _HOME else other
+    command = f"{PROGRAM} -help"
+    return solvers.version("OpenFOAM", command, _STATED, tried=TRIED, env=env, remedy=remedy)
 
 
 def read_numbers(path: Path) -> dict[str, float]:
@@ -97,32 +74,25 @@ def check_log(directory: Path) -> int:
     times = re.findall(r"^Time = (\d+)$", text, re.MULTILINE)
     last = f"iteration {times[-1]}" if times else "its header"
     # first the crash: a NaN also makes simpleFoam stumble over its own residuals' file
-    has_nan = re.search(r"residual = -?nan", text)
-    if has_nan or "sigFpe::sigHandler" in text:
+    nan = re.search(r".*residual = -?nan.*", text)
+    if nan or "sigFpe::sigHandler" in text:
         exception = f"floating point exception after {last}"
-        cause = (
-            f"the residuals are not numbers: {_line_with('nan', text)}" if has_nan else exception
-        )
+        cause = f"the residuals are not numbers: {nan[0].strip()}" if nan else exception
         remedy = "other first cells or cells per face may do; see also system/fvSolution"
         raise Exploded(f"{PROGRAM} diverged: {cause}", where, remedy)
     if "sigSegv::sigHandler" in text:
         remedy = "run the case again; if it stays, install the package `openfoam` anew"
         raise SolverError(f"{PROGRAM} crashed: segmentation fault after {last}", where, remedy)
-    if fatal := _FATAL.search(text):
+    if fatal := re.search(_FATAL, text):
         cause = " ".join(fatal[1].split())
         raise SolverError(f"{PROGRAM} stopped: {cause}", where, f"{log.name} says where")
     if text.split()[-1:] != ["End"]:
         what = f"{PROGRAM} was stopped before its end; its log breaks off after {last}"
         remedy = "killed, out of time, memory or disk? Run the case again"
         raise SolverError(what, where, remedy)
-    converged = _CONVERGED.search(text)
-    if converged is None:
-        residual = _RESIDUAL.findall(text)[-1:] or ["not known"]
-        what = f"{PROGRAM} did not converge: the residual of Ux is {residual[0]} after {last}"
-        remedy = "raise endTime in system/controlDict; if the residuals cycle, relax more"
-        raise Stalled(what, where, remedy)
-    return int(converged[1])
-
-
-def _line_with(word: str, text: str) -> str:
-    return next((line.strip() for line in text.splitlines() if word in line), "")
+    if converged := re.search(_CONVERGED, text):
+        return int(converged[1])
+    residual = re.findall(_RESIDUAL, text)[-1:] or ["not known"]
+    what = f"{PROGRAM} did not converge: the residual of Ux is {residual[0]} after {last}"
+    remedy = "raise endTime in system/controlDict; if the residuals cycle, relax more"
+    raise Stalled(what, where, remedy)

@@ -12,7 +12,6 @@ import pytest
 
 from orchestrator import cli, plan
 from orchestrator.runs import case
-from orchestrator.runs.files import read_json
 from orchestrator.study import study
 from tests.conftest import Mount
 from tests.faults.bench import HEAD, ORCHESTRATOR, PILE, ROOT, Bench, case_of, same_tables
@@ -53,14 +52,14 @@ def test_a_pruned_study_stays_finished(pile: Bench, capsys: Capsys) -> None:
     (cells,) = case_of(pile.out, "cells")
     assert cli.main(["status", str(pile.out)]) == 0
     size = float(capsys.readouterr().out.partition("size: ")[2].split()[0])
-    assert size == pytest.approx(_size(pile.out) / 1e6, rel=0.01)
+    assert size == pytest.approx(_size(pile.out) / 1e6, abs=0.06)
     assert cli.main(["prune", str(pile.out)]) == 0
     printed = capsys.readouterr().out
     assert "pruned: 1 cases" in printed
     # the page shows the pile and its flow
     assert all(next(case_of(pile.out, kind)).name in printed for kind in ("pile", "flow"))
     assert not list(cells.glob("*.dump"))
-    assert case.size(cells, read_json(cells / case.DONE) or {}) == _size(cells)
+    assert case.size(cells) == _size(cells)
     assert cli.main(["study", str(pile.source), "--out", str(pile.out)]) == 0
     assert "no solver was started" in capsys.readouterr().err
     assert cli.main(["report", str(pile.out)]) == 0

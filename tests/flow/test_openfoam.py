@@ -80,8 +80,8 @@ def pretend(directory: Path, stated: str, monkeypatch: pytest.MonkeyPatch) -> No
     ("stated", "cause"),
     [
         ("Using: OpenFOAM-v1812 (see www.OpenFOAM.com)", "OpenFOAM 1812 is older than 1912"),
-        ("Using: OpenFOAM-10 (see https://openfoam.org)", "not of the openfoam.com line: .*-10"),
-        ("foo", "not of the openfoam.com line: it ended with 0 and printed “foo”"),
+        ("Using: OpenFOAM-10 (see https://openfoam.org)", "not a known OpenFOAM: .*-10"),
+        ("foo", "not a known OpenFOAM: it ended with 0 and printed “foo”"),
     ],
 )
 def test_versions_that_are_refused(

@@ -1,5 +1,8 @@
-"""Cases in a pool: their order, the cores that they take, the time left, and what a fault costs."""
+"""Cases and their pool: identity, order, cores, the time left, and what a fault costs."""
 
+import json
+import os
+import subprocess
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -10,9 +13,8 @@ import pytest
 
 from orchestrator.errors import SolverError
 from orchestrator.runs import case, engine
-from orchestrator.runs.case import Case
-from orchestrator.runs.engine import Cores, Outcome, Pool
-from orchestrator.runs.progress import Display
+from orchestrator.runs.case import Case, templates
+from orchestrator.runs.engine import Cores, Display, Pool
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,33 @@ class Step(Case):
         return {}
 
 
+def test_a_case_is_a_copy_of_its_template_with_inputs_and_then_results(tmp_path: Path) -> None:
+    step = Step(1.0)
+    assert step.id == Step(1.0).id != Step(2.0).id
+    directory = case.prepare(step, tmp_path)
+    assert directory.name == step.name == f"step-{step.id[:12]}"
+    for path in (templates() / "liggghts/checks").iterdir():
+        assert (directory / path.name).read_bytes() == path.read_bytes()
+    identity = json.loads((directory / case.IDENTITY).read_text())
+    assert identity["parameters"] == {"size": 1.0, "by": 1}
+    assert "Allrun" in identity["inputs_sha256"]
+    assert not case.done_state(step, tmp_path)
+    engine.execute(step, tmp_path, 60.0)
+    assert case.done_state(step, tmp_path)
+    subprocess.run(["sha256sum", "-c", case.CHECKSUMS], cwd=directory, check=True)
+    # it is read again only if its time or size has changed
+    result, marker = directory / "result.txt", directory / case.DONE
+    then = result.stat().st_mtime_ns
+    os.utime(marker, ns=(then + 1, then + 1))
+    result.write_text("24\n")
+    assert not case.done_state(step, tmp_path)
+    os.utime(result, ns=(then, then))
+    assert case.done_state(step, tmp_path)
+    # as old as the marker: it may have been changed after it in the same tick of the clock
+    os.utime(marker, ns=(then, then))
+    assert not case.done_state(step, tmp_path)
+
+
 def _order(places: int, *cases: Case) -> list[Case]:
     """Cases in the order in which a pool without solvers starts them."""
     started: list[Case] = []
@@ -61,7 +90,7 @@ def _order(places: int, *cases: Case) -> list[Case]:
 
     with ThreadPoolExecutor(1) as threads:
         todo = {step.name: step for step in cases}
-        assert not engine.run(todo, Pool(threads, task, places), lambda _: None)
+        assert not engine.run(todo, Pool(threads, task, places), lambda *_: None)
     return started
 
 
@@ -78,15 +107,15 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
     fault, lost = Step(1.0, by=6), Step(2.0, by=0)
     second = Step(3.0, (lost,))
     third, fine = Step(4.0, (second,)), Step(5.0, by=7)
-    outcomes: list[Outcome] = []
-    todo = {one.name: one for one in (fault, lost, second, third, fine)}
+    ended: list[str] = []
+    todo = {step.name: step for step in (fault, lost, second, third, fine)}
     with engine.local(tmp_path, workers=2, limit_s=60.0) as pool:
-        failed = engine.run(todo, pool, outcomes.append)
-    assert failed.keys() == {one.name for one in (fault, lost, second, third)}
+        failed = engine.run(todo, pool, lambda step, *_: ended.append(step.name))
+    assert failed.keys() == {step.name for step in (fault, lost, second, third)}
     assert "a fault of this program: ZeroDivisionError" in str(failed[fault.name])
     assert f"it needs {lost.name}, which failed" in str(failed[second.name])
-    assert case.failure(tmp_path / lost.name) == "no result"
-    assert len(outcomes) == 5
+    assert case.failure(tmp_path / lost.name) == ("failed", "no result")
+    assert sorted(ended) == sorted(todo)
     assert case.done_state(fine, tmp_path)
 
 
@@ -94,12 +123,12 @@ def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> N
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
     display = Display([first, second, third], tmp_path, workers=2, after_s=20.0)
     assert display.left_s() == pytest.approx(430 / 2 + 20)
-    display(Outcome(first, 5.0))
+    display(first, 5.0, None)
     assert display.left_s() == pytest.approx(0.5 * 420 / 2 + 20)
     assert display.done == pytest.approx(1 - 230 / 235)
-    display(Outcome(third, error=SolverError("died")))
+    display(third, 0.0, SolverError("died"))
     assert display.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
-    display(Outcome(second, 10.0))
+    display(second, 10.0, None)
     assert display.done == pytest.approx(1 - 20 / 235)
 
 
