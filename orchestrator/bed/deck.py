@@ -141,31 +141,22 @@ def cost_s(
 
 @dataclass(frozen=True)
 class GrainTable:
-    """The n grains of a deck; the id of a grain is its place, from 1.
-
-    Attributes
-    ----------
-    position : ndarray, shape (n, 3)
-        x, y, z of the centres, m.
-    kind : ndarray of int, shape (n,)
-        One of GONE, FIXED, MOBILE, COUNTED, PUSHED.
-    along : ndarray, shape (n, 2)
-        Unit vector downstream along the bed, in which displacement is counted.
-    sizes : ndarray, shape (n,)
-        Diameter of each grain over `diameter`.
-    diameter, density : float
-        The diameter d of the deck's units, m; the density of every grain, kg/m3.
-    width : float
-        Width of a strip with periodic sides, d; 0 for grains in planes.
-    """
+    """The n grains of a deck; the id of a grain is its place, from 1."""
 
     position: FloatArray
+    """x, y, z of the centres, m, shape (n, 3)."""
     kind: IntArray
+    """One of GONE, FIXED, MOBILE, COUNTED, PUSHED, shape (n,)."""
     along: FloatArray
+    """Unit vector downstream along the bed, in which displacement is counted, shape (n, 2)."""
     sizes: FloatArray
+    """Diameter of each grain over `diameter`, shape (n,)."""
     diameter: float
+    """The diameter d of the deck's units, m."""
     density: float
+    """Density of every grain, kg/m3."""
     width: float = 0.0
+    """Width of a strip with periodic sides, d; 0 for grains in planes."""
 
     @property
     def counted_ids(self) -> IntArray:
@@ -266,13 +257,7 @@ def write_grains(
 
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
-    """Read a CSV that a deck, or the code that read its results, has written.
-
-    Raises
-    ------
-    SolverError
-        If it is missing or cut short, or has fewer rows.
-    """
+    """Read a CSV of the deck or of `collect`; a SolverError if it is not whole or has less rows."""
     try:
         text = path.read_text(encoding="ascii")
         table = pd.read_csv(StringIO(text))
@@ -287,12 +272,8 @@ def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
 def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:
     """Read a text dump of some columns: the time step of each frame, and a row for each grain.
 
-    Frames without a grain have a time step too; each row has that of its frame in ``step``.
-
-    Raises
-    ------
-    SolverError
-        If it is missing, cut short or not a dump of these columns.
+    Frames without a grain have a time step too; each row has that of its frame in ``step``. Raises
+    a SolverError if the file is missing, cut short or not a dump of these columns.
     """
     try:
         text = path.read_text(encoding="ascii")

@@ -176,13 +176,7 @@ class BedLine:
 
 @cache
 def of_bed(bed: PileBed) -> BedLine:
-    """The bed line that a pile's bed asks for, m.
-
-    Raises
-    ------
-    UnfitError
-        If the forms of a train overlap.
-    """
+    """The bed line that a pile's bed asks for, m; an UnfitError if the forms of a train overlap."""
     if bed.profile:
         corners = np.column_stack([bed.profile.x, bed.profile.z])
     else:

@@ -272,12 +272,8 @@ def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice)
     The line is divided at its sharp corners. Each part has rows of its own, those that are counted
     first; where rows of two parts meet, grains of the later one that would overlap are left out,
     and grains that do not rest on two are fixed. `ground` is the bed line without obstacles,
-    `counts` says which exposed grains are counted, as `BedLine.counted` takes it.
-
-    Raises
-    ------
-    UnfitError
-        If the bed bends more sharply than grains can follow, or none is counted.
+    `counts` says which exposed grains are counted, as `BedLine.counted` takes it. Raises an
+    UnfitError if the bed bends more sharply than grains can follow, or none is counted.
     """
     x = np.array(ground.x)
     x[0], x[-1] = x[1] - APRON, x[-2] + APRON
@@ -302,13 +298,7 @@ def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice)
 
 
 def offset(line: BedLine, distance: float) -> BedLine:
-    """The line at a distance above a line, with the corners that it has.
-
-    Raises
-    ------
-    UnfitError
-        If the line bends more sharply than that.
-    """
+    """The line at a distance above a line, with its corners; UnfitError if it bends too sharply."""
     bends = np.radians(line.bends_deg) / 2
     ends = np.vstack([line.normals[:1], line.normals, line.normals[-1:]])
     middle = ends[:-1] + ends[1:]

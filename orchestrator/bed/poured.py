@@ -106,13 +106,7 @@ class PouredBed(Case):
         return liggghts.ranks(self._count)
 
     def check_size(self) -> None:
-        """See that the mould has room for a bed, and takes no more grains than a machine bears.
-
-        Raises
-        ------
-        InputError
-            With the field of a study file.
-        """
+        """Refuse a mould without room for a bed, or with more grains than a machine bears."""
         length = self.line.x[-2] - self.line.x[1]
         if length < LEAST_LENGTH * (1 - 1e-9):
             what = f"a poured bed of {length:.3g} grains has no pockets that are those of a bed"
@@ -288,12 +282,8 @@ def read(
     """The packing of a finished case `PouredBed`; lengths in d.
 
     `line` is the bed line of the flow, `counts` says which exposed grains are counted, as
-    `BedLine.counted` takes it, `surface` is the height of the highest centres over the line.
-
-    Raises
-    ------
-    InputError
-        If no grain is counted.
+    `BedLine.counted` takes it, `surface` is the height of the highest centres over the line. Raises
+    an InputError if no grain is counted.
     """
     rows = deck.read_table(directory / BED)
     centres, sizes = rows[["x_over_d", "z_over_d"]].to_numpy(float), rows["size"].to_numpy(float)

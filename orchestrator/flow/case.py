@@ -162,13 +162,7 @@ class FlowCase(Case):
         return growth_far(self.growth, self.settings.cells_per_face)
 
     def check_mesh(self) -> None:
-        """Refuse settings and bed lines whose mesh cannot be made or not be solved on.
-
-        Raises
-        ------
-        InputError
-            With the field of the study file.
-        """
+        """Refuse settings and bed lines whose mesh cannot be made or not be solved on."""
         if self.growth > MOST_GROWTH:
             what = f"neighbouring cells differ by {self.growth:.3g}, more than {MOST_GROWTH:g}"
             remedy = "lower it, or raise flow.cells_per_face"
@@ -214,6 +208,11 @@ class FlowCase(Case):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write numbers into the template's files, the mesh, and a flow to start from."""
+        coarser = [SolvedFlow(cases / flow.name) for flow in self.needs]
+        self.write_from(directory, coarser[0] if coarser else None)
+
+    def write_from(self, directory: Path, coarser: SolvedFlow | None) -> None:
+        """Write all that; the flow to start from is that on half the cells, else the log layer."""
         settings, lid_m = self.settings, self.lid * self.height_m
         # an iteration carries a change past some twenty cells: with more of them along the bed the
         # flow still changes at a residual at which that over a pile has ended
@@ -236,16 +235,13 @@ class FlowCase(Case):
         types |= {"lid": "wall"} if closed else {}
         middles = write_poly_mesh(made_by_gmsh(directory), directory, types)
         x, z = middles[:, 0, 0], middles[..., 2]
-        # a bed that changes has no flow on half the cells
-        starts = [each for each in self.needs if (cases / each.name).is_dir()]
-        for coarser in starts:
-            solved, line = SolvedFlow(cases / coarser.name), self.bed_line
-            omega = settings.turbulence_model == "kOmegaSST"
+        if coarser:
+            line, omega = self.bed_line, settings.turbulence_model == "kOmegaSST"
             for name in ("U", "p", "k", "nut", "omega" if omega else "epsilon"):
-                values = solved.at(name, x, z - line.height(x)[:, None], line)
+                values = coarser.at(name, x, z - line.height(x)[:, None], line)
                 start_from(directory / "0" / name, values)
-        if not starts:
-            # the log layer: a third of the iterations from a uniform flow
+        else:
+            # a third of the iterations from a uniform flow
             ustar, over = self.ustar0_m_s, np.abs(z.ravel())
             speed = log_law_speed(ustar, over, self.roughness_m)
             start_from(directory / "0/U", np.column_stack([speed, 0 * speed, 0 * speed]))
@@ -261,36 +257,29 @@ class FlowCase(Case):
     def collect(self, directory: Path) -> None:
         """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
 
-        Raises
-        ------
-        SolverError
-            If the run failed or did not converge, or if the stress is not usable; as `Exploded` or
-            `Stalled` where that is how it ended.
+        Raises a SolverError, as `Exploded` or `Stalled` where that is how the run ended, if it
+        failed or did not converge, or if the stress is not usable.
         """
         openfoam.check_log(directory)
         solved = SolvedFlow(directory)
-        stress = solved.stress()
+        stress = solved.stress(self.roughness_m)
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)
-        reynolds = self.ustar0_m_s / self.viscosity_m2_s
+        approach, reynolds = solved.ustar0 / self.ustar0_m_s, self.ustar0_m_s / self.viscosity_m2_s
         speed = self.mean_speed_over_log_law(solved) if self.settings.depth else None
         bed = (self.slope_deg, self.height_m, self.roughness_m)
-        table = diagnostics(stress, solved.approach_ustar(), reynolds, *bed, mean_speed=speed)
+        table = diagnostics(stress, approach, reynolds, *bed, mean_speed=speed)
         text = table.to_csv(float_format="%.6g", lineterminator="\n")
         write_durably(directory / DIAGNOSTICS, text)
-        approach = table.loc["approach_ustar_over_log_law"]
-        if approach["sound"] != "yes":
-            what = f"on flat bed u* is {approach['value']:.3f} of the log law's"
+        if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
+            what = f"on flat bed u* is {approach:.3f} of the log law's: the wall function fails"
             remedy = f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"
-            raise SolverError(
-                f"{what}: the wall function fails", where=str(directory), remedy=remedy
-            )
+            raise SolverError(what, where=str(directory), remedy=remedy)
 
     def mean_speed_over_log_law(self, solved: SolvedFlow) -> float:
         """The mean speed of a channel in the column before the inlet over that of the log law."""
-        ustar, depth = solved.approach_ustar() * self.ustar0_m_s, self.lid * self.height_m
-        closed = self.settings.top == "closed channel"
-        law = depth_mean_speed(ustar, depth, self.roughness_m, closed=closed)
+        closed, depth = self.settings.top == "closed channel", self.lid * self.height_m
+        law = depth_mean_speed(solved.ustar0, depth, self.roughness_m, closed=closed)
         return float(solved.column_speed() / law)
 
     def _check_stress(self, stress: WallStress, directory: Path) -> None:

@@ -13,7 +13,6 @@ from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
-from orchestrator.solvers.openfoam import read_numbers
 from orchestrator.types import FloatArray, IntArray
 
 SIDES = np.array(
@@ -34,10 +33,7 @@ def listed(values: FloatArray | IntArray, item: str) -> str:
 def read_list(path: Path, after: str = "") -> FloatArray:
     """The first list of a file, or the first behind some text, shape (n, numbers of an item).
 
-    Raises
-    ------
-    SolverError
-        If the file is missing or not whole.
+    Raises a SolverError if the file is missing or not whole.
     """
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
@@ -118,12 +114,8 @@ def start_from(path: Path, values: FloatArray) -> None:
 class SolvedFlow:
     """The last iteration of an OpenFOAM case that `Allrun` has run in.
 
-    The approaching flow develops in the column before the inlet, on the rows of the mesh.
-
-    Raises
-    ------
-    SolverError
-        By each method and property, if the case holds no results, or a file of it is not whole.
+    The approaching flow develops in the column before the inlet, on the rows of the mesh. Each
+    method and property raises a SolverError if there are no results, or a file is not whole.
     """
 
     directory: Path
@@ -135,7 +127,7 @@ class SolvedFlow:
         The result has the shape (columns * cells, components). The field is linear along the rows
         of cells, and in a column in the logarithm of the height.
         """
-        middles, values = self.middles, self.field(name)
+        middles, values = self.mesh[2], self.field(name)
         rows = int(np.argmax(np.diff(middles[:, 0]) > 1e-9 * bed.h)) + 1
         places = middles[::rows, 0]
         above = (middles[:, 2] - bed.height(middles[:, 0])).reshape(-1, rows)
@@ -156,8 +148,8 @@ class SolvedFlow:
         return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
 
     @cached_property
-    def _mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells."""
+    def mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells, m."""
         folder, corners = self.directory / "constant/polyMesh", sides(self.directory)
         files = (folder / name for name in ("owner", "neighbour"))
         owner, neighbour = (read_list(file).astype(int)[:, 0] for file in files)
@@ -173,20 +165,29 @@ class SolvedFlow:
         bed = slice(start, start + count)
         return corners[bed], owner[bed], middles
 
-    @property
-    def middles(self) -> FloatArray:
-        """Middles of the cells, m, shape (n, 3)."""
-        return self._mesh[2]
+    @cached_property
+    def velocity(self) -> FloatArray:
+        """The velocity in each cell, m/s, shape (n, 3)."""
+        return self.field("U")
 
     @cached_property
-    def _numbers(self) -> dict[str, float]:
-        return read_numbers(self.directory / "parameters")
+    def wall_shear(self) -> FloatArray:
+        """Kinematic stress of each face of the bed on the flow, m2/s2, shape (n, 3)."""
+        return self.field("wallShearStress", "bed")
 
-    def stress(self) -> WallStress:
-        """Stress along the bed; u*_0 is that of the column before the inlet."""
-        velocity, z0 = self.field("U"), self._numbers["roughnessLength"]
-        corners, cells, middles = self._mesh
-        # faces in the order of the flow, each with its two upstream corners first
+    @cached_property
+    def ustar0(self) -> float:
+        """Friction velocity in the column before the inlet, m/s."""
+        tau = -float(self.wall_shear[np.argmin(self.mesh[0][..., 0].mean(axis=1)), 0])
+        if not tau > 0:
+            raise SolverError("no flow in the column before the inlet", where=str(self.directory))
+        return float(np.sqrt(tau))
+
+    def stress(self, z0: float) -> WallStress:
+        """Stress along the bed, of a roughness length z0 (m), over that of the approaching flow."""
+        corners, cells, middles = self.mesh
+        # faces in the order of the flow, each with its two upstream corners first; those of the
+        # study begin behind the column before the inlet
         order = np.argsort(corners[..., 0].mean(axis=1))
         across = np.argsort(corners[order, :, 0], axis=1)[..., None]
         corners = np.take_along_axis(corners[order], across, axis=1)
@@ -196,41 +197,19 @@ class SolvedFlow:
         toe = int(np.argmin(np.abs(starts[:, 0])))
         s = np.cumsum(lengths) - lengths[:toe].sum() - lengths / 2.0
         normals = np.column_stack([-tangents[:, 2], np.zeros(len(s)), tangents[:, 0]])
-        above = cells[order]
-        z_e = np.vecdot(middles[above] - centres, normals)
-        u_t = np.vecdot(velocity[above], tangents)
-        # OpenFOAM's is the stress of the bed on the flow
-        tau = -np.vecdot(self.field("wallShearStress", "bed")[order], tangents)
-        if not tau[0] > 0:
-            raise SolverError("no flow in the column before the inlet", where=str(self.directory))
-        ustar0, bed_of_study = float(np.sqrt(tau[0])), slice(1, None)
-        columns = {
-            "s_m": s,
-            "x_m": centres[:, 0],
-            "z_m": centres[:, 2],
-            "length_m": lengths,
-            "z_e_m": z_e,
-            "tau_wall": tau / ustar0**2,
-            "ustar_over_ustar0_eq10": log_law_ustar(u_t, z_e, z0) / ustar0,
-            "ustar_over_ustar0_eq10_printed": log_law_ustar(u_t, z_e, z0, printed=True) / ustar0,
-        }
-        return WallStress(**{name: values[bed_of_study] for name, values in columns.items()})
-
-    def approach_ustar(self) -> float:
-        """Friction velocity in the column before the inlet over that of the log law.
-
-        It is 1 but for the difference that the rows of the mesh make to the log law.
-        """
-        first = int(np.argmin(self._mesh[0][..., 0].mean(axis=1)))
-        tau = -float(self.field("wallShearStress", "bed")[first, 0])
-        law = (self._numbers[name] for name in ("freeStream", "speedHeight", "roughnessLength"))
-        return float(np.sqrt(max(tau, 0.0)) / log_law_ustar(*law))
+        z_e = np.vecdot(middles[cells[order]] - centres, normals)
+        u_t = np.vecdot(self.velocity[cells[order]], tangents)
+        tau = -np.vecdot(self.wall_shear[order], tangents) / self.ustar0**2
+        eq10 = [log_law_ustar(u_t, z_e, z0, printed=as_printed) for as_printed in (False, True)]
+        ustar = [velocity / self.ustar0 for velocity in eq10]
+        columns = (s, centres[:, 0], centres[:, 2], lengths, z_e, tau, *ustar)
+        return WallStress(*(values[1:] for values in columns))
 
     def column_speed(self) -> float:
         """Mean speed in the column before the inlet, m/s."""
-        x, z = self.middles[:, 0], self.middles[:, 2]
+        x, _, z = self.mesh[2].T
         column = np.flatnonzero(x < x.min() + 1e-6 * np.ptp(x))
         column = column[np.argsort(z[column])]
         points = read_list(self.directory / "constant/polyMesh/points")
         levels = np.sort(points[points[:, 0] <= points[:, 0].min() + 1e-9, 2])[::2]
-        return float(np.average(self.field("U")[column, 0], weights=np.diff(levels)))
+        return float(np.average(self.velocity[column, 0], weights=np.diff(levels)))

@@ -177,12 +177,8 @@ def _first(piece: tuple[int, float], length: float) -> float:
 def made_by_gmsh(directory: Path) -> Any:
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
-    Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`.
-
-    Raises
-    ------
-    SolverError
-        If gmsh fails, if not all cells are hexahedra, some are inverted, or one of `GROUPS` lacks.
+    Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`. Raises a
+    SolverError if gmsh fails, not all cells are hexahedra, some are inverted, or a group lacks.
     """
     import meshio
 

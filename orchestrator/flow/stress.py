@@ -76,20 +76,14 @@ class WallStress:
         """Mean signed stress tau/u*_0^2 over lengths of bed (m) centred on arc lengths (m).
 
         The two broadcast. The integral is exact: over each face the stress is linear, with the
-        face's value as its mean and the slope that its neighbours give.
-
-        Raises
-        ------
-        InputError
-            If a length is not positive, or reaches beyond the bed.
+        face's value as its mean and the slope that its neighbours give. Raises an InputError if a
+        length is not positive, or reaches beyond the bed.
         """
         centre, length = np.broadcast_arrays(np.asarray(s_m, float), np.asarray(length_m, float))
         low, high, edges = centre - length / 2.0, centre + length / 2.0, self.edges_m
         if not (np.all(low < high) and np.all(low >= edges[0]) and np.all(high <= edges[-1])):
-            raise InputError(
-                "a mean of the stress needs a positive length within the bed, "
-                f"which spans s = {edges[0]:.4g} ... {edges[-1]:.4g} m",
-            )
+            span = f"s = {edges[0]:.4g} ... {edges[-1]:.4g} m"
+            raise InputError(f"a mean of the stress needs a length within the bed, {span}")
         tau = self.tau_wall if measure == "wall" else self.tau_eq10
         slope, sums = self._slopes(tau), np.concatenate([[0.0], np.cumsum(tau * self.length_m)])
 

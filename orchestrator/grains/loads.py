@@ -217,12 +217,7 @@ class Loads:
 
         In a lattice where its stress reaches that of Eq. 3 or 5, in a poured bed where it begins to
         roll out of its own pocket. Where the flow runs back it pushes the grain upstream. Infinite
-        for grains without flow.
-
-        Raises
-        ------
-        InputError
-            If no grain feels a flow.
+        for grains without flow; an InputError if no grain feels one.
         """
         bed, counted = self.geometry, self.geometry.packing.windward
         speed = self.ratio[counted]

@@ -47,29 +47,22 @@ REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that
 class Motion:
     """The motion of the N counted grains of a deck.
 
-    Attributes
-    ----------
-    flow : ndarray, shape (levels + 1,)
-        The flow of each load step, never falling, in the deck's unit; first that of the settling.
-    level : ndarray of int, shape (N,)
-        Load step (index into `flow`) in which a grain moved by the counting rule; 0 for never.
-    fallen : ndarray of int, shape (N,)
-        Load step in which a grain was first the criterion upstream of its place; 0 for never.
-    carried : ndarray of bool, shape (N,)
-        Whether it was gone before it was seen beyond the displacement criterion: carried off.
-    mode : ndarray of int, shape (N,)
-        How it moved: index into `MODES`.
-    exact : bool
-        Whether a grain moves at its level's very flow, as by a formula; else between the load step
-        before and that one.
+    `flow`, never falling, has the shape (levels + 1,), all others have the shape (N,).
     """
 
     flow: FloatArray
+    """The flow of each load step, in the deck's unit; first that of the settling."""
     level: IntArray
+    """Load step (index into `flow`) in which a grain moved by the counting rule; 0 for never."""
     fallen: IntArray
+    """Load step in which a grain was first the criterion upstream of its place; 0 for never."""
     carried: BoolArray
+    """Whether it was gone before it was seen beyond the displacement criterion: carried off."""
     mode: IntArray
+    """How it moved: index into `MODES`."""
     exact: bool = False
+    """Whether a grain moves at its level's very flow, as by a formula; else between the load step
+    before and that one."""
 
     @classmethod
     def of_flows(cls, flows: FloatArray) -> "Motion":
@@ -195,14 +188,9 @@ class Track(NamedTuple):
 class Count(NamedTuple):
     """Motion of N counted grains by each of T samples, shape (T, N); a grain stays counted.
 
-    Attributes
-    ----------
-    moved
-        Displaced downstream or aside by the criterion at a sample, or carried off.
-    fallen
-        Displaced upstream by the criterion at a sample. Such a grain has not moved, but may yet.
-    carried
-        Gone without having been seen beyond the criterion: the flow lifted it off the pile.
+    `moved`: displaced downstream or aside by the criterion at a sample, or carried off. `fallen`:
+    displaced upstream by it; such a grain has not moved, but may yet. `carried`: gone without
+    having been seen beyond the criterion: the flow lifted it off the pile.
     """
 
     moved: BoolArray
@@ -243,12 +231,8 @@ def _ever(happened: BoolArray) -> BoolArray:
 def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool) -> Motion:
     """Read the deck's tables of a finished run; the other arguments are those of `count`.
 
-    Raises
-    ------
-    SolverError
-        If a table is cut short, grains are lost that may not be, or the counts do not reconcile.
-    Exploded
-        If every counted grain was lost.
+    Raises a SolverError if a table is cut short, grains are lost that may not be, or the counts do
+    not reconcile; as `Exploded` if every counted grain was lost.
     """
     samples = read_table(directory / SAMPLES)
     track = read_track(directory, grains, samples)
@@ -292,14 +276,8 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     """Read what the counted grains did at each sample, from ``passage.dump`` and ``bed.dump``.
 
     A counted grain that the first does not list, and that the second has at the end of the load
-    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows.
-
-    Raises
-    ------
-    SolverError
-        If a dump is not one of these grains and samples.
-    Exploded
-        If no counted grain is left.
+    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows. Raises
+    a SolverError if a dump is not of these grains and samples, as `Exploded` if it has no grain.
     """
     ids, path = grains.counted_ids, directory / PASSAGE
     steps, rows = read_dump(path, PASSAGE_COLUMNS)
@@ -359,16 +337,9 @@ def check_rest(
     """See that a bed of grains came to rest before the flow rose, judged by their energy.
 
     The submerged weight W of a grain is in N, the stiffness is K d/W. All grains of a pile must
-    come to rest; cells are each a bed of their own and may be one whose grain falls out.
-
-    Raises
-    ------
-    Exploded
-        If the energy is no number, grows, or has driven grains away.
-    Noisy
-        If the grains keep moving.
-    SolverError
-        If the table cannot be read.
+    come to rest; cells are each a bed of their own and may be one whose grain falls out. Raises
+    `Exploded` if the energy is no number, grows, or has driven grains away, `Noisy` if the grains
+    keep moving.
     """
     settling, where = read_table(directory / SETTLING, rows=4), str(directory / SETTLING)
     energy = settling["ke"].to_numpy(float) / grains.mobile_count / (weight * grains.diameter)

@@ -43,18 +43,12 @@ PLACES, FEWER = 4001, 501
 
 @dataclass(frozen=True)
 class Loading:
-    """Forces on n grains.
+    """Forces on n grains, by the force law of the scene: of n local friction velocities, or of one.
 
-    Attributes
-    ----------
-    drag, lift : callable
-        The force law of the scene: of n local friction velocities, or of one.
-    ratio : ndarray, shape (n,)
-        Local friction velocity over the undisturbed one; negative where the flow runs back, 0 for
-        a grain that carries no force.
-    along, outward : ndarray, shape (n, 2)
-        Unit vectors downstream along the bed and out of it. Drag follows the flow's direction,
-        lift is never negative.
+    `ratio`, shape (n,), is the local friction velocity over the undisturbed one; negative where the
+    flow runs back, 0 for a grain that carries no force. `along` and `outward`, shape (n, 2), are
+    the unit vectors downstream along the bed and out of it. Drag follows the flow's direction, lift
+    is never negative.
     """
 
     drag: Force

@@ -61,14 +61,10 @@ FAR = 1e9
 class Worn:
     """The n grains of a pile that wears, at one time.
 
-    Attributes
-    ----------
-    places : ndarray, shape (n, 2)
-        x and z of the centres, d; NaN for a grain that has gone.
-    left : ndarray, shape (n,)
-        Undisturbed friction velocity at which a counted grain has moved, m/s; else infinite.
-    speed : ndarray, shape (n,)
-        Signed local friction velocity over the undisturbed one, at that time; else the last known.
+    `places`, shape (n, 2), has x and z of the centres, d, NaN for a grain that has gone; `left`,
+    shape (n,), the undisturbed friction velocity at which a counted grain has moved, m/s, else
+    infinite; `speed`, shape (n,), the signed local friction velocity over the undisturbed one, at
+    that time or when it was last there.
     """
 
     places: FloatArray
@@ -160,7 +156,7 @@ class WornFlow(Case):
         else:
             worn = Worn.from_csv(cases / self.run.name)
         worn.to_csv(directory)
-        self._over(worn, cases).write(directory, cases)
+        self._over(worn, cases).write_from(directory, None)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write the stress and the diagnostics, as any flow's."""
@@ -389,10 +385,7 @@ class PileCase(GrainCase):
 def flows(loads: Loads) -> FloatArray:
     """The flow of the settling, then of each load step: from before the first grain goes.
 
-    Raises
-    ------
-    InputError
-        If no counted grain is held by its contacts and can leave them.
+    Raises an InputError if no counted grain is held by its contacts and can leave them.
     """
     geometry, rules = loads.geometry, loads.geometry.scene.protocol
     pivots = np.sort(loads.alone())

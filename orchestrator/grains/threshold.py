@@ -47,22 +47,12 @@ def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatAr
 
 @dataclass(frozen=True)
 class PileThreshold:
-    """The flow at which a fraction of a pile's grains has moved; NaN if it was not reached.
+    """The flow at which a fraction n/N of a pile's grains has moved; NaN if it was not reached.
 
-    Attributes
-    ----------
-    fraction : float
-        n/N.
-    ustar0 : float
-        Undisturbed friction velocity, m/s.
-    tau, tau_low, tau_high : float
-        tau_c and its interval, Pa: the mean over the grains that have moved of the stress that
-        drives each along its own way, whichever way that is. The interval holds the step between
-        two flows and the count's resolution of 1/N.
-    carried_off : float
-        Share of the grains that had moved which were carried off.
-    against_the_flow : float
-        Share of the grains that had moved which a reversed flow drove upstream.
+    `ustar0` is the undisturbed friction velocity, m/s; `tau` is tau_c, Pa: the mean over the grains
+    that have moved of the stress that drives each along its own way, whichever way that is. Its
+    interval holds the step between two flows and the count's resolution of 1/N. The last two are
+    shares of the grains that had moved: carried off, and driven upstream by a reversed flow.
     """
 
     fraction: float

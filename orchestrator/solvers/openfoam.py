@@ -34,12 +34,6 @@ def version() -> str:
     return solvers.version("OpenFOAM", command, _STATED, tried=TRIED, env=env, remedy=remedy)
 
 
-def read_numbers(path: Path) -> dict[str, float]:
-    """The entries `name number;` of a dictionary file, such as a case's `parameters`."""
-    entries = re.findall(r"(?m)^(\w+)\s+([-+.\d][^\s;]*);", path.read_text(encoding="utf-8"))
-    return {name: float(value) for name, value in entries}
-
-
 def read_cells(directory: Path, array: str) -> "pyvista.UnstructuredGrid":
     """The cells of a case with a field of its last time; SolverError if it has no results."""
     import pyvista

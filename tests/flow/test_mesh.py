@@ -47,7 +47,7 @@ def of_study(text: str) -> FlowCase:
 
 def first_cells(directory: Path) -> tuple[FloatArray, FloatArray]:
     """Corners of the bed's faces (x, z), downstream, and mean heights of the cells on them."""
-    faces, cells, middles = SolvedFlow(directory)._mesh
+    faces, cells, middles = SolvedFlow(directory).mesh
     heights = 2 * (middles[cells, 2] - faces[..., 2].mean(axis=1))
     corners = np.unique(np.round(faces.reshape(-1, 3)[:, [0, 2]], 9), axis=0)
     return corners, heights
