@@ -16,7 +16,7 @@ from orchestrator.study.study import BED, TIME_LIMIT_S
 HEAD = f"""# Study files
 
 A study file is TOML. It has a table for each part of a scene: `[fluid]`, `[grain]`, `[bed]`,
-`[flow]` and `[protocol]`. `[axes]` lists values of fields; every combination of them is a scene:
+`[flow]`, `[forces]` and `[protocol]`. `[axes]` lists values; every combination is a scene:
 
 ```toml
 title = "Two grains on three slopes"
@@ -29,9 +29,9 @@ roughness = "d/30"
 "bed.slope_deg" = [0.0, 15.0, 20.0]
 ```
 
-Each `[[group]]` is an experiment of its own, with a `name`: its tables override those of the top,
-and its `axes` add to them. A wrong key, type or range is refused in one line that names the file,
-the field and the remedy. The [glossary](glossary.md) explains the words.
+Each `[[group]]` is an experiment with a `name`: its tables override those of the top, its `axes`
+add to them. A wrong key, type or range is refused in one line with the field and the remedy. The
+[glossary](glossary.md) explains the words.
 
 | key of the top | default | meaning |
 |---|---|---|
@@ -42,12 +42,13 @@ the field and the remedy. The [glossary](glossary.md) explains the words.
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 
-The *scope* of a field says for which scenes it has an effect; for all others its column in the
-tables is empty. A tolerance may change a field marked *answer*, which says how a scene is answered.
-The column `answered_...` of the table of scenes has the value that was run.
+The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
+The *column* is named as the field where none is given. A tolerance may change a field marked
+*answer*; column `answered_...` of the table of scenes has the value that was run. Ranges are
+intervals; a parenthesis leaves out the end.
 """
-SIGNS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
-COLUMNS = "| field | symbol, unit | range | default | meaning | scope | column |"
+SIGNS = {Gt: ("gt", "({:g},"), Ge: ("ge", "[{:g},"), Lt: ("lt", "{:g})"), Le: ("le", "{:g}]")}
+COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
 
 
 def text() -> str:
@@ -57,44 +58,45 @@ def text() -> str:
         about = (model.__doc__ or "").partition("\n")[0]
         if part == "bed":
             about = "One grain on two others, or a pile of grains."
-        lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 7}|")
+        lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")
         rows = (_row(each) for each in fields.FIELDS if each.name.startswith(f"{part}."))
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
     return "\n".join(lines)
 
 
 def _row(quantity: Quantity) -> list[str]:
-    field, info = fields.declared(quantity), quantity.info
-    words = info.choices or {w: w for w in get_args(field.annotation) if isinstance(w, str)}
-    listed = [f'`"{w}"`' + (f": {m}" if m.lower() != w else "") for w, m in words.items()]
     part, _, name = quantity.name.partition(".")
+    field, info = fields.PARTS[part].model_fields[name], quantity.info
+    words = info.choices or {w: w for w in get_args(field.annotation) if isinstance(w, str)}
+    listed = [f'`"{w}"`' + (f": {m}" if m.lower() != w.lower() else "") for w, m in words.items()]
     value = BED.get(name, field.default) if part == "bed" else field.default
     default = f"`{list(value) if isinstance(value, tuple) else value!r}`".replace("'", '"')
     if value is PydanticUndefined:
-        default = "none: required"
+        default = "required"
     elif value is None:
-        default = "worked out"
+        default = ""
     scope = "" if info.scope == "every scene" else info.scope
     role = "" if info.about == "question" else f"*{info.about}*"
     return [
         f"`{name}`",
-        ", ".join(filter(None, (info.symbol, info.unit))).replace("*", r"\*"),
-        ", ".join(bounds(field)),
+        ", ".join(filter(None, (info.symbol, info.unit, " ".join(bounds(field))))).replace(
+            "*", r"\*"
+        ),
         default,
         "<br>".join([quantity.meaning, *listed]).replace("*", r"\*"),
         ", ".join(filter(None, (scope, role))),
-        f"`{quantity.column}`" if quantity.column in fields.COLUMNS else "",
+        "" if quantity.column == name else f"`{quantity.column}`".replace("`-`", "none"),
     ]
 
 
 def bounds(field: FieldInfo) -> list[str]:
-    """The range of a field's values; of an optional field or a list, the range of each of them."""
+    """The ends of a field's range; of an optional field or a list, those of each of its values."""
     rules = list(field.metadata)
     for inner in get_args(field.annotation):
         for rule in getattr(inner, "__metadata__", ()):
             rules += getattr(rule, "metadata", [rule])
     signs = [(SIGNS[type(rule)], rule) for rule in rules if type(rule) in SIGNS]
-    return [f"{sign} {getattr(rule, name):g}" for (name, sign), rule in signs]
+    return [sign.format(getattr(rule, name)) for (name, sign), rule in signs]
 
 
 if __name__ == "__main__":

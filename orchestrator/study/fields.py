@@ -3,7 +3,7 @@
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Any, get_args
+from typing import Any
 
 from pydantic.fields import FieldInfo
 
@@ -87,14 +87,11 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
 
 def _quantity(part: str, name: str, declared: FieldInfo) -> Quantity:
     info = next(each for each in declared.metadata if isinstance(each, Info))
-    meanings: Any = info.choices
-    if isinstance(meanings, list):
-        words = zip(get_args(declared.annotation), meanings, strict=True)
-        info = replace(info, choices=dict(words))
-    info = replace(info, label=info.label or name.removesuffix("_deg").replace("_", " "))
-    meaning = " ".join((declared.description or "").split())
-    read = attrgetter(f"{part}.{name}")
-    return Quantity(f"{part}.{name}", info.column or name, info, meaning, read)
+    text, *words = (declared.description or "").split("\n- ")
+    choices = info.choices or dict(word.split(": ", 1) for word in words)
+    label = info.label or name.removesuffix("_deg").replace("_", " ")
+    info, read = replace(info, label=label, choices=choices), attrgetter(f"{part}.{name}")
+    return Quantity(f"{part}.{name}", info.column or name, info, " ".join(text.split()), read)
 
 
 FIELDS: tuple[Quantity, ...] = tuple(
@@ -103,7 +100,6 @@ FIELDS: tuple[Quantity, ...] = tuple(
     for name, declared in model.model_fields.items()
 )
 """Every field of a study file, in the order of the file."""
-_RATIO = Info("roughness length", "z_0", "d")
 _REGIME = "forces that are valid at the threshold of a single grain of the scene, or transition"
 
 
@@ -112,6 +108,7 @@ def _ratio(scene: Scene) -> float:
     return round(scene.bed.roughness / scene.grain.diameter, 9)
 
 
+_RATIO = Info("roughness length", "z_0", "d")
 DERIVED = (
     Quantity("", "z0_over_d", _RATIO, "roughness length over diameter", _ratio),
     Quantity("", "regime", Info("regime"), _REGIME, regime_of),
@@ -127,12 +124,6 @@ ANSWERS: Mapping[str, Quantity] = {
 FOLLOW = ("z0_m", "regime", *(column for column, each in ANSWERS.items() if each.info.read))
 """Columns that follow from others: of the two roughness lengths, the ratio to the diameter tells
 beds apart that are alike but for the size of their grains."""
-
-
-def declared(quantity: Quantity) -> FieldInfo:
-    """The declaration of a field: its range and its default."""
-    part, _, name = quantity.name.partition(".")
-    return PARTS[part].model_fields[name]
 
 
 def asked(scene: Scene) -> dict[str, Any]:

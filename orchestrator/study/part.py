@@ -32,8 +32,7 @@ class Info:
     symbol: str = ""  # as formulas write it, an index after an underscore
     unit: str = ""
     column: str = ""  # of tables, with the unit, where that is not its name; "-" for none
-    scope: str = "every scene"
-    """The scenes on which it has an effect, a key of `fields.APPLIES`."""
+    scope: str = "every scene"  # the scenes on which it has an effect, a key of `fields.APPLIES`
     about: Literal["question", "answer", "replica"] = "question"
     """A question to nature, a way to answer it, which alone a level of fidelity may change, or a
     choice among many alike."""
@@ -42,15 +41,14 @@ class Info:
 
 
 def field(default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
-    """Declare a field: default (none: required), symbol, unit and column as of `Info`.
+    """Declare a field: default (none: required), symbol, unit, column, label, `read` of `Info`.
 
-    `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge`` and ``le``;
-    without a label it is the name, and `choices` may be a list of the meanings of a `Literal`. A
-    field that came after the first studies is `since`: a scene that has its default leaves it out
-    of its digest, and keeps its id.
+    `settings` are the same or further words of `Info`, and rules of `pydantic.Field` such as
+    ``ge``. A field that came after the first studies is `since`: a scene that has its default
+    leaves it out of its digest, and keeps its id.
     """
     about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
-    about |= dict(zip(("symbol", "unit", "column"), words, strict=False))
+    about |= dict(zip(("symbol", "unit", "column", "label", "read"), words, strict=False))
     if since:
         settings["exclude_if"] = lambda value: value == default
     declared: FieldInfo = Field(default, **settings)

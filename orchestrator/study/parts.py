@@ -1,52 +1,44 @@
 """The parts of a scene: fluid, grain, bed, flow, forces and protocol; frozen, validated, SI.
 
 Each field is declared here once: its name and default are the study file's, its words and the text
-under it are what tables, figures and the reference of study files say of it. Angles are in degrees
-and say so in their names; all else is in SI units or in the unit that is declared. Ranges are
-limits of nature, not of the methods.
+under it are what tables, figures and the reference of study files say of it. Lines of the text that
+begin with a dash give the meaning of one word each. Angles are in degrees and say so in their
+names; all else is in SI units or in the unit that is declared. Ranges are limits of nature.
 """
 
 from functools import partial
 from math import radians, tan
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, InstanceOf, PlainSerializer, field_validator, model_validator
+from pydantic import Field, InstanceOf, PlainSerializer
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
-from orchestrator.study import sizes
 from orchestrator.study.part import Height, Length, List, Part, Roughness, Viscosity, field
 from orchestrator.study.part import UnfitError as UnfitError
 from orchestrator.study.profile import Profile
 from orchestrator.study.shapes import SHAPES, Shape
 from orchestrator.study.sizes import Sizes
 
+LAW_LABELS = {"paper": "Eq. 2 or Eq. 4 where each holds, both in the transition"}
+LAW_LABELS |= {name: law.label for name, law in LAWS.items()}
+SHAPE_MEANINGS = {name: shape.meaning for name, shape in SHAPES.items()}
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
-Convection = Literal["linearUpwind", "upwind", "limitedLinear"]
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
 if TYPE_CHECKING:
     ShapeName = str
+    LawName = str
 else:
-    ShapeName = Literal[tuple(SHAPES)]
+    ShapeName, LawName = Literal[tuple(SHAPES)], Literal[tuple(LAW_LABELS)]
 Range = Annotated[tuple[float, float], List]
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
-Update = Annotated[float, Field(ge=0, le=0.5)]
 File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
-BEDS = {
-    "grain": "one grain on its two fixed neighbours, in an undisturbed boundary layer",
-    "pile": "grains of any bed line across the flow: a form, a train of forms, a profile",
-}
-LAW_LABELS = {"paper": "Eq. 2 or Eq. 4 where each holds, both in the transition"}
-LAW_LABELS |= {name: law.label for name, law in LAWS.items()}
-COUNTED = {"windward": "on sides that rise", "all": "all"}
-SHAPE_MEANINGS = {name: shape.meaning for name, shape in SHAPES.items()}
 LEVEL = 4.0  # length of level bed with grains, over the height
-LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
 
 _pile = partial(field, scope="piles")
 _answer = partial(field, scope="piles", about="answer")
 _dune = partial(field, scope="dunes", since=True)
-_poured = partial(field, scope="poured beds")
+_poured = partial(field, scope="poured beds", since=True)
 _solved = partial(field, scope="solved flows", about="answer")
 _dem = partial(field, scope="DEM", about="answer")
 
@@ -55,9 +47,7 @@ class Fluid(Part):
     """The fluid; the default is the paper's air."""
 
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
-    density: float = field(
-        1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", label="fluid density", ge=1e-7, le=20_000
-    )
+    density: float = field(1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", "fluid density", ge=1e-7, le=2e4)
     """density of the fluid"""
     viscosity: Viscosity = field(1e-5, "ν", "m²/s", "nu_m2_s")
     """kinematic viscosity that the grains feel"""
@@ -74,7 +64,7 @@ class Grain(Part):
     """grain diameter"""
     # from aerogels, 0.2, to osmium, 22,600
     density: float = field(
-        2500.0, "ρ_sol", "kg/m³", "rho_sol_kg_m3", label="grain density", ge=0.1, le=25_000
+        2500.0, "ρ_sol", "kg/m³", "rho_sol_kg_m3", "grain density", ge=0.1, le=25_000
     )
     """density of the grains"""
     # from wet ice to grains that hold by more than friction
@@ -85,70 +75,51 @@ class Grain(Part):
     """spring constant of a contact, normal and tangential, times the diameter over the weight"""
     damping: float = _dem(0.1, ge=0, le=1)
     """damping ratio of a collision"""
-    sizes: Sizes | None = _poured(None, since=True)
-    """mixture of a poured bed; by default all grains have the diameter. A sieve table: rows of
-    diameter (m, rising) and mass fraction, or the name of a file with columns diameter_m and
-    fraction; its d50 is the diameter. Or a log-normal distribution by mass about the diameter,
-    { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, with cut-offs in d, two geometric standard
-    deviations by default"""
-
-    @model_validator(mode="after")
-    def _sizes_fit(self) -> Self:
-        if self.sizes is not None:
-            sizes.check(self.sizes, self.diameter)
-        return self
+    sizes: Sizes | None = _poured(None)
+    """mixture of a poured bed: a sieve table, rows of diameter (m, rising) and mass fraction or a
+    CSV file with columns diameter_m and fraction, whose d50 is the diameter; or log-normal by mass,
+    { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by default at two geometric
+    standard deviations"""
 
 
 class Forces(Part):
     """How the grains feel the flow."""
 
-    law: str = field("bridged", label="force law", column="force_law", choices=LAW_LABELS)
+    law: LawName = field("bridged", label="force law", column="force_law", choices=LAW_LABELS)
     """drag and lift on an exposed grain"""
     # from none to sixty times Saffman's
     lift_coefficient: float = field(LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100)
     """lift coefficient"""
-    stress: Literal["wall", "eq10"] = _pile("wall", choices=["wall stress", "stress of Eq. 10"])
-    """how the stress on the bed is read off the flow: at the wall, or at the first cell"""
+    stress: Literal["wall", "eq10"] = _pile("wall")
+    """stress on the bed: at the wall, or at the first cell
+    - wall: wall stress
+    - eq10: stress of Eq. 10"""
     # from far below a cell of any mesh to several piles
     averaging_length: float = _pile(1 / 40, unit="h", ge=1e-4, le=100)
-    """least length of bed that a grain's stress is averaged on: the crest's own value never
-    converges with the mesh"""
-    loaded_grains: Literal["exposed", "all but crest", "all but toe"] = _pile(
-        "exposed",
-        choices={
-            "exposed": "all exposed grains",
-            "all but crest": "exposed grains but for the topmost one",
-            "all but toe": "exposed grains but for those on the lowest 5 % of the face",
-        },
-    )
-    """grains of a pile that feel the flow's force"""
-    exposure: Literal["alike", "protrusion"] = _poured(
-        "alike",
-        since=True,
-        choices=[
-            "every exposed grain stands z₀ above the bed, as in the paper",
-            "each stands at its own height over the local bed",
-        ],
-    )
-    """height at which the flow meets a grain"""
-
-    @field_validator("law")
-    @classmethod
-    def _is_in_registry(cls, value: str) -> str:
-        if value not in LAW_LABELS:
-            known = f"known: {', '.join(LAW_LABELS)}"
-            raise UnfitError("forces.law", f"unknown force law {value!r}", known)
-        return value
+    """least length of bed that a grain's stress is averaged on: the crest's own never converges
+    with the mesh"""
+    loaded_grains: Literal["exposed", "all but crest", "all but toe"] = _pile("exposed")
+    """grains of a pile that feel the flow's force
+    - exposed: all exposed grains
+    - all but crest: exposed grains but for the topmost one
+    - all but toe: exposed grains but for those on the lowest 5 % of the face"""
+    exposure: Literal["alike", "protrusion"] = _poured("alike")
+    """height at which the flow meets a grain
+    - alike: every exposed grain stands z₀ above the bed, as in the paper
+    - protrusion: each stands at its own height over the local bed"""
 
 
 class Protocol(Part):
     """How the threshold is found; by DEM the flow rises in load steps."""
 
     method: Literal["dem", "peeling", "pivot"] = field(
-        "dem", label="threshold method", about="answer", choices=["DEM", "peeling", "pivot"]
+        "dem", label="threshold method", about="answer"
     )
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
-    another), or DEM"""
+    another), or DEM
+    - dem: DEM
+    - peeling: peeling
+    - pivot: pivot"""
     load_increment: float = _dem(0.02, "Δu*/u*", ge=1e-4, le=0.2)
     """relative rise of u* from one load step to the next"""
     waiting_time: float = _dem(10.0, unit="√(d/g′)", ge=1, le=1e4)
@@ -163,100 +134,77 @@ class Protocol(Part):
     """fractions of the exposed grains at which the thresholds of a pile are reported"""
     time_step: float = _dem(0.2, unit="√(m/K)", ge=1e-3, le=2)
     """time step of the grains' integration"""
-    update: Update = field(
-        0.0, "", "of N", label="update of the bed", scope="DEM and peeling of piles", since=True
+    update: Annotated[float, Field(ge=0, le=0.5)] = field(
+        0.0, "", "of N", "", "update of the bed", scope="DEM and peeling of piles", since=True
     )
-    """part of the counted grains after which the bed line is drawn anew through the grains that are
-    there, and the flow solved over it, until the last of the fractions; 0 keeps the flow of the
-    whole pile, as in the paper"""
-
-    @model_validator(mode="after")
-    def _updates_are_few(self) -> Self:
-        if 0 < self.update < LEAST_UPDATE:
-            remedy = f"each update is a solve of the flow: 0, or at least {LEAST_UPDATE:g}"
-            raise UnfitError("protocol.update", f"{self.update:g} of the grains", remedy)
-        return self
+    """part of the counted grains after which the flow is solved over the bed line of the remaining
+    ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
 
 
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
     model: Literal["solve", "waves", "hill", "flat"] = _answer(
-        "solve",
-        label="flow model",
-        column="flow_model",
-        choices=[
-            "OpenFOAM",
-            "linear theory with A and B of each wavelength (Fourrière et al. 2010)",
-            "linear theory with A and B of one low hill (Kroy et al. 2002)",
-            "log law of a flat bed, u* = u*₀",
-        ],
+        "solve", "", "", "flow_model", "flow model"
     )
-    """where the stress on a pile comes from"""
+    """where the stress on a pile comes from
+    - solve: OpenFOAM
+    - waves: linear theory with A and B of each wavelength (Fourrière et al. 2010)
+    - hill: linear theory with A and B of one low hill (Kroy et al. 2002)
+    - flat: log law of a flat bed, u* = u*₀"""
     speed: float = _solved(
-        10.0, "U_e", "m/s", "solve_u_e_m_s", label="speed of the solve", ge=1e-6, le=1e3
+        10.0, "U_e", "m/s", "solve_u_e_m_s", "speed of the solve", ge=1e-6, le=1e3
     )
-    """speed 10 h above the flat bed at which the flow over a pile is solved; the stress is scaled
-    from it"""
+    """speed 10 h above the flat bed at which the flow is solved; the stress is scaled from it"""
     viscosity: Viscosity | None = _solved(
-        None, "ν", "m²/s", "solve_nu_m2_s", label="viscosity of the solve", read="solve_viscosity"
+        None, "ν", "m²/s", "solve_nu_m2_s", "viscosity of the solve", "solve_viscosity"
     )
-    """kinematic viscosity of that solve: the wall is rough, the fluid's own moves only the grain's
-    Re*; by default 1e-5, or less where the flow in the first cells would not be turbulent"""
+    """kinematic viscosity of the solve, over a rough wall; by default 1e-5, or less where the first
+    cells would not be turbulent"""
     first_cell_height: Length | None = _solved(
-        None, "", "m", "first_cell_m", label="first cell", read="first_cell_height"
+        None, "", "m", "first_cell_m", "first cell", "first_cell_height"
     )
-    """height of the mesh's cells on the bed; by default h/40, more on a very rough bed, 2.5 z₀, and
-    where the viscosity of the solve is given and the flow in them would not be turbulent"""
+    """height of the cells on the bed; by default h/40, more on a rough bed and where the given
+    viscosity needs it"""
     cells_per_face: int = _solved(40, ge=10, le=400)
     """cells of the mesh along each face of the pile"""
     expansion_ratio: float = _solved(1.1, ge=1.01, le=2)
-    """ratio of neighbouring cells up from the bed and away from the pile, with 40 cells along a
-    face; it follows their number"""
+    """ratio of neighbouring cells up from the bed and away from the pile, for 40 cells along a
+    face"""
     roughness: Roughness | None = _answer(
-        None,
-        "z_0",
-        "m",
-        "solve_z0_m",
-        label="roughness length of the solve",
-        read="solve_roughness",
+        None, "z_0", "m", "solve_z0_m", "roughness length of the solve", "solve_roughness"
     )
-    """roughness length at which the flow is found, for beds of nearly the same one to share it; by
-    default the bed's"""
+    """roughness length at which the flow is solved, which similar beds can share; by default the
+    bed's"""
     nodes: bool = _solved(False, label="nodes of z₀", since=True)
-    """whether the flow is interpolated in ln z₀, face by face, between solves at fixed values of
-    z₀/h, which beds of one form share"""
-    turbulence_model: Turbulence = _solved(
-        "kEpsilon", choices=["k-ε", "RNG k-ε", "realizable k-ε", "k-ω SST"]
-    )
-    """OpenFOAM's turbulence model"""
-    convection_scheme: Convection = _solved("linearUpwind")
+    """whether the flow is interpolated in ln z₀ between solves that beds of one form share"""
+    turbulence_model: Turbulence = _solved("kEpsilon")
+    """OpenFOAM's turbulence model
+    - kEpsilon: k-ε
+    - RNGkEpsilon: RNG k-ε
+    - realizableKE: realizable k-ε
+    - kOmegaSST: k-ω SST"""
+    convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved("linearUpwind")
     """OpenFOAM's scheme for the convection of U"""
     top: Literal["open water", "closed channel", "boundary layer"] = _pile(
-        "boundary layer",
-        label="top of the flow",
-        column="flow_top",
-        since=True,
-        choices=[
-            "a level surface without stress",
-            "a wall as rough as the bed",
-            "the log layer goes on above",
-        ],
+        "boundary layer", "", "", "flow_top", "top of the flow", since=True
     )
-    """what the flow has above"""
+    """what the flow has above
+    - open water: a level surface without stress
+    - closed channel: a wall as rough as the bed
+    - boundary layer: the log layer goes on above"""
     depth: Length | None = _pile(None, "D", "m", "depth_m", since=True)
     """depth of open water or of a closed channel over the flat bed"""
     lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
-    """height of a boundary layer's lid above the flat bed; the flow there is that of the
-    undisturbed log layer"""
-    upstream: float = _solved(80.0, label="flat bed upstream", unit="h", since=True, ge=3, le=1000)
+    """height of a boundary layer's lid above the flat bed, in undisturbed flow"""
+    upstream: float = _solved(80.0, "", "h", "", "flat bed upstream", since=True, ge=3, le=1000)
     """flat bed from the inlet to the forms"""
     downstream: float = _solved(
-        100.0, label="flat bed downstream", unit="h", since=True, ge=3, le=1000
+        100.0, "", "h", "", "flat bed downstream", since=True, ge=3, le=1000
     )
     """flat bed from the forms to the outlet"""
     non_orthogonal_correctors: int = _solved(1, label="non-orthogonal correctors", ge=0, le=5)
-    """repeated solves of the pressure for cells that are not orthogonal, in each iteration"""
+    """repeated solves of the pressure in each iteration"""
 
 
 class Obstacle(Part):
@@ -289,86 +237,79 @@ class Bed(Part):
     """slope of the bed; the flow goes up it"""
     # at 60 the two grains below touch, at 0 the grain falls between them
     entrainment_angle_deg: float = field(60.0, "β", "°", "beta_deg", ge=1, le=60)
-    """angle at which a grain leaves its pocket: the neighbours below it are 2 d cos β apart"""
-    roughness: Roughness = field(..., "z_0", "m", "z0_m", label="roughness length")
-    """roughness length of the bed; a study file may write a part of the diameter of the bed's
-    grains: "d/30" """
+    """angle at which a grain leaves its pocket, between neighbours 2 d cos β apart"""
+    roughness: Roughness = field(..., "z_0", "m", "z0_m", "roughness length")
+    """roughness length of the bed, or a part of the diameter of its grains, "d/30" """
     # a smaller grain falls through the pores of a bed, a larger one lies on many grains
     relative_size: float = field(1.0, "D/d", scope="single grains", since=True, ge=0.1, le=10)
-    """diameter of a single grain over that of its two neighbours, which lie as far apart as equal
-    grains do: 2 d cos β"""
+    """diameter of a single grain over that of its two neighbours"""
 
 
 class GrainBed(Bed):
     """One grain on its two fixed neighbours, in an undisturbed boundary layer (paper, 3.1)."""
 
-    kind: Literal["grain"] = field("grain", label="bed", column="bed", choices=BEDS)
-    """what the bed is made of"""
+    kind: Literal["grain"] = "grain"
 
 
 class PileBed(Bed):
     """Grains across the flow, under a bed line of any shape (the paper's, 3.2, is a triangle)."""
 
-    kind: Literal["pile"] = field(label="bed", column="bed", choices=BEDS)
-    """what the bed is made of"""
+    kind: Literal["pile"] = field(label="bed", column="bed")
+    """what the bed is made of
+    - grain: one grain on its two fixed neighbours, in an undisturbed boundary layer
+    - pile: grains under any bed line: a form, a train of forms, a profile"""
     height: Height = _pile(0.02, "h", "m", "h_m")
-    """height of the forms that the flow goes over; that of a profile follows from it, and over a
-    flat bed with obstacles the flow is measured in the height of the tallest"""
+    """height of the forms; that of a profile follows; over a flat bed with obstacles lengths in h
+    are heights of the tallest"""
     shape: ShapeName = _pile("triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS)
     """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
-    windward: Literal["straight", "curved"] = _dune(
-        "straight", label="windward side", choices=["one slope", "half a wave of a cosine"]
-    )
-    """windward side of a dune"""
+    windward: Literal["straight", "curved"] = _dune("straight", label="windward side")
+    """windward side of a dune
+    - straight: one slope
+    - curved: half a wave of a cosine"""
     lee_slope_deg: float | None = _pile(None, unit="°", since=True, gt=0, le=60)
-    """slope of a straight lee side or a step down; by default that of the windward side, 30 of a
-    dune and a step down"""
+    """slope of a straight lee side or a step down; by default the windward side's, 30 of a dune and
+    a step down"""
     brink_radius: float = _dune(0.0, "", "m", ge=0, le=1e3)
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
     length: Length | None = field(None, "", "m", scope="beds with level parts", since=True)
-    """length of level bed with grains: of a trapezoid's top, of a flat bed, before or behind a
-    step; by default 4 h"""
+    """length of level bed with grains: a trapezoid's top, a flat bed, before or behind a step; by
+    default 4 h"""
     forms: int = _pile(1, since=True, ge=1, le=100)
     """number of forms in a train"""
     spacing: Length | None = _pile(None, unit="m", since=True)
     """from one form of a train to the next; by default they touch"""
     profile: File | None = _pile(None, since=True)
-    """file with the bed line, in place of a shape: columns x_m and z_m; a path is relative to the
+    """file with the bed line, in place of a shape: columns x_m and z_m; its path is relative to the
     study file"""
     smoothing: float = field(0.0, "", "m", scope="profiles", since=True, ge=0, le=1e3)
     """length over which a noisy profile is smoothed"""
     obstacles: Annotated[tuple[Obstacle, ...], List] = _pile((), since=True)
-    """fences, blocks and half-cylinders on the bed, which carry no grains: tables with `kind`, `x`,
-    `height` and, of a block, `length`"""
+    """fences, blocks and half-cylinders, which carry no grains: tables with `kind`, `x`, `height`
+    and, of a block, `length`"""
     counted: Literal["windward", "all"] | Range | None = _pile(
-        None, label="counted grains", since=True, choices=COUNTED
+        None, label="counted grains", since=True
     )
-    """exposed grains that are counted, or the range of x in which; by default those of windward
-    sides, all of a flat bed, a step down and a profile"""
-    packing: Packing = _pile(
-        "aligned",
-        choices=[
-            "rows along the slope",
-            "level rows",
-            "random gaps",
-            "poured by LIGGGHTS into a mould of the bed line, settled and cut to it",
-        ],
-    )
-    """pattern of the pile's grains; random gaps are between grains of rows along the slope"""
+    """exposed grains that are counted, or their range of x; by default those of windward sides,
+    all of a flat bed, a step down and a profile
+    - windward: on sides that rise
+    - all: all"""
+    packing: Packing = _pile("aligned")
+    """pattern of the pile's grains
+    - aligned: rows along the slope
+    - horizontal: level rows
+    - disordered: rows along the slope with random gaps
+    - poured: poured by LIGGGHTS into a mould of the bed line, settled and cut to it"""
     disorder: float = field(0.02, "", "d", scope="disordered piles", ge=1e-6, le=0.2)
     """largest gap between two grains of the row under the four uppermost"""
-    poured_depth: float = _poured(
-        6.0, label="depth of the mould", unit="d", since=True, ge=3, le=100
-    )
-    """depth of a poured bed under the bed line, along the vertical, to a row of fixed grains"""
-    width: float = _poured(
-        0.0, "", "d", label="width of the strip", about="answer", since=True, ge=0, le=50
-    )
-    """width of a poured bed across the flow, a strip in space with periodic sides: at least 3 of
-    its largest grains; 0 is one layer of grains in the plane of the flow"""
+    poured_depth: float = _poured(6.0, "", "d", "", "depth of the mould", ge=3, le=100)
+    """vertical depth of a poured bed under the bed line, to a row of fixed grains"""
+    width: float = _poured(0.0, "", "d", "", "width of the strip", about="answer", ge=0, le=50)
+    """width of a strip of poured grains with periodic sides, at least 3 of the largest; 0 is one
+    layer in the plane of the flow"""
     seed: int = field(0, scope="random beds and replicas", about="replica", ge=0, le=10**9)
-    """which of the many disordered or poured packings; of a lattice 0 is itself, any other a
-    replica with grains up to 1e-9 d aside, so that replicas differ by round-off alone"""
+    """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
+    up to 1e-9 d aside"""
     mobile_layers: int = _answer(2, ge=1, le=1000)
     """layers of the windward face that may move; below them the grains are fixed"""
 

@@ -13,10 +13,8 @@ import numpy as np
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
 from orchestrator.study.shapes import SHAPES
-from orchestrator.types import FloatArray, IntArray
+from orchestrator.types import FloatArray
 
-SHAPE_FIELDS = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
-"""Fields of a bed that a profile replaces."""
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest coordinate, m
 MOST_CORNERS = 3000  # most corners of a bed line, each of which is a grid line of the flow's mesh
 GAP, DENSE = 20.0, 20
@@ -53,9 +51,9 @@ class Files:
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
         """Fields of a bed that names a profile; `where` names the study file in messages."""
         where, name = f"{where}: bed.profile", bed["profile"]
-        for given in SHAPE_FIELDS:
-            if given in bed:
-                raise InputError(f"it has its own {given}", where, f"leave out bed.{given}")
+        replaced = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
+        for given in bed.keys() & replaced:
+            raise InputError(f"it has its own {given}", where, f"leave out bed.{given}")
         if not isinstance(name, str):
             raise InputError(f"{name!r} is not accepted", where, "name a file")
         smoothing = bed.get("smoothing", 0.0)
@@ -70,8 +68,7 @@ class Files:
     def sieve(self, name: str, where: str) -> list[list[float]]:
         """The rows of a sieve table, diameter (m) and fraction."""
         place = f"{where}: grain.sizes: {self.folder / name}"
-        _, *columns = read_columns(self._text(name, place), ("diameter_m", "fraction"), place)
-        return [list(row) for row in np.column_stack(columns).tolist()]
+        return read_columns(self._text(name, place), ("diameter_m", "fraction"), place)[1]
 
     def _text(self, name: str, where: str) -> str:
         if name not in self.texts:
@@ -106,35 +103,28 @@ def read_text(path: Path, largest: int, where: str) -> str:
 
 def read_columns(
     text: str, names: tuple[str, str], where: str
-) -> tuple[IntArray, FloatArray, FloatArray]:
+) -> tuple[list[int], list[list[float]]]:
     """Two columns of a CSV file with a header; blank lines and other columns are left out.
 
-    Returned are the numbers of the lines, and the values of both columns, all of shape (n,). An
-    `InputError` names the file, the line and the remedy.
+    Returned are the number of each line and its two values. An `InputError` names the line.
     """
-    rows = [(line, row) for line, row in enumerate(csv.reader(io.StringIO(text)), 1) if any(row)]
-    header = [name.strip() for name in rows[0][1]] if rows else []
-    for name in names:
-        if header.count(name) != 1:
-            remedy = f"the first line is {','.join(names)}: metres, commas between columns"
-            raise InputError(f"no column {name}, or two", f"{where}: line 1", remedy)
-    places, values = [header.index(name) for name in names], np.empty((len(rows) - 1, 2))
-    for index, (line, row) in enumerate(rows[1:]):
-        try:
-            if len(row) != len(header):
-                raise ValueError(f"{len(row)} values under a header of {len(header)}")
-            cells = [row[place] for place in places]
-            if "_" in "".join(cells) or not "".join(cells).isascii():
-                raise ValueError(
-                    f"{cells} are not two numbers"
-                )  # float() reads them: 1_0, Arabic digits
-            first, second = values[index] = [float(cell) for cell in cells]
-            if not (abs(first) <= LARGEST_NUMBER and abs(second) <= LARGEST_NUMBER):
-                raise ValueError(f"a number is not within {LARGEST_NUMBER:g}")
-        except ValueError as error:
-            remedy = "write metres with a decimal point and commas between them; close gaps"
-            raise InputError(str(error), f"{where}: line {line}", remedy) from None
-    return np.array([line for line, _ in rows[1:]]), values[:, 0], values[:, 1]
+    reader = csv.DictReader(io.StringIO(text))
+    lines, values = [], []
+    try:
+        header = reader.fieldnames = [name.strip() for name in reader.fieldnames or ()]
+        if any(header.count(name) != 1 for name in names):
+            raise ValueError(f"not one column {names[0]} and one {names[1]}")
+        for row in reader:
+            pair = [float(row[name] or "") for name in names]
+            is_number = all(abs(value) <= LARGEST_NUMBER for value in pair)
+            if None in row or None in row.values() or not is_number:
+                raise ValueError(f"not a number up to {LARGEST_NUMBER:g} for each column")
+            lines.append(reader.line_num)
+            values.append(pair)
+    except (ValueError, csv.Error) as error:
+        remedy = f"the first line is {','.join(names)}: metres, decimal points, commas between"
+        raise InputError(str(error), f"{where}: line {reader.line_num or 1}", remedy) from None
+    return lines, values
 
 
 @cache
@@ -145,15 +135,16 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     is twice the standard deviation of the Gaussian weights of a mean along x, m; 0 for none. An
     `InputError` names the line and the remedy.
     """
-    lines, x, z = read_columns(text, ("x_m", "z_m"), where)
+    lines, points = read_columns(text, ("x_m", "z_m"), where)
+    x, z = np.array(points).reshape(-1, 2).T
 
     def refuse(what: str, remedy: str, point: int | None = None) -> None:
         place = where if point is None or smoothing else f"{where}: line {lines[point]}"
-        raise InputError(what, where=place, remedy=remedy)
+        raise InputError(what, place, remedy)
 
     if len(x) < 3:
         refuse(f"{len(x)} points make no bed", "write 3 at least")
-    steps = np.diff(x)
+    steps, length = np.diff(x), float(np.ptp(x))
     back, widest, middle = int(np.argmin(steps > 0)), int(np.argmax(steps)), float(np.median(steps))
     if steps[back] <= 0:
         what = f"x does not rise to {x[back + 1]:g} m: unsorted, twice the same, or an overhang"
@@ -162,10 +153,11 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
         what = f"a gap of {steps[widest]:g} m after x = {x[widest]:g} m; others are {middle:g} m"
         refuse(what, "fill it with points", widest + 1)
     more = "raise bed.smoothing" if smoothing else "give bed.smoothing, a length in m"
-    if smoothing > np.ptp(x) / 4:
-        what = f"smoothing over {smoothing:g} m leaves nothing of {np.ptp(x):g} m"
-        refuse(what, "lower bed.smoothing")
-    count = float(np.ptp(x)) / smoothing * RESOLVED if smoothing else len(x)
+    if smoothing > length / 4:
+        refuse(
+            f"smoothing over {smoothing:g} m leaves nothing of {length:g} m", "lower bed.smoothing"
+        )
+    count = length / smoothing * RESOLVED if smoothing else len(x)
     if count > MOST_CORNERS:
         refuse(f"{count:.0f} points, more than the {MOST_CORNERS} that a mesh has", more)
     if smoothing:
@@ -187,10 +179,10 @@ def _smoothed(
 ) -> tuple[FloatArray, FloatArray]:
     """Weighted means at the ends of `count` equal steps."""
     # beyond its ends the line goes on as turned about them: they stay where they are
-    around = np.concatenate([2 * x[0] - x[:0:-1], x, 2 * x[-1] - x[-2::-1]])
-    heights = np.concatenate([2 * z[0] - z[:0:-1], z, 2 * z[-1] - z[-2::-1]])
-    # each point stands for the bed half-way to its neighbours
-    share = np.gradient(around)
+    around, heights = (
+        np.concatenate([2 * v[0] - v[:0:-1], v, 2 * v[-1] - v[-2::-1]]) for v in (x, z)
+    )
+    share = np.gradient(around)  # each point stands for the bed half-way to its neighbours
     places = np.linspace(x[0], x[-1], count + 1)
     first, last = np.searchsorted(around, [places - 2 * length, places + 2 * length])
     means = np.interp(places, x, z)

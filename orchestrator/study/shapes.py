@@ -31,10 +31,10 @@ class Shape:
     meaning: str
     corners: Callable[["PileBed"], FloatArray]  # of one form of a bed
     fields: tuple[str, ...] = ()  # of the bed that not all shapes have, and this one has
+    label: str = ""  # in figures, where that is not the name
     rises: bool = True  # whether it has a windward side, whose slope is the bed's
     lee_slope_deg: float | None = None  # by default; None: that of the windward side
     counted: Literal["windward", "all"] = "windward"  # exposed grains, by default
-    label: str = ""  # in figures, where that is not the name
 
 
 def _faces(bed: "PileBed") -> FloatArray:
@@ -147,26 +147,19 @@ def _flat(bed: "PileBed") -> FloatArray:
 
 
 TRAIN, LEE, LEVEL = ("forms", "spacing"), ("lee_slope_deg",), ("length",)
+DUNE = ("windward", "brink_radius", *TRAIN, *LEE)
 SLIP_FACE_DEG = 30.0  # lee slope of a dune and of a step down
 _LISTED = (
     Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
-    Shape(
-        "dune",
-        "a windward side and a slip face",
-        _dune,
-        ("windward", "brink_radius", *TRAIN, *LEE),
-        lee_slope_deg=SLIP_FACE_DEG,
-    ),
-    Shape(
-        "cosine", "one wave of a cosine, trough to trough", _cosine, TRAIN, label="wave of a cosine"
-    ),
-    Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, label="Gaussian hill"),
+    Shape("dune", "a windward side and a slip face", _dune, DUNE, lee_slope_deg=SLIP_FACE_DEG),
+    Shape("cosine", "one wave of a cosine, trough to trough", _cosine, TRAIN, "wave of a cosine"),
+    Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, "Gaussian hill"),
     Shape(
         "rushil",
-        "a hill of the wind-tunnel experiment RUSHIL, level at its feet",
+        "a hill of the wind tunnel RUSHIL, level at its feet",
         _rushil,
         TRAIN,
-        label="hill of RUSHIL",
+        "hill of RUSHIL",
     ),
     Shape("trapezoid", "two straight faces and a level top", _trapezoid, LEVEL + TRAIN + LEE),
     Shape("step up", "a straight face up to higher ground", _step_up, LEVEL),

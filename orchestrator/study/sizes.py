@@ -5,9 +5,9 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
-from orchestrator.study.part import List, UnfitError
+from orchestrator.study.part import List, Part, UnfitError
 from orchestrator.types import FloatArray
 
 LARGEST_RATIO = 10.0
@@ -18,10 +18,8 @@ SUM, OFF_MEDIAN = 1e-6, 0.01
 d50 from the diameter, relative: Shields numbers and a roughness length of d/30 take the latter."""
 
 
-class LogNormal(BaseModel):
+class LogNormal(Part):
     """A log-normal distribution by mass, whose median is the grain diameter."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     sigma_g: Annotated[float, Field(ge=1.001, le=3)]
     smallest: Annotated[float | None, Field(ge=0.1, le=1)] = None
@@ -60,23 +58,21 @@ Sizes = Annotated[
 
 def check(sizes: Sizes, diameter: float) -> None:
     """Refuse, by an `UnfitError`, a mixture that cannot be poured, or with another d50 (m)."""
-    median = percentile(sizes, diameter, 0.5)
-    if isinstance(sizes, LogNormal):
-        if abs(median / diameter - 1) > OFF_MEDIAN:
-            what = f"between these cut-offs d50 is {median:.4g} m, not the diameter"
-            raise UnfitError("grain.sizes", what, "write smallest = 1/largest")
-    else:
+    median, (low, high) = percentile(sizes, diameter, 0.5), extremes(sizes, diameter)
+    if isinstance(sizes, LogNormal) and abs(median / diameter - 1) > OFF_MEDIAN:
+        what = f"between these cut-offs d50 is {median:.4g} m, not the diameter"
+        raise UnfitError("grain.sizes", what, "write smallest = 1/largest")
+    if isinstance(sizes, tuple):
         diameters, fractions = np.array(sizes).T
-        if not np.all(np.diff(diameters) > 0):
-            raise UnfitError("grain.sizes", "the diameters do not rise", "sort the rows")
-        if abs(fractions.sum() - 1) > SUM:
-            what = f"the mass fractions add up to {fractions.sum():.6g}, not to 1"
+        if not np.all(np.diff(diameters) > 0) or abs(fractions.sum() - 1) > SUM:
+            what = (
+                f"diameters do not rise, or mass fractions add up to {fractions.sum():.6g}, not 1"
+            )
             raise UnfitError("grain.sizes", what, "look at the rows")
         if abs(diameter / median - 1) > 1e-9:
             raise UnfitError("grain.diameter", f"the d50 of grain.sizes is {median:.9g} m")
-    low, high = extremes(sizes, diameter)
-    if (ratio := high / low) > LARGEST_RATIO:
-        what = f"the largest grain is {ratio:.3g} times the smallest"
+    if high / low > LARGEST_RATIO:
+        what = f"the largest grain is {high / low:.3g} times the smallest"
         raise UnfitError("grain.sizes", what, f"at most {LARGEST_RATIO:g}")
 
 
@@ -106,8 +102,7 @@ def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
 def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:
     """Diameters of some grains over one diameter, in random order, shape (count,).
 
-    They are evenly spread over the distribution by number, so that no bed has more of a size than
-    it should by chance.
+    They are evenly spread over the distribution by number: no bed has more of a size by chance.
     """
     part = (np.arange(count) + 0.5) / count
     if sizes is None:

@@ -33,23 +33,6 @@ BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may 
 MOST_SCENES = 100_000
 MOST_BYTES = 2**24
 """Largest study file, bytes: one that lists every scene that there may be is smaller."""
-RENAMED = {
-    "flow.closure": "forces.law",
-    "flow.lift_coefficient": "forces.lift_coefficient",
-    "flow.stress": "forces.stress",
-    "flow.average": "forces.averaging_length",
-    "flow.forced": "forces.loaded_grains",
-    "flow.growth": "flow.expansion_ratio",
-    "flow.correctors": "flow.non_orthogonal_correctors",
-    "flow.turbulence": "flow.turbulence_model",
-    "flow.convection": "flow.convection_scheme",
-    "protocol.step": "protocol.load_increment",
-    "protocol.quiet": "protocol.waiting_time",
-    "protocol.marker": "protocol.displacement_criterion",
-    "protocol.until": "protocol.final_fraction",
-    "protocol.timestep": "protocol.time_step",
-}
-"""Former names of keys, with the present ones."""
 Table = dict[str, Any]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
@@ -68,16 +51,12 @@ class _Tables(Part):
 
 
 class _Group(_Tables):
-    """The keys of a ``[[group]]``."""
-
     name: str = ""
 
 
 class _File(_Tables):
-    """The keys of a study file; a time limit is at most three years, s."""
-
     title: str = ""
-    time_limit: float = Field(default=TIME_LIMIT_S, gt=0, le=1e8)
+    time_limit: float = Field(default=TIME_LIMIT_S, gt=0, le=1e8)  # s, at most three years
     tolerance: float | None = Field(default=None, ge=0, lt=1)
     cluster: Table = Field(default={})
     profiles: dict[str, str] = Field(default={})
@@ -132,8 +111,6 @@ def load(source: str, folders: Iterable[Path] = ()) -> Study:
     text = read_text(path, MOST_BYTES, source)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
-    if name.strip(".") == "":
-        raise InputError("a file of dots names no study", source, "rename it")
     return replace(parse(text, name=name, where=source), file=str(path.absolute()))
 
 
@@ -153,7 +130,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
     except ValueError as error:
         raise InputError(f"not TOML: {error}", where) from None
     files = Files(Path(where).parent, dict(file.profiles))
-    groups, count = [], 0
+    listed, count = [], 0
     for number, table in enumerate(file.group or [_Group()], 1):
         place = f"{where}: group {number}" if file.group else where
         tables = {part: {**getattr(file, part), **getattr(table, part)} for part in PARTS}
@@ -163,15 +140,16 @@ def parse(text: str, *, name: str, where: str) -> Study:
         if (count := count + math.prod(map(len, axes.values()))) > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
             raise InputError(what, f"{place}: axes", "shorten the lists")
-        scenes = tuple(_scenes(tables, axes, place, files))
-        groups.append(Group(table.name or f"group {number}", scenes, place))
+        scenes = [*_scenes(tables, axes, place, files)]
+        listed.append((table.name or f"group {number}", scenes, place))
     # force laws are found for the scenes of all groups at once
-    laws = resolved([scene for group in groups for scene in group.scenes])
-    for index, group in enumerate(groups):
-        scenes = tuple(itertools.chain(*itertools.islice(laws, len(group.scenes))))
-        groups[index] = replace(group, scenes=scenes)
+    laws = resolved([scene for _, scenes, _ in listed for scene in scenes])
+    groups = tuple(
+        Group(title, tuple(itertools.chain(*itertools.islice(laws, len(scenes)))), place)
+        for title, scenes, place in listed
+    )
     settings = (file.time_limit, file.tolerance, file.cluster, text + files.added)
-    return Study(name, file.title or name, tuple(groups), *settings)
+    return Study(name, file.title or name, groups, *settings)
 
 
 def check_tolerance(value: Any, where: str) -> None:
@@ -196,10 +174,8 @@ def _scenes(
         for (part, _, name), value in zip(keys, point, strict=True):
             parts[part][name] = value
         scene = make_scene(parts, where, files)
-        same = points.setdefault(scene.id, point)
-        if same is not point:
-            texts = (", ".join(map(str, values)) for values in (same, point))
-            what = f"{' and '.join(texts)} are one scene"
+        if (same := points.setdefault(scene.id, point)) is not point:
+            what = f"{', '.join(map(str, same))} and {', '.join(map(str, point))} are one scene"
             raise InputError(what, f"{where}: axes", "list each value once")
         yield scene
 
@@ -216,7 +192,7 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
     if files and isinstance(grain.get("sizes"), str):
         grain["sizes"] = files.sieve(grain["sizes"], where)
     try:
-        # what is wrong with a value is said by the validation of the scene
+        # values of a wrong type or range are left to the validation of the scene
         with suppress(ValidationError, KeyError, TypeError, OverflowError):
             mixture = MIXTURE.validate_python(grain.get("sizes"))
             if isinstance(mixture, tuple):
@@ -237,33 +213,26 @@ def _explained(error: ValidationError, where: str) -> InputError:
     """The refusal of a file's tables, for the first thing that is wrong in them."""
     # a misspelt key says more than the field that is missing because of it
     first = min(
-        error.errors(),
-        key=lambda each: each["type"] != "extra_forbidden" and "sizes" not in each["loc"],
+        error.errors(), key=lambda e: e["type"] != "extra_forbidden" and "sizes" not in e["loc"]
     )
-    cause = first.get("ctx", {}).get("error")
-    if isinstance(cause, UnfitError):
+    if isinstance(cause := first.get("ctx", {}).get("error"), UnfitError):
         return InputError(cause.what, f"{where}: {cause.field}", cause.remedy)
     path, keys = [*first["loc"]], [*_File.model_fields]
     if path[0] == "group" and len(path) > 2:
         where, path, keys = f"{where}: group {int(path[1]) + 1}", path[2:], [*_Group.model_fields]
-    branch = path.pop(1) if path[0] == "bed" and path[1:2] in (["grain"], ["pile"]) else ""
+    branch = path.pop(1) if path[0] == "bed" and path[1:] else ""
     path = [step for step in path if step not in ("log-normal", "rows")]
-    field, key = ".".join(map(str, path)), str(path[-1])
-    place = f"{where}: {field}"
+    place, key = f"{where}: {'.'.join(map(str, path))}", str(path[-1])
     if first["type"] == "missing":
         return InputError("is missing", place, "add it to the file")
     if first["type"] != "extra_forbidden":
-        remedy = first["msg"].lower().replace("input should", "it should")
-        remedy = remedy.replace("dictionary", "table").replace("tuple", "list")
+        remedy = first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
         return InputError(f"{first.get('input')!r} is not accepted", place, remedy)
-    if field in RENAMED:
-        return InputError("a former name", place, f"write {RENAMED[field]}")
     if branch == "grain" and key in PileBed.model_fields:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
     here = str(path[0]) if path[1:] else ""
-    known = [*PARTS[here].model_fields] if here else keys
     elsewhere = [
-        *((n, f"{part}.{n}") for part in PARTS if part != here for n in PARTS[part].model_fields),
-        *((name, f"{name}, above the first table") for name in keys if name not in PARTS),
+        (n, f"{part}.{n}") for part in PARTS if part != here for n in PARTS[part].model_fields
     ]
-    return unknown_key(key, known, place, elsewhere)
+    elsewhere += [(name, f"{name}, above the first table") for name in keys if name not in PARTS]
+    return unknown_key(key, [*PARTS[here].model_fields] if here else keys, place, elsewhere)

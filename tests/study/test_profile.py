@@ -37,29 +37,28 @@ def long(*changed: tuple[int, str]) -> str:
 
 
 BAD: dict[str, tuple[str | bytes, str]] = {
-    "empty": ("", "line 1: no column x_m"),
+    "empty": ("", "line 1: not one column x_m"),
     "header alone": ("x_m,z_m\n", "0 points make no bed"),
-    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", "line 1: no column z_m"),
-    "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: no column x_m, or two"),
-    "semicolons": ("x_m;z_m\n0;0\n1;1\n", "line 1: no column x_m"),
+    "missing column": ("x_m,y_m\n0,0\n1,1\n2,0\n", "line 1: not one column x_m and one z_m"),
+    "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: not one column x_m"),
+    "semicolons": ("x_m;z_m\n0;0\n1;1\n", "line 1: not one column x_m"),
     "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), "line 4: x does not rise to 1 m"),
     "overhang": (long((30, "0.14,0.02")), "line 32: x does not rise to 0.14 m"),
     "upstream": (points("3,0", "2,0.1", "1,0"), "line 3: x does not rise to 2 m"),
     "duplicate": (points("0,0", "1,0.1", "1,0.2", "2,0"), "line 4: x does not rise to 1 m"),
-    "too few values": (points("0,0", "1", "2,0"), "line 3: 1 values"),
-    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: 4 values"),
+    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: not a number"),
     **{
-        f"not a number: {cell}": (points("0,0", f"1,{cell}", "2,0"), "line 3: (a number|could not)")
-        for cell in ("nan", "inf", "1e6", "high", "")
+        f"not a number: {cell}": (points("0,0", f"1{cell}", "2,0"), "line 3: (not a|could not)")
+        for cell in (",nan", ",inf", ",1e6", ",high", ",", "")
     },
     "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), "a gap"),
     "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), "line 4: 89 deg at x = 1 m, above"),
     "level": (points("0,0.3", "1,0.3", "2,0.3"), "level: it has no height"),
     "too many points": (points(*(f"{i},{i % 2}" for i in range(4000))), "4000 points, more than"),
     "Latin 1": ("x_m,z_m,Höhe\n".encode("latin-1"), "not a readable text file"),
-    "underscore": (points("0,0", "1_0e-2,0.01", "0.2,0"), "are not two numbers"),
     "binary": (b"\x7fELF\0\0\x01\0", "binary, not text"),
     "too large": (b"x_m,z_m\n" + b"0,0\n" * 6_000_000, "larger than 20 MiB"),
+    "millimetres": (points("0,0", "70,20", "140,0"), "140 m are 140000 grains .*in mm"),
 }
 UNFIT = [
     ('"scan.csv", height = 0.1', r"bed.profile: it has its own height \(leave out bed.height"),
@@ -80,7 +79,6 @@ def test_a_bad_profile_is_refused_in_one_line(name: str, tmp_path: Path) -> None
     content, message = BAD[name]
     with pytest.raises(InputError, match=message) as caught:
         scene_of(tmp_path, content)
-    assert str(tmp_path / "scan.csv") in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.remedy
 
@@ -92,11 +90,6 @@ def test_what_does_not_go_with_a_profile_is_refused(
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match=message):
         scene_of(tmp_path, GOOD, STUDY.replace('"scan.csv"', fields))
-
-
-def test_a_profile_that_may_be_in_millimetres_is_asked_about(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"bed.profile: 140 m are 140000 grains .*in mm"):
-        scene_of(tmp_path, points("0,0", "70,20", "140,0"))
 
 
 def test_a_profile_begins_at_the_origin_between_flat_beds(tmp_path: Path) -> None:

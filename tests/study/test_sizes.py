@@ -57,8 +57,8 @@ def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes) -> Non
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("sizes = [[5e-4, 0.2], [1e-3, 0.5]]", "add up to 0.7, not to 1"),
-        ("sizes = [[1e-3, 0.5], [5e-4, 0.5]]", "do not rise"),
+        ("sizes = [[5e-4, 0.2], [1e-3, 0.5]]", "add up to 0.7, not 1"),
+        ("sizes = [[1e-3, 0.5], [5e-4, 0.5]]", "diameters do not rise"),
         ("sizes = [[1e-4, 0.5], [2e-3, 0.5]]", "20 times the smallest"),
         ("sizes = [[1e-3, 1.0, 2.0]]", "at most 2"),
         ("sizes = [[1e-3, -1.0]]", "greater than 0"),
@@ -68,10 +68,7 @@ def test_the_grains_that_are_drawn_have_the_mixtures_mass(mixture: Sizes) -> Non
         ("diameter = 1e-3\nsizes = { sigma_g = 0.5 }", "sigma_g"),
         ("diameter = 1e-3\nsizes = { sigma_g = 2.0 }", "16 times the smallest"),
         ("diameter = 1e-3\nsizes = { sigma = 2.0 }", "sigma"),
-        (
-            "diameter = 1e-3\nsizes = { sigma_g = 2.0, smallest = 0.3, largest = 1.0 }",
-            "between these cut-offs d50 is",
-        ),
+        ("diameter = 1e-3\nsizes = { sigma_g = 2.0, smallest = 0.3, largest = 1.0 }", "d50 is"),
         ("sizes = { sigma_g = 1.3 }", "is missing"),
     ],
 )
@@ -84,18 +81,11 @@ def test_bad_mixtures_are_refused_in_one_line(text: str, message: str) -> None:
 
 def test_springs_that_throw_poured_grains_apart_are_refused_in_dem() -> None:
     text = f"grain = {{ diameter = 1e-3, stiffness = 2e5 }}\n{BED % 'd/30'}\n"
-    with pytest.raises(InputError, match=r"springs of 2e\+05 W/d throw them apart"):
+    with pytest.raises(InputError, match=r"springs of 2e\+05 W/d throw poured grains"):
         _parse(text)
     for other in ("peeling", "pivot"):
         _parse(f'{text}protocol = {{ method = "{other}" }}')
     _parse(text.replace('packing = "poured", ', ""))
-
-
-@pytest.mark.parametrize("name", ["poured", "mixture"])
-def test_presets_of_poured_beds_can_be_planned(name: str) -> None:
-    asked = study.load(name)
-    assert all(scene.is_poured for scene in asked.scenes)
-    assert len(plan.make(asked).cases) >= 4
 
 
 @pytest.mark.parametrize(
@@ -107,7 +97,7 @@ def test_presets_of_poured_beds_can_be_planned(name: str) -> None:
         ("diameter_m,fraction\n1e-3;1\n", "sieve.csv: line 2"),
         ("diameter_m,fraction\n1e-3,0.5\nsand,0.5\n", "sieve.csv: line 3"),
         ("diameter_m,fraction\n", "grain.sizes: .* at least 1"),
-        ("diameter_m,fraction\n1,0.5\n2,0.4\n", "grain.sizes: the mass fractions add up to 0.9"),
+        ("diameter_m,fraction\n1,0.5\n2,0.4\n", "grain.sizes: .* fractions add up to 0.9"),
     ],
 )
 def test_a_sieve_table_may_be_a_file_beside_the_study(
