@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.fidelity import decision, limits
-from orchestrator.fidelity.decision import Bound, Decision, by_default, decide
+from orchestrator.fidelity.decision import Bound, Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
 from orchestrator.runs.case import Case, done_state, failure, is_whole
@@ -77,12 +77,7 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
         the field.
     """
     limits.check_study(study)
-    bounds = above or {}
-    if study.tolerance is None:
-        decisions = by_default(study.scenes, bounds)
-    else:
-        decisions = decide(study.scenes, study.tolerance, bounds)
-    return of(decisions, study.tolerance, cases)
+    return of(decide(study.scenes, study.tolerance, above or {}), study.tolerance, cases)
 
 
 def of(
@@ -136,8 +131,9 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
             if any(failure(directory / run.name)[1] for run in plan.piles[asked].runs)
         }
         if study.tolerance:
-            answers, done = (plan.decisions, plan.piles, plan.checks), plan.done(directory)
-            more |= decision.overruled(*answers, study.tolerance, directory, done)
+            both, done = (plan.piles, plan.checks), plan.done(directory)
+            compared = decision.compare(*both, study.tolerance, directory, done)
+            more |= decision.overruled(compared, plan.decisions)
         if not more:
             return plan
         above |= more

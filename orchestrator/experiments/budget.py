@@ -15,20 +15,10 @@ import numpy as np
 import pandas as pd
 from matplotlib import colormaps
 from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from orchestrator import plan
 from orchestrator.errors import InputError
-from orchestrator.experiments.experiment import (
-    TEXTS,
-    Experiment,
-    Runs,
-    Tables,
-    figure,
-    label,
-    piles,
-)
+from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
 from orchestrator.fidelity import calibration, limits
 from orchestrator.fidelity.calibration import FROZEN
 from orchestrator.fidelity.decision import Decision, on_levels
@@ -39,25 +29,23 @@ from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
 from orchestrator.report.page import Section
+from orchestrator.report.style import Figure, Look
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.tables.piles import shields
 
-COARSE = level("flow", "coarse")
-"""The level of a solved flow; another flow model is kept."""
+COARSE = level("flow", "coarse")  # of a solved flow; another flow model is kept
 DYNAMIC, DYNAMIC_POURED = level("grains", "1 layer, fast"), level("grains", "4 layers, fast")
 """Levels for a choice that dynamics alone feel; on poured beds, with more layers."""
-SEEDS = (1, 2, 3)
-"""Other draws of a random packing that are as good."""
+SEEDS = (1, 2, 3)  # other draws of a random packing that are as good
 QUANTITIES = {"shields": "Shields number $θ$", "ustar0": "undisturbed friction velocity $u^*_0$"}
 """The Shields number of the mean stress on the moved grains, and the undisturbed friction velocity
 at which they moved."""
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
-BLUE, ORANGE = "#0072b2", "#d55e00"
-MOST_PILES = 4
-"""Piles whose wear is drawn; the table has all."""
+COLOURS = ("#0072b2", "#d55e00")
+MOST_PILES = 4  # whose wear is drawn; the table has all
 
 
 @dataclass(frozen=True)
@@ -99,21 +87,19 @@ class Choice:
                 yield name, other
 
     def _alternatives(self, scene: Scene) -> dict[str, Fields]:
-        if self.name == "packing" and scene.is_poured:
-            return {f"poured, seed {seed}": {"bed.seed": seed} for seed in SEEDS}
         if self.name == "packing":
-            gaps = {"bed.packing": "disordered", "bed.disorder": 0.05}
-            rows: dict[str, Fields] = {
-                "rows along the slope": {"bed.packing": "aligned"},
-                "level rows": {"bed.packing": "horizontal"},
-            }
-            return rows | {f"random gaps, seed {n}": {**gaps, "bed.seed": n} for n in SEEDS}
+            name, random, rows = "poured", {}, dict[str, Fields]()
+            if not scene.is_poured:
+                name, random = "random gaps", {"bed.packing": "disordered", "bed.disorder": 0.05}
+                rows["rows along the slope"] = {"bed.packing": "aligned"}
+                rows["level rows"] = {"bed.packing": "horizontal"}
+            return rows | {f"{name}, seed {seed}": {**random, "bed.seed": seed} for seed in SEEDS}
         if self.name == "force law":  # peeling knows no torque
             return {law.label: {self.field: n} for n, law in LAWS.items() if not law.turns}
         of_cell = self.name == "first cell"
         value = scene.first_cell_height if of_cell else value_of(scene, self.field)
         return {
-            **{f"{one}": {self.field: one} for one in self.values},
+            **{f"{other}": {self.field: other} for other in self.values},
             **{f"{by:g} times": {self.field: by * value} for by in self.times},
             **{f"{by:+g}°": {self.field: value + by} for by in self.beside},
         }
@@ -155,20 +141,17 @@ def experiment(study: Study, out: Path) -> Experiment:
     listed, asked = changes(study)
     planned = plan.of(asked, cases=out.absolute() / "cases")
 
-    def tables(runs: Runs) -> Tables:
+    def results(runs: Runs) -> Results:
         moved = measure(listed, runs)
         if moved.empty:
-            return {"changes": moved}
-        return {"changes": moved, "shares": (shared := shares(moved)), "budget": known(shared)}
+            return {}, ()
+        tables = {"changes": moved, "shares": (shared := shares(moved)), "budget": known(shared)}
+        return tables, _sections(listed, moved, shared, runs)
 
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
     failing = {run.name for change in listed for run in planned.piles[change.base].runs}
-
-    def sections(tables: Tables, runs: Runs) -> list[Section]:
-        return _sections(listed, tables, runs)
-
     title, limit_s = "What a threshold is worth", study.time_limit_s
-    return Experiment("budget", title, planned, tables, sections, limit_s, failing=failing)
+    return Experiment("budget", title, planned, results, limit_s, failing=failing)
 
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
@@ -213,11 +196,11 @@ def known(shared: pd.DataFrame) -> pd.DataFrame:
     return grouped[ENDS].max().assign(scenes=grouped["scene_id"].nunique()).reset_index()
 
 
-def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]:
+def _sections(
+    listed: list[Change], moved: pd.DataFrame, shared: pd.DataFrame, runs: Runs
+) -> list[Section]:
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
-    words, of = TEXTS["budget"], runs.planned.piles
-    moved, shared = tables["changes"], tables["shares"]
-    rows, tornados = [], []
+    words, rows, tornados = TEXTS["budget"], [], []
     for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
         name, largest = str(scene["scene"].iloc[0]), scene.groupby("choice", sort=False)[ENDS].max()
         row = {"scene": name}
@@ -233,31 +216,34 @@ def _sections(listed: list[Change], tables: Tables, runs: Runs) -> list[Section]
         wide = scene.assign(share=share, head=heads).pivot_table(
             "share", "choice", "head", aggfunc="first", sort=False
         )
-        chart = figure(f"tornado-{number}", name, tornado(largest), words["scene"])
+        chart = Figure(f"tornado-{number}", name, words["scene"], (), tornado(largest))
         tornados.append(Section(name, "", (chart,), [wide.reset_index()]))
-    title, all_scenes = "All choices together", pd.DataFrame(rows)
-    sections = [Section(title, words["together"], (), [all_scenes], [words["limit"]])]
-    frozen = moved[moved["choice"] == FROZEN]
-    if len(frozen):
-        worn = [
-            (of[change.base], of[change.other])
-            for change in listed
-            if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
-        ]
+    all_scenes = [pd.DataFrame(rows)]
+    title = "All choices together"
+    sections = [Section(title, words["together"], (), all_scenes, [words["limit"]])]
+    worn = [
+        (runs.planned.piles[change.base], runs.planned.piles[change.other])
+        for change in listed
+        if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
+    ]
+    if worn:
+        frozen = moved[moved["choice"] == FROZEN]
         table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
         table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
-        drawn = curves(worn[:MOST_PILES], runs.cases)
-        chart = figure("wear", "Frozen bed and bed that changes", drawn, words["wear"])
-        title = "The bed that changes"
-        sections.append(Section(title, words["changing"], (chart,), [table]))
+        drawn, title = curves(worn[:MOST_PILES], runs.cases), "Frozen bed and bed that changes"
+        chart = Figure("wear", title, words["wear"], (), drawn)
+        title, text = "The bed that changes", words["changing"]
+        sections.append(Section(title, text, (chart,), [table]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     sheets = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
-    columns = ["scene", "choice", "alternative"]
-    lost = [c for c in listed if not runs.are_done(c.other)]  # a flow model may refuse a bed
+    lost = [
+        (label(change.scene), change.choice.name, change.alternative)
+        for change in listed
+        if not runs.are_done(change.other)
+    ]
     if lost:
-        refused = [(label(c.scene), c.choice.name, c.alternative) for c in lost]
-        sheets.append(pd.DataFrame(refused, columns=columns))
+        sheets.append(pd.DataFrame(lost, columns=["scene", "choice", "alternative"]))
     text = "The alternatives of the second table have no answer." * bool(lost)
     last = Section("The choices and their alternatives", text, tables=sheets)
     return [*sections, *tornados, last]
@@ -270,7 +256,7 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     rows = pd.concat([largest, pd.DataFrame([total], columns=ENDS, index=["all together"])])
     canvas = style.canvas(0.28 * len(rows) + 1.0)
     ax, bar = canvas.subplots(), 0.38
-    for name, offset, colour in zip(QUANTITIES, (bar / 2, -bar / 2), (BLUE, ORANGE), strict=True):
+    for name, offset, colour in zip(QUANTITIES, (bar / 2, -bar / 2), COLOURS, strict=True):
         low, high = 100 * rows[f"{name}_low"], 100 * rows[f"{name}_high"]
         ax.barh(np.arange(len(rows)) + offset, low + high, bar, left=-low, color=colour, lw=0)
     ax.axvline(0.0, color="0.2", lw=0.8)
@@ -278,8 +264,8 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     ax.set_yticks(range(len(rows)), list(rows.index))
     ax.set_xlabel("change of the threshold, %")
     ax.grid(axis="x", lw=0.4, color="0.85")
-    looks = zip((BLUE, ORANGE), QUANTITIES.values(), strict=True)
-    style.legends(canvas, [Patch(color=colour, label=text) for colour, text in looks], [])
+    looks = zip(QUANTITIES.values(), COLOURS, strict=True)
+    style.legends(canvas, [style.entry(text, colour) for text, colour in looks], [])
     return canvas
 
 
@@ -287,15 +273,15 @@ def curves(shown: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
     """A row for each pile, frozen and changing: θ at each n/N, and its bed line in each round."""
     canvas = style.canvas(1.9 * len(shown) + 0.6)
     grid = canvas.subplots(len(shown), 2, squeeze=False)
+    whole: Look = {"color": "0.5", "ls": "--", "label": "flow of the whole pile"}
+    drawn_anew: Look = {"color": COLOURS[0], "label": "flow of the bed as it is"}
     for (left, right), (frozen, changing) in zip(grid, shown, strict=True):
-        for pile, colour, dashes in ((frozen, "0.5", "--"), (changing, BLUE, "-")):
-            whole = pile.packing.count
-            count = round(max(pile.scene.protocol.fractions) * whole)
-            fractions = np.arange(1, count + 1) / whole
-            tau = np.array([row.tau for row in pile.thresholds(cases, fractions.tolist())])
-            left.plot(fractions, shields(pile.scene, tau), color=colour, ls=dashes)
-        left.set(xlim=(0, max(changing.scene.protocol.fractions)), ylabel="Shields number $θ$")
-        left.set_ylim(bottom=0)
+        last = max(changing.scene.protocol.fractions)
+        for pile, look in ((frozen, whole), (changing, drawn_anew)):
+            n_over_N = np.arange(1, round(last * pile.packing.count) + 1) / pile.packing.count
+            tau = np.array([row.tau for row in pile.thresholds(cases, n_over_N.tolist())])
+            left.plot(n_over_N, shields(pile.scene, tau), **look)
+        left.set(xlim=(0, last), ylim=(0, None), ylabel="Shields number $θ$")
         left.set_title(label(frozen.scene), loc="left", fontsize=8)
         h, rounds = changing.line.h, changing.flows
         for number, flow in enumerate(rounds):
@@ -306,9 +292,5 @@ def curves(shown: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
         right.set(xlim=(changing.line.x[1] / h, end), ylabel="z / h")
     grid[-1, 0].set_xlabel("n/N")
     grid[-1, 1].set_xlabel("x / h")
-    samples = [
-        Line2D([], [], color="0.5", ls="--", label="flow of the whole pile"),
-        Line2D([], [], color=BLUE, label="flow of the bed as it is"),
-    ]
-    style.legends(canvas, samples, [])
+    style.legends(canvas, grid[0, 0].get_lines(), [])
     return canvas

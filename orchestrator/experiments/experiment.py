@@ -14,7 +14,6 @@ from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.page import Section
-from orchestrator.report.style import Figure
 from orchestrator.runs import case
 from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 from orchestrator.study.parts import PileBed
@@ -22,7 +21,7 @@ from orchestrator.study.scene import Scene
 from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
-Tables = Mapping[str, pd.DataFrame]
+Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]
 _FILE = Path(__file__).with_name("texts.toml")
 TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 """The texts of the pages, by experiment and by what they are about."""
@@ -30,12 +29,11 @@ TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(_FILE.read_text(encoding=
 
 @dataclass(frozen=True)
 class Runs:
-    """Plan and directory of the runs; by name the markers of those done, and the failures."""
+    """Plan and directory of the runs, and the markers of those that are done, by name."""
 
     planned: Plan
     cases: Path
     done: Mapping[str, Mapping[str, Any]]
-    failures: Mapping[str, OrchestratorError]
 
     def are_done(self, *piles: str) -> bool:
         """Whether all runs of some piles of the plan are done, by their names."""
@@ -50,16 +48,15 @@ class Runs:
 class Experiment:
     """What an experiment runs and makes: its name and title, its scenes and runs, its page.
 
-    `tables` gives the tables by name, the main one first; where that is empty, nothing is known. A
-    run may take `limit_s`, s. A failed run that ends by one of the `verdicts` is not run again: its
-    failure is the answer. Failures of the runs named in `failing` count (None: of all).
+    `results` gives the tables by name and the sections of the page; no table where too little is
+    known. A run may take `limit_s`, s. A failed run that ends by one of the `verdicts` is not run
+    again: its failure is the answer. Failures of the runs named in `failing` count (None: of all).
     """
 
     name: str
     title: str
     planned: Plan
-    tables: Callable[[Runs], Tables]
-    sections: Callable[[Tables, Runs], Sequence[Section]]
+    results: Callable[[Runs], Results]
     limit_s: float = TIME_LIMIT_S
     verdicts: Container[str] = ()
     failing: Container[str] | None = None
@@ -76,18 +73,18 @@ class Experiment:
             ends = {name: case.failure(space.cases / name)[0] for name, _ in missing}
             todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
             failures = pipeline.complete(todo, space, workers=workers, limit_s=self.limit_s)
-            runs = Runs(planned, space.cases, planned.done(space.cases), failures)
-            tables = self.tables(runs)
-            if next(iter(tables.values())).empty:
-                remedy = "`orchestrator status` names the causes; the same command continues"
-                what = "no reference ran to its end: nothing is known"
-                raise OrchestratorError(what, where=str(out), remedy=remedy)
-            with style.settings(), folder.renewed():
-                for key, table in tables.items():
-                    folder.put(f"tables/{key}.csv", csv(table))
-                solvers = case.programs(space.cases, planned.cases)
-                sections = self.sections(tables, runs)
-                page.write(self.title, sections, folder, space.page.name, solvers)
+            with style.settings():
+                done = planned.done(space.cases)
+                tables, sections = self.results(Runs(planned, space.cases, done))
+                if not tables:
+                    remedy = "`orchestrator status` names the causes; the same command continues"
+                    what = "no reference ran to its end: nothing is known"
+                    raise OrchestratorError(what, where=str(out), remedy=remedy)
+                with folder.renewed():
+                    for key, table in tables.items():
+                        folder.put(f"tables/{key}.csv", csv(table))
+                    solvers = case.programs(space.cases, planned.cases)
+                    page.write(self.title, sections, folder, space.page.name, solvers)
         if self.failing is not None:
             failures = {name: error for name, error in failures.items() if name in self.failing}
         return Finished(space.page, len(todo), failures)
@@ -107,21 +104,13 @@ def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:
     return chosen
 
 
-def figure(name: str, title: str, canvas: Any, caption: str = "") -> Figure:
-    """A figure of the page."""
-    return Figure(name, title, caption, (), canvas)
-
-
 def label(scene: Scene) -> str:
     """A pile in a few words."""
     bed, fluid, d = scene.bed, scene.fluid, scene.grain.diameter
     assert isinstance(bed, PileBed)
-    packing = {
-        "aligned": "rows along the slope",
-        "horizontal": "level rows",
-        "disordered": f"gaps up to {bed.disorder:g} d, seed {bed.seed}",
-        "poured": f"poured, seed {bed.seed}",
-    }[bed.packing]
+    rows = {"aligned": "rows along the slope", "horizontal": "level rows"}
+    gaps = f"gaps up to {bed.disorder:g} d" if bed.packing == "disordered" else "poured"
+    packing = rows.get(bed.packing, f"{gaps}, seed {bed.seed}")
     form = "level" if bed.is_level else f"{bed.slope_deg:g}°"
     if not bed.is_triangle and not bed.is_level:
         form = f"{'profile' if bed.profile else bed.shape}, {form}"

@@ -27,40 +27,21 @@ from matplotlib.patheffects import Normal, Stroke
 
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
-from orchestrator.experiments.experiment import (
-    TEXTS,
-    Experiment,
-    Runs,
-    Tables,
-    figure,
-    label,
-    piles,
-)
-from orchestrator.fidelity import calibration, limits
+from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
+from orchestrator.fidelity import calibration, levels, limits
 from orchestrator.fidelity.decision import Decision, as_asked, on_levels
-from orchestrator.fidelity.levels import (
-    FLAT,
-    FLOW,
-    GRAINS,
-    LEVELS,
-    PEELING,
-    Pair,
-    changed,
-    level,
-    packing,
-    paper_stiffness,
-)
+from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, changed, level
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
 from orchestrator.report.page import Section
-from orchestrator.report.style import Look
+from orchestrator.report.style import Figure, Look
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.tables.scenes import point
-from orchestrator.types import FloatArray, Row
+from orchestrator.types import Row
 
 FINE, FAST = level("flow", "fine"), level("grains", "1 layer, fast")
 WHOLE = level("grains", "full pile, fast")
@@ -77,15 +58,13 @@ USED = (
     *(("standard", "1 layer, fast"), ("standard", "1 layer, slow")),
 )
 """Pairs as they are used together."""
-CURVE = np.arange(0.05, 0.86, 0.05)
-"""Fractions at which whole curves are compared."""
+CURVE = np.arange(0.05, 0.86, 0.05)  # fractions at which whole curves are compared
 HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {"error_curve": "whole curve"}
 """Columns of errors and the heads of their panels."""
 STEPS = {"protocol.load_increment": 0.2, "protocol.waiting_time": 10.0, "protocol.time_step": 0.2}
 """Few load steps, on which the time of one is measured for the naive route."""
 LEVEL_PAIR = ["flow_level", "grain_level"]
-FLOOR = 1e-3
-"""Errors below it are drawn on it."""
+FLOOR = 1e-3  # errors below it are drawn on it
 BANDS = {
     "reference_error": ("error of the reference itself", "0.88"),
     "model_floor": ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
@@ -101,20 +80,21 @@ def experiment(study: Study, out: Path) -> Experiment:
     routes, pairs = naive_routes(study), decisions(study)
     planned = plan.of({**pairs, **routes}, cases=out.absolute() / "cases")
 
-    def tables(runs: Runs) -> Tables:
+    def results(runs: Runs) -> Results:
         measured = points(pairs, runs)
         if measured.empty or (compared := errors(measured)).empty:
-            return {"points": measured.iloc[:0]}
-        front = together(compared)[["packing", *LEVEL_PAIR, "pareto"]]
+            return {}, ()
+        means = together(compared)
         fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
-        return {
-            "points": compared.merge(front, how="left").fillna({"pareto": False}),
+        front = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
+        tables = {
+            "points": front.fillna({"pareto": False}),
             "levels": known_errors(measured),
             "naive": naive_costs(routes, fast, runs),
         }
+        return tables, _sections(means, tables["levels"], tables["naive"])
 
-    title, limit_s = "Speed against accuracy", study.time_limit_s
-    return Experiment("ladder", title, planned, tables, _sections, limit_s)
+    return Experiment("ladder", "Speed against accuracy", planned, results, study.time_limit_s)
 
 
 def decisions(study: Study) -> dict[str, Decision]:
@@ -130,8 +110,8 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
     line, by_dem = of_bed(bed), scene.protocol.method == "dem"
     exposed = line.lengths[line.counted(bed.counts)].sum() / scene.grain.diameter - 1e-6
     flows, grains = (
-        [level for level in levels if level.takes(scene) and exposed <= level.most_grains]
-        for levels in (FLOW, GRAINS)
+        [level for level in part if level.takes(scene) and exposed <= level.most_grains]
+        for part in LEVELS.values()
     )
     # neither over a level bed nor on a bed in space can the levels of the flow be measured
     solved = not (bed.is_level or bed.width)
@@ -146,7 +126,7 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
     """A row for each scene and pair whose runs are done: its cost and its thresholds."""
-    rows = []
+    rows, floors = [], calibration.floors()
     for key, decision in pairs.items():
         pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
         if not pair or not runs.are_done(key):
@@ -161,14 +141,14 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             "scene_id": scene.id,
             "scene": label(scene),
             **point(scene),
-            "packing": packing(scene) + (", level bed" if pile.bed.is_level else ""),
+            "packing": levels.packing(scene) + (", level bed" if pile.bed.is_level else ""),
             "asked": scene.protocol.method,
             **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
             "count": motion.count,
             "flow_level": pair.flow.name,
             "grain_level": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
-            "model_floor": calibration.floor(calibration.model_class(scene)),
+            "model_floor": floors.get(calibration.model_class(scene), math.nan),
             "flow_s": runs.cpu_s([run for flow in pile.model.cases for run in (*flow.needs, flow)]),
             "grains_s": here_s + runs.cpu_s(pile.method.cases),
         }
@@ -224,17 +204,11 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
     worst = each[np.arange(len(each)), np.nan_to_num(np.abs(each)).argmax(axis=1)]
     whole = np.isfinite(each).all(axis=1)
     table = table.assign(largest=np.where(whole, worst, math.nan), pareto=False)
-    for _, alike in table[table["same_model"]].groupby("packing"):
-        table.loc[alike.index, "pareto"] = _front(
-            alike[["cost_core_s", "largest"]].abs().to_numpy(float)
-        )
+    for _, alike in table[whole & table["same_model"]].groupby("packing"):
+        values = alike[["cost_core_s", "largest"]].abs().to_numpy(float)
+        worse = [(values <= row).all(axis=1) & (values < row).any(axis=1) for row in values]
+        table.loc[alike.index, "pareto"] = ~np.any(worse, axis=1)
     return table
-
-
-def _front(values: FloatArray) -> list[bool]:
-    """Which rows are finite and not beaten in all columns by another."""
-    beaten = [((values <= row).all(axis=1) & (values < row).any(axis=1)).any() for row in values]
-    return [bool(np.isfinite(row).all() and not by) for row, by in zip(values, beaten, strict=True)]
 
 
 def known_errors(points: pd.DataFrame) -> pd.DataFrame:
@@ -283,7 +257,7 @@ def naive_routes(study: Study) -> dict[str, Decision]:
     lattices = piles(study, by_dem=True)
     scene = min(lattices, key=lambda scene: lattices[scene].height / scene.grain.diameter)
     whole = changed(WHOLE.answer(scene), STEPS)
-    stiffness = {"K = 1e6 N/m": paper_stiffness(scene), "K d/W = 1e4": 1e4}
+    stiffness = {"K = 1e6 N/m": levels.paper_stiffness(scene), "K d/W = 1e4": 1e4}
     return {
         f"every Re* alone, {name}": as_asked(changed(whole, {"grain.stiffness": value}))
         for name, value in stiffness.items()
@@ -313,41 +287,34 @@ def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["route", "core_s", "extrapolated"])
 
 
-def _sections(tables: Tables, runs: Runs) -> list[Section]:
-    words, pairs = TEXTS["ladder"], together(tables["points"])
+def _sections(pairs: pd.DataFrame, known: pd.DataFrame, naive: pd.DataFrame) -> list[Section]:
+    words, columns = TEXTS["ladder"], ["part", "level", "what it is"]
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
     heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
+    heads["scene_class"] = "scene class"
     means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))
     means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(columns=heads)
-    columns = ["part", "level", "what it is"]
-    meanings = pd.DataFrame(
-        [(part, one.name, one.meaning) for part, levels in LEVELS.items() for one in levels],
-        columns=columns,
-    )
+    meanings = [(part, one.name, one.meaning) for part, lv in LEVELS.items() for one in lv]
+    order = {name: place for place, (_, name, _) in enumerate(meanings)}
     index = ["part", "scene_class", "level", "scenes", "cost_core_s"]
-    known = (100 * tables["levels"].set_index([*index, "fraction"])["error"]).unstack("fraction")
-    known.columns = pd.Index([f"{fraction:.0%}" for fraction in known.columns])
-    order = {name: place for place, name in enumerate(meanings["level"])}
-    known = known.reset_index().assign(order=lambda rows: rows["level"].map(order))
-    known = known.sort_values(["part", "scene_class", "order"]).drop(columns="order")
-    known = known.rename(columns={"cost_core_s": "core-s", "scene_class": "scene class"})
-    largest, each = chart(pairs, {"largest": ""}), chart(pairs, HEADS)
+    table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
+    table = table.rename(columns="{:.0%}".format).sort_index(
+        level=index[:3], key=lambda keys: keys.map(order) if keys.name == "level" else keys
+    )
+    sheets = [pd.DataFrame(meanings, columns=columns)]
+    sheets.append(table.reset_index().rename(columns=heads))
+    error, each = "Cost against error", "The error at each fraction"
+    largest = chart(pairs, {"largest": ""})
     charts = [
-        figure("speed-against-accuracy", "Cost against error", largest, words["largest"]),
-        figure("error-at-fractions", "The error at each fraction", each, words["fractions"]),
+        Figure("speed-against-accuracy", error, words["largest"], (), largest),
+        Figure("error-at-fractions", each, words["fractions"], (), chart(pairs, HEADS)),
     ]
-    gained, title = figure("gains", "Factors gained", gains(tables["naive"])), "The fidelity levels"
-    known_title = f"{title}, and what is known of them"
-    known_tables = [meanings, known]
+    gained, routes = Figure("gains", "Factors gained", "", (), gains(naive)), [naive]
+    title = "The fidelity levels, and what is known of them"
     return [
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
-        Section(
-            "What is gained over the naive route",
-            words["naive"],
-            [gained],
-            [tables["naive"]],
-        ),
-        Section(known_title, words["levels"], (), known_tables, [words["limit"]]),
+        Section("What is gained over the naive route", words["naive"], [gained], routes),
+        Section(title, words["levels"], (), sheets, [words["limit"]]),
     ]
 
 
@@ -384,12 +351,12 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
     numbered = (table if single else table[table["pareto"]]).drop_duplicates("number")
     style.legends(canvas, used, _samples(numbered, single=single))
     canvas.draw_without_rendering()  # labels are placed in a finished layout
-    for ax, texts_here in tags:
-        if texts_here:
-            arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
-            x, y = np.transpose([text.get_position() for text in texts_here])
-            adjust_text(texts_here, x, y, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100)
-        for text in texts_here:
+    arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
+    for ax, texts in tags:
+        if texts:
+            x, y = np.transpose([text.get_position() for text in texts])
+            adjust_text(texts, x, y, ax=ax, arrowprops=arrow, expand=(1.15, 1.4), iter_lim=100)
+        for text in texts:
             text.set_in_layout(False)
     return canvas
 
@@ -398,8 +365,8 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
     """Draw the points of a panel, and the front; return their labels."""
     shown = rows[(rows["cost_core_s"] > 0) & rows[column].notna()]
     shown = shown.assign(y=shown[column].abs().clip(lower=FLOOR))
+    halo = [Stroke(linewidth=1.8, foreground="white"), Normal()]
     look: Look = {"fontsize": 6.0 if named else 5.5, "color": "0.1", "zorder": 5}
-    look["path_effects"] = [Stroke(linewidth=1.8, foreground="white"), Normal()]
     tags: list[Any] = []
     each: Any = shown.itertuples(index=False)
     for row in each:
@@ -409,7 +376,7 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
         ax.plot(row.cost_core_s, row.y, gid="point", zorder=3, **point)
         if named or row.pareto:
             text = f"{row.number}" + f": {row.name}" * (named and row.pareto)
-            tags.append(ax.text(row.cost_core_s, row.y, text, **look))
+            tags.append(ax.text(row.cost_core_s, row.y, text, path_effects=halo, **look))
     if named:
         front = shown[shown["pareto"]].sort_values("cost_core_s")
         ax.step(front["cost_core_s"], front["y"], where="post", **FRONT)
@@ -420,17 +387,19 @@ def _samples(pairs: pd.DataFrame, *, single: bool) -> list[Artist]:
     """Samples of the pairs' numbers, the markers, the bands, and the front of a single column."""
     mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
     each: Any = pairs.itertuples(index=False)
-    return [
-        *(
-            Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
-            for row in each
-        ),
-        Line2D([], [], marker="^", mfc="0.2", label="threshold too high", **mark),
-        Line2D([], [], marker="v", mfc="0.2", label="threshold too low", **mark),
-        Line2D([], [], marker="^", mfc="white", label="hollow: another model", **mark),
-        *(Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()),
-        *([Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)] * single),
+    samples: list[Artist] = [
+        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
+        for row in each
     ]
+    for marker, face, text in (
+        ("^", "0.2", "threshold too high"),
+        ("v", "0.2", "threshold too low"),
+        ("^", "white", "hollow: another model"),
+    ):
+        samples.append(Line2D([], [], marker=marker, mfc=face, label=text, **mark))
+    samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()]
+    front = Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)
+    return [*samples, front] if single else samples
 
 
 def gains(routes: pd.DataFrame) -> Canvas:

@@ -19,14 +19,14 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
-from orchestrator.experiments.experiment import TEXTS, Experiment, Runs, Tables, figure
+from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.plan import Plan
 from orchestrator.report import style
 from orchestrator.report.page import Section
-from orchestrator.report.style import Look
+from orchestrator.report.style import Figure, Look
 from orchestrator.runs import case
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
@@ -36,12 +36,9 @@ from orchestrator.types import Row
 
 FOLDER = Path(__file__).parent / "maps"
 TITLE = "Where each method fails"
-DEFAULT = "default"
-"""In a file, the value that is a field's default; TOML has none."""
-WRONG = 0.05
-"""Relative error of tau_c from which an answer counts as wrong."""
-NOTICED = ("exploded", "noisy", "stalled")
-"""How a run says that it failed."""
+DEFAULT = "default"  # in a file, the value that is a field's default; TOML has none
+WRONG = 0.05  # relative error of tau_c from which an answer counts as wrong
+NOTICED = ("exploded", "noisy", "stalled")  # how a run says that it failed
 VERDICTS = {
     "good": ("#8cc5e8", "black", "G"),
     "noisy": ("#f4ea7a", "black", "N"),
@@ -70,11 +67,6 @@ class Map(NamedTuple):
     name: str
     data: Mapping[str, Any]
     places: tuple[Place, ...]
-
-    @property
-    def fractions(self) -> list[float]:
-        """The fractions at which one run is read along x; empty for other axes."""
-        return [float(value) for value in self.data["x"].get("fractions", ())]
 
 
 def load_all() -> list[Map]:
@@ -122,22 +114,18 @@ def experiment(out: Path) -> Experiment:
     """Where each method fails: every map of the package."""
     maps = load_all()
 
-    def tables(runs: Runs) -> Tables:
-        return {"maps": pd.concat([judge(one, runs) for one in maps], ignore_index=True)}
-
-    def sections(tables: Tables, runs: Runs) -> list[Section]:
-        table = tables["maps"]
-        sheet = figure("maps", TITLE, draw(maps, table))
-        sections = [Section("All maps", TEXTS["stability"]["maps"], (sheet,))]
-        for one in maps:
-            title, question = one.data["title"], one.data["question"]
-            drawn = figure(f"map-{one.name}", title, draw([one], table))
-            limits = one.data.get("limits", ())
-            sections.append(Section(title, question, (drawn,), limits=limits))
-        return sections
+    def results(runs: Runs) -> Results:
+        table = pd.concat([judge(each, runs) for each in maps], ignore_index=True)
+        whole = Figure("maps", TITLE, "", (), draw(maps, table))
+        sections = [Section("All maps", TEXTS["stability"]["maps"], (whole,))]
+        for each in maps:
+            title, question = each.data["title"], each.data["question"]
+            drawn = Figure(f"map-{each.name}", title, "", (), draw([each], table))
+            sections.append(Section(title, question, (drawn,), (), each.data.get("limits", ())))
+        return {"maps": table}, sections
 
     planned = planned_for(maps)
-    return Experiment("stability", TITLE, planned, tables, sections, verdicts=NOTICED, failing=())
+    return Experiment("stability", TITLE, planned, results, verdicts=NOTICED, failing=())
 
 
 def planned_for(maps: Sequence[Map]) -> Plan:
@@ -160,24 +148,24 @@ def judge(one: Map, runs: Runs) -> pd.DataFrame:
     rows: list[Row] = []
     for place in one.places:
         failed = next((end for scene in place.scenes if (end := _failure(scene, runs))), None)
-        fractions: Sequence[float | None] = one.fractions or [None]
-        for at in fractions:
-            row: Row = {"map": one.name, "x": place.x if at is None else at, "y": place.y}
+        for fraction in one.data["x"].get("fractions", (None,)):
+            error, note = math.nan, ""
             if failed:
-                row |= {"verdict": failed[0], "caught": True, "error": math.nan, "note": failed[1]}
+                verdict, note = failed
             else:
-                error = max(_errors(one, place, runs, at), key=abs, default=math.nan)
-                row |= {"verdict": "good" if abs(error) <= WRONG else "wrong", "caught": False}
+                error = max(_errors(one, place, runs, fraction), key=abs, default=math.nan)
+                verdict = "good" if abs(error) <= WRONG else "wrong"
                 note = "its reference failed" if math.isnan(error) else ""
-                row |= {"error": error, "note": note}
-            rows.append(row)
+            x = place.x if fraction is None else float(fraction)
+            row: Row = {"map": one.name, "x": x, "y": place.y, "verdict": verdict}
+            rows.append({**row, "caught": bool(failed), "error": error, "note": note})
     return pd.DataFrame(rows)
 
 
 def _failure(scene: Scene, runs: Runs) -> tuple[str, str] | None:
     """How a run that the scene needs failed, and why; None where all of them are done."""
     pile = runs.planned.piles.get(scene.id)
-    needed = pile.runs if pile else [one for one in runs.planned.cells if scene in one.scenes]
+    needed = pile.runs if pile else [each for each in runs.planned.cells if scene in each.scenes]
     lost = next((run.name for run in needed if run.name not in runs.done), None)
     if lost is None:
         return None
@@ -211,21 +199,21 @@ def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
     A cell has the colour and the letter of its verdict, and the error. Of several runs in one place
     the worst is shown.
     """
-    tables = {one.name: table[table["map"] == one.name] for one in maps}
-    counts = [tables[one.name]["y"].nunique() for one in maps]
+    tables = [table[table["map"] == each.name] for each in maps]
+    counts = [rows["y"].nunique() for rows in tables]
     columns = min(len(maps), 2)
     ratios = [max(counts[at : at + columns]) for at in range(0, len(maps), columns)]
-    cell = 0.42 if columns == 1 else 0.31
+    cell, font = (0.42, 9) if columns == 1 else (0.31, 5.4)
     canvas = style.canvas(cell * sum(ratios) + 0.85 * len(ratios) + 0.55)
     grid = canvas.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios).ravel()
-    for ax, one in zip(grid, maps, strict=False):
-        _panel(ax, one, tables[one.name], 9 if columns == 1 else 5.4)
+    for ax, each, rows in zip(grid, maps, tables, strict=False):
+        _panel(ax, each, rows, font)
     for ax in grid[len(maps) :]:
         ax.set_axis_off()
-    looks = {verdict: VERDICTS[verdict] for verdict in VERDICTS if verdict in set(table["verdict"])}
     samples = [
         Patch(fc=colour, ec="white", label=f"{letter}: {verdict}")
-        for verdict, (colour, _, letter) in looks.items()
+        for verdict, (colour, _, letter) in VERDICTS.items()
+        if verdict in set(table["verdict"])
     ]
     style.legends(canvas, samples, [])
     return canvas
@@ -233,25 +221,24 @@ def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
 
 def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
     places = {}
-    for axis in ("x", "y"):
-        values = table[axis].drop_duplicates()  # texts as they come, numbers rising
+    for line, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
+        values = table[name].drop_duplicates()  # texts as they come, numbers rising
         if pd.to_numeric(values, errors="coerce").notna().all():
             values = values.astype(float).sort_values()
-        places[axis] = {value: place for place, value in enumerate(values)}
+        places[name] = {value: place for place, value in enumerate(values)}
+        marks = [value if isinstance(value, str) else f"{value:g}" for value in values]
+        line.set_ticks([place + 0.5 for place in range(len(marks))], marks)
+        line.set_label_text(one.data[name]["label"])
     rank = {verdict: place for place, verdict in enumerate(VERDICTS)}
     worst_last = table.sort_values("verdict", key=lambda verdicts: verdicts.map(rank))
     cells: Any = worst_last.drop_duplicates(["x", "y"], keep="last").itertuples(index=False)
     for cell in cells:
-        x, y = (places[axis][getattr(cell, axis)] for axis in ("x", "y"))
+        x, y = places["x"][cell.x], places["y"][cell.y]
         colour, ink, letter = VERDICTS[cell.verdict]
         ax.add_patch(Rectangle((x, y), 1, 1, fc=colour, ec="white", lw=1, gid=cell.verdict))
         text = letter if math.isnan(cell.error) else f"{letter}\n{percent(cell.error)}"
         look: Look = {"ha": "center", "va": "center", "fontsize": font, "color": ink}
-        ax.text(x + 0.5, y + 0.5, text, gid="cell", **look)
-    for line, name in ((ax.xaxis, "x"), (ax.yaxis, "y")):
-        marks = [v if isinstance(v, str) else f"{v:g}" for v in places[name]]
-        line.set_ticks([place + 0.5 for place in range(len(marks))], marks)
-        line.set_label_text(one.data[name]["label"])
+        ax.text(x + 0.5, y + 0.5, text, **look)
     ax.set(xlim=(0, len(places["x"])), ylim=(0, len(places["y"])))
     ax.set_title(one.data["title"], loc="left")
     ax.tick_params(length=0)
@@ -260,6 +247,5 @@ def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
 def percent(error: float) -> str:
     """A signed error, to two digits at most."""
     size = 100 * abs(error)
-    digits = 0 if size >= 9.95 else 1
-    text = f"{error:+.0f}×" if size >= 1000 else f"{100 * error:+.{digits}f} %"
+    text = f"{error:+.0f}×" if size >= 1000 else f"{100 * error:+.{int(size < 9.95)}f} %"
     return text.replace("-", "−")

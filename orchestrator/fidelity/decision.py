@@ -9,32 +9,28 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.fidelity import calibration
 from orchestrator.fidelity.calibration import UNKNOWN, Known
-from orchestrator.fidelity.levels import (
-    FLAT,
-    LEVELS,
-    PEELING,
-    Level,
-    Pair,
-    changed,
-    level,
-    pair_of,
-)
+from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Level, Pair, changed, level, pair_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.study import fields
+from orchestrator.study.fields import FIELDS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
+Piles = Mapping[str, Pile]
 LEAST_HELD = 6.0
 """Waiting time, sqrt(d/g'), from which load steps hold the flow. Shorter ones make a ramp, whose
 rate is a part of what is asked."""
+ROUNDS = 4
+ASKED = "as the study asks"
+ANSWERS = [q.name.partition(".") for q in FIELDS if q.info.about == "answer"]
+"""The fields about the answer, as part, dot and name."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +75,10 @@ class Bound(NamedTuple):
 
 NO_BOUND = Bound()
 NO_BOUNDS: Mapping[str, Bound] = {}
-ROUNDS = 4
 THEORY = level("flow", "waves")
 """Above it the flow is solved."""
 CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
 """Above it are the levels that check an answer without DEM."""
-SPREAD = "within the model's own spread of"
-NONE_WITHIN = "cheapest whose error is below the uncertainty of the reference: none is"
-"""How the reason begins where no levels meet the tolerance."""
 
 
 def decide(
@@ -105,7 +97,9 @@ def decide(
         Resolved; those of a study.
     tolerance : float or None
         Relative error of tau_c at the scene's fractions, the uncertainty of the reference
-        included; None or 0: the scenes as they are asked.
+        included; 0: the scenes as they are asked. None: a pile whose file sets no field about the
+        answer is answered on a solved flow, within the lowest `calibration.floors` of all classes,
+        so that the scenes of a figure are answered alike; all others, and poured beds, as asked.
     above : mapping of str to Bound, optional
         Levels that turned out to be not good enough, by the id of the scene.
     """
@@ -113,7 +107,7 @@ def decide(
     for scene in scenes:
         pairs, why = _offered(scene, tolerance, above.get(scene.id, NO_BOUND))
         if pairs:
-            offered[scene.id] = [_Option.of(scene, pair, why) for pair in pairs]
+            offered[scene.id] = [_option(scene, pair, why, tolerance is None) for pair in pairs]
         elif why or isinstance(scene.bed, PileBed):
             decided[scene.id] = as_asked(scene, why)
         else:
@@ -125,10 +119,20 @@ def decide(
 
 def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Sequence[Pair], str]:
     """The pairs of levels that are good enough for a scene, and why it is answered as it is."""
-    if not tolerance:
-        return (), "as the study asks"
-    # the levels approximate DEM in a held, solved flow
     rules, model, bed = scene.protocol, scene.flow.model, scene.bed
+    limit, start = "within the tolerance", ""
+    if tolerance is None:
+        floors = calibration.floors()
+        is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in ANSWERS)
+        is_lattice = isinstance(bed, PileBed) and not scene.is_poured
+        if is_set or not is_lattice or calibration.model_class(scene) not in floors:
+            return (), ASKED
+        tolerance, start = min(floors.values()), "chosen by default: "
+        limit = f"within the model's own spread of {tolerance:.0%}"
+        above = above._replace(flow=above.flow or THEORY)
+    if not tolerance:
+        return (), ASKED
+    # the levels approximate DEM in a held, solved flow
     if rules.method != "dem":
         return (), f"the study asks for the method {rules.method}"
     if model not in ("solve", _best_model(scene)):
@@ -141,10 +145,11 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
         beyond = bed.slope_deg > bed.entrainment_angle_deg
         return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
     if name := calibration.unmeasured(scene):
-        return (), f"no error is known for {name}: as the study asks"
+        return (), f"no error is known for {name}: {ASKED}"
     levels = (tuple(level for level in part if level.takes(scene)) for part in LEVELS.values())
     classes = (calibration.classes(part, scene) for part in LEVELS)
     pairs, why = _good_enough(*levels, *classes, above, tolerance)
+    why = f"{start}{why} {limit}" if pairs else why
     return pairs, f"{why}; {above.because}" if above.because else why
 
 
@@ -173,10 +178,10 @@ def _good_enough(
     if not within:
         best = min((error.total for error in known.values()), default=math.inf)
         if math.isinf(best):
-            return (), "no error is known: as the study asks"
+            return (), f"no error is known: {ASKED}"
         # errors below the uncertainty of the reference cannot be ranked
         within = [pair for pair in pairs if known[pair].error <= best]
-        why = NONE_WITHIN
+        why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:
         cost = known[pair]
@@ -187,15 +192,7 @@ def _good_enough(
             for other in kept
         ):
             kept.append(pair)
-    return kept, f"{why} within the tolerance"
-
-
-@cache  # a plan is made several times
-def _times(scene: Scene, pair: Pair) -> tuple[Scene, Mapping[str, float], float]:
-    """A scene on a pair of levels; expected times of its flows, by name, and of other runs, s."""
-    pile = Pile(pair.answer(scene))
-    flows_s = {run.name: run.cost_s for flow in pile.model.cases for run in (*flow.needs, flow)}
-    return pile.scene, flows_s, sum(run.cost_s for run in pile.method.cases)
+    return kept, why
 
 
 class _Option(NamedTuple):
@@ -205,18 +202,20 @@ class _Option(NamedTuple):
     flows_s: Mapping[str, float]
     grains_s: float
 
-    @classmethod
-    def of(cls, scene: Scene, pair: Pair, why: str) -> "_Option":
-        """The option to answer a scene on a pair of levels."""
-        answered, flows_s, runs_s = _times(scene, pair)
-        known = calibration.known(pair, scene)
-        return cls(Decision(scene, answered, pair, known, why), flows_s, runs_s or known.grains_s)
-
     def time_s(self, users: Mapping[str, int], mine: Container[str]) -> float:
         """Its time, with each flow divided by its users; it would be one more of those not mine."""
         flows = self.flows_s.items()
         shares = (time / (users.get(name, 0) + (name not in mine)) for name, time in flows)
         return self.grains_s + sum(shares)
+
+
+@cache  # a plan is made several times
+def _option(scene: Scene, pair: Pair, why: str, by_default: bool) -> _Option:
+    """The option to answer a scene on a pair of levels."""
+    pile, known = Pile(pair.answer(scene)), calibration.known(pair, scene)
+    flows_s = {run.name: run.cost_s for flow in pile.model.cases for run in (*flow.needs, flow)}
+    grains_s = sum(run.cost_s for run in pile.method.cases) or known.grains_s
+    return _Option(Decision(scene, pile.scene, pair, known, why, by_default), flows_s, grains_s)
 
 
 def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
@@ -243,38 +242,7 @@ def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
     return {key: option.decision for key, option in best.items()}
 
 
-def by_default(
-    scenes: Iterable[Scene], above: Mapping[str, Bound] = NO_BOUNDS
-) -> dict[str, Decision]:
-    """The decisions on the scenes of a study that says nothing about how to answer.
-
-    A pile whose file sets no field about the answer is answered on the cheapest levels whose known
-    error is below the model's own spread. The flow is solved: a theory of it needs a tolerance. The
-    spread is the lowest of all classes of scenes, so that all scenes in one figure are answered
-    alike. Single grains, poured beds, classes without a measured spread, and all that sets a field
-    about the answer are answered as asked.
-    """
-    names = [q.name.partition(".") for q in fields.FIELDS if q.info.about == "answer"]
-
-    def is_open(scene: Scene) -> bool:
-        is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in names)
-        if is_set or scene.is_poured or not isinstance(scene.bed, PileBed):
-            return False
-        return not math.isnan(calibration.floor(calibration.model_class(scene)))
-
-    listed, floor = list(scenes), calibration.lowest_floor()
-    bounds = {scene.id: above.get(scene.id, NO_BOUND) for scene in listed}
-    bounds = {key: bound._replace(flow=bound.flow or THEORY) for key, bound in bounds.items()}
-    decided = {scene.id: as_asked(scene) for scene in listed}
-    decided |= decide((scene for scene in listed if is_open(scene)), floor, bounds)
-    for key, chosen in decided.items():
-        if chosen.levels and not chosen.is_as_asked:
-            why = chosen.why.replace("within the tolerance", f"{SPREAD} {floor:.0%}")
-            decided[key] = replace(chosen, why=f"chosen by default: {why}", by_default=True)
-    return decided
-
-
-def as_asked(scene: Scene, why: str = "as the study asks") -> Decision:
+def as_asked(scene: Scene, why: str = ASKED) -> Decision:
     """The decision to answer a scene as it is."""
     if not isinstance(scene.bed, PileBed):
         return Decision(scene, scene, None, UNKNOWN, why)
@@ -318,48 +286,35 @@ def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decis
 
 
 class Comparison(NamedTuple):
-    """An answer without DEM and that of DEM, at one fraction of one pile."""
+    """An answer without DEM and that of DEM, at one fraction of the pile `asked` for, by its id."""
 
+    asked: str
     cheap: PileThreshold
     dem: PileThreshold
     agree: bool
 
 
-def compare(cheap: Pile, check: Pile, tolerance: float, cases: Path) -> Iterator[Comparison]:
-    """Compare a pile's two answers at each fraction, from the finished cases.
+def compare(
+    piles: Piles, checking: Piles, tolerance: float, cases: Path, done: Container[str]
+) -> Iterator[Comparison]:
+    """Compare the answers of the piles that DEM checks at each fraction, where both are run.
 
     They agree where the answer without DEM lies in the interval of DEM, widened by the tolerance,
-    or where neither reaches the fraction.
+    or where neither reaches the fraction. All piles are by the id of the scene asked for.
     """
-    answers = (pile.thresholds(cases, cheap.scene.protocol.fractions) for pile in (cheap, check))
-    for answer, dem in zip(*answers, strict=True):
-        within = dem.tau_low * (1 - tolerance) <= answer.tau <= dem.tau_high * (1 + tolerance)
-        neither = math.isnan(answer.tau) and math.isnan(dem.tau)
-        yield Comparison(answer, dem, within or neither)
+    for asked, check in checking.items():
+        both, fractions = (piles[asked], check), piles[asked].scene.protocol.fractions
+        if all(pile.is_run(done) for pile in both):
+            answers = (pile.thresholds(cases, fractions) for pile in both)
+            for cheap, dem in zip(*answers, strict=True):
+                low, high = dem.tau_low * (1 - tolerance), dem.tau_high * (1 + tolerance)
+                neither = math.isnan(cheap.tau) and math.isnan(dem.tau)
+                yield Comparison(asked, cheap, dem, neither or low <= cheap.tau <= high)
 
 
-def ready(
-    piles: Mapping[str, Pile], checking: Mapping[str, Pile], done: Container[str]
-) -> dict[str, Pile]:
-    """The checks whose runs are done, and those of the answers that they check."""
-    both = {asked: (piles[asked], check) for asked, check in checking.items()}
-    return {key: pair[1] for key, pair in both.items() if all(pile.is_run(done) for pile in pair)}
-
-
-def overruled(
-    answers: Mapping[str, Decision],
-    piles: Mapping[str, Pile],
-    checking: Mapping[str, Pile],
-    tolerance: float,
-    cases: Path,
-    done: Container[str],
-) -> dict[str, Bound]:
+def overruled(compared: Iterable[Comparison], answers: Mapping[str, Decision]) -> dict[str, Bound]:
     """For each pile of a group whose check disagrees, the levels that are not good enough."""
-    lost = {
-        _check_group(check.scene)
-        for asked, check in ready(piles, checking, done).items()
-        if not all(row.agree for row in compare(piles[asked], check, tolerance, cases))
-    }
+    lost = {_check_group(answers[row.asked].scene) for row in compared if not row.agree}
     return {
         asked: Bound(*answer.levels, f"DEM overruled {answer.levels.text}")
         for asked, answer in answers.items()

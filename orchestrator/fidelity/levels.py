@@ -25,13 +25,9 @@ Fields = Mapping[str, Any]
 STRIP_WIDTH = 5.0
 """Width of the bed of the level `strip`, d; more where the largest grains need it."""
 FINER = {
-    "flow.cells_per_face": 1,
-    "flow.expansion_ratio": -1,
-    "bed.mobile_layers": 1,
-    "grain.stiffness": 1,
-    "protocol.time_step": -1,
-    "protocol.waiting_time": 1,
-    "protocol.load_increment": -1,
+    **{"flow.cells_per_face": 1, "flow.expansion_ratio": -1},
+    **{"bed.mobile_layers": 1, "grain.stiffness": 1},
+    **{"protocol.time_step": -1, "protocol.waiting_time": 1, "protocol.load_increment": -1},
 }
 """Numbers of a level, and whether a larger one (1) or a smaller one (-1) is at least as fine."""
 
@@ -150,17 +146,15 @@ def packing(scene: Scene) -> str:
 def _load(part: str) -> tuple[Level, ...]:
     data = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
-    def dem(layers: int, rules: str) -> Fields:
-        return {"protocol.method": "dem", "bed.mobile_layers": layers, **data["rules"][rules]}
+    def by_dem(row: dict[str, Any]) -> Fields:
+        layers = {"protocol.method": "dem", "bed.mobile_layers": row.pop("layers")}
+        return {**layers, **data["rules"][row.pop("rules")]}
 
-    levels = []
     for row in data[part]:
         if "rules" in row:
-            row["sets"] = dem(row.pop("layers"), row.pop("rules"))
-        if "on_poured" in row:
-            row["on_poured"] = dem(**row["on_poured"])
-        levels.append(Level(**row))
-    return tuple(levels)
+            row["sets"] = by_dem(row)
+            row["on_poured"] = by_dem(row["on_poured"]) if "on_poured" in row else {}
+    return tuple(Level(**row) for row in data[part])
 
 
 AS_ASKED = Level("as asked", "numbers of the study file")

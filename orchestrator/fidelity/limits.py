@@ -1,7 +1,7 @@
 """Where the methods hold: what a study refuses, and what it is warned of.
 
-Each limit was read off a map of `orchestrator stability`, whose file says it in words; what the
-maps found lies in ``calibration/maps.csv``.
+Each limit was read off a map of `orchestrator stability` (``calibration/maps.csv``), whose file
+says it in words.
 """
 
 import warnings
@@ -29,14 +29,13 @@ PILE_SLOPES_DEG = (10.0, 35.0)
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
 LEAST_DAMPING = 0.03
-WAITING_TIME = 3.0
-"""Least time without a passage, sqrt(d/g')."""
+WAITING_TIME = 3.0  # least time without a passage, sqrt(d/g')
 COARSE_STEP = 0.05
-CLOSE_PACKED_DEG = 59.0
-"""Entrainment angle from which the grains of a row hold each other."""
+CLOSE_PACKED_DEG = 59.0  # entrainment angle from which the grains of a row hold each other
+ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
-class Fault(NamedTuple):
+class Limit(NamedTuple):
     """A limit that a scene is beyond: a study is refused, or merely warned.
 
     The map that shows it, the field of a study file to change, what is wrong and what would do.
@@ -66,11 +65,11 @@ def check(scene: Scene, where: str) -> None:
     InputError
         For the first limit that it is beyond: the field, the map and the remedy.
     """
-    for fault in faults(scene):
-        remedy = f"{fault.remedy}; map “{fault.map}” of `orchestrator stability`"
-        if fault.refused:
-            raise InputError(fault.what, f"{where}: {fault.field}", remedy)
-        warnings.warn(f"{fault.field}: {fault.what} ({remedy})", stacklevel=2)
+    for limit in exceeded(scene):
+        remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
+        if limit.refused:
+            raise InputError(limit.what, f"{where}: {limit.field}", remedy)
+        warnings.warn(f"{limit.field}: {limit.what} ({remedy})", stacklevel=2)
     if isinstance(scene.bed, PileBed):
         try:
             _ = model(scene).cases  # a mesh that cannot be made is refused before anything runs
@@ -78,22 +77,21 @@ def check(scene: Scene, where: str) -> None:
             raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
 
 
-def faults(scene: Scene) -> Iterator[Fault]:
+def exceeded(scene: Scene) -> Iterator[Limit]:
     """The limits that a scene is beyond."""
     bed = scene.bed
+    slope, limit, angle = bed.slope_deg, scene.limiting_slope_deg, bed.entrainment_angle_deg
     if isinstance(bed, PileBed):
         yield from _pile(scene, bed)
         yield from _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
-    else:
-        yield from _slope(scene)
-        if bed.slope_deg > (angle := bed.entrainment_angle_deg):
-            what = (
-                f"{bed.slope_deg:g} deg is beyond the entrainment angle, {angle:g} deg: a grain "
-                "may come to rest half-way over its neighbour, and DEM and the closed form "
-                "differ by up to a third"
-            )
-            remedy = "read it by DEM, or lower the slope"
-            yield Fault("slope", "bed.slope_deg", what, remedy, refused=False)
+    if (not isinstance(bed, PileBed) or bed.is_wedge) and slope > limit + 1e-9:
+        what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg: the bed rolls back without flow"
+        yield Limit("slope", "bed.slope_deg", what, "lower the slope or the entrainment angle")
+    if not isinstance(bed, PileBed) and slope > angle:
+        what = f"{slope:g} deg is beyond the entrainment angle, {angle:g} deg: a grain may come to"
+        what = f"{what} rest half-way, and DEM and the closed form differ by up to a third"
+        remedy = "read it by DEM, or lower the slope"
+        yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
     if scene.protocol.method == "dem":
         yield from _dem(scene)
 
@@ -103,63 +101,54 @@ def largest_timestep(damping: float) -> float:
     return next(step for most, step in TIMESTEPS if damping <= most)
 
 
-def _slope(scene: Scene) -> Iterator[Fault]:
-    slope, limit = scene.bed.slope_deg, scene.limiting_slope_deg
-    if slope > limit + 1e-9:
-        angles = "min(friction angle, 90 deg - entrainment angle)"
-        what = f"{slope:g} deg is beyond {angles} = {limit:g} deg"
-        remedy = (
-            "a steeper bed rolls back without any flow: lower the slope or the entrainment angle"
-        )
-        yield Fault("slope", "bed.slope_deg", what, remedy)
-
-
-def _pile(scene: Scene, bed: PileBed) -> Iterator[Fault]:
-    remedy = "smooth a profile, give forms room, or count another part of the bed"
+def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
+    (low, high), angle = PILE_SLOPES_DEG, bed.entrainment_angle_deg
     try:
-        line = of_bed(bed)
-        length, what = line.x[-2] - line.x[1], ""
-        if bed.packing == "poured" and bed.obstacles:
-            what = "no grains can be poured around obstacles"
-        elif length > MOST_GRAINS * scene.grain.diameter:
-            count = length / scene.grain.diameter
-            what = f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
-        elif not bed.is_wedge and bed.packing != "poured":
-            _ = Geometry(scene).packing
-        what = what or _too_steep(scene, bed, line)
+        what = _unfit(scene, bed, of_bed(bed))
     except UnfitError as error:
         what = str(error)
     if what:
-        yield Fault("slope", "bed", what, remedy)
-    low, high = PILE_SLOPES_DEG
-    if bed.is_wedge:
-        yield from _slope(scene)
-        if not low <= bed.slope_deg <= high:
-            limit = "min(friction angle, 90 deg - entrainment angle)"
-            remedy = f"choose {low:g} ... {high:g} deg, and no more than {limit}"
-            yield Fault("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
-    if bed.entrainment_angle_deg < CLOSE_PACKED_DEG:
-        what = (
-            f"a pile of {bed.entrainment_angle_deg:g} deg: the grains of a row do not touch, those "
-            "under the gaps are exposed too, and a mobile row is wedged apart by the one on it"
+        remedy = "smooth a profile, give forms room, or count another part of the bed"
+        yield Limit("slope", "bed", what, remedy)
+    if bed.is_wedge and not low <= bed.slope_deg <= high:
+        remedy = f"choose {low:g} ... {high:g} deg, and no more than {ANGLES}"
+        yield Limit("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
+    if angle < CLOSE_PACKED_DEG:
+        what = f"a pile of {angle:g} deg: the grains of a row do not touch, and a mobile row is"
+        what, remedy = (
+            f"{what} wedged apart by the row on it",
+            "60 deg; single grains may have less",
         )
-        remedy = "60 deg; single grains may have less"
-        yield Fault("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
+        yield Limit("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
     if (loaded := scene.forces.loaded_grains) != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
-        yield Fault("forced", "forces.loaded_grains", what, "exposed", refused=False)
+        yield Limit("forced", "forces.loaded_grains", what, "exposed", refused=False)
 
 
-def _too_steep(scene: Scene, bed: PileBed, line: BedLine) -> str:
-    """The steepest place of a bed that is too steep; a poured one slumps also where none count."""
+def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
+    """Why grains cannot lie on a bed line: too many, or too steep; empty if they can.
+
+    Raises
+    ------
+    UnfitError
+        Where a lattice cannot be laid.
+    """
+    length = line.x[-2] - line.x[1]
+    count = length / scene.grain.diameter
+    slopes, limit, why = abs(line.slopes_deg), scene.limiting_slope_deg, ANGLES
+    if count > MOST_GRAINS:
+        return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
     if bed.packing == "poured":
+        if bed.obstacles:
+            return "no grains can be poured around obstacles"
+        # poured grains slump also where they do not count
         limit = min(scene.grain.friction_angle_deg, PILE_SLOPES_DEG[1])
-        why, slopes = "what poured grains hold, min(friction angle, 35 deg)", abs(line.slopes_deg)
+        why = "what poured grains hold, min(friction angle, 35 deg)"
     elif bed.is_wedge:
         return ""
     else:
-        limit, why = scene.limiting_slope_deg, "min(friction angle, 90 deg - entrainment angle)"
-        slopes = np.where(line.counted(bed.counts), abs(line.slopes_deg), 0.0)
+        _ = Geometry(scene).packing
+        slopes = np.where(line.counted(bed.counts), slopes, 0.0)
     for start, end in line.bare:
         slopes[(np.array(line.x[1:]) > start) & (np.array(line.x[:-1]) < end)] = 0.0
     at = int(np.argmax(slopes))
@@ -169,7 +158,7 @@ def _too_steep(scene: Scene, bed: PileBed, line: BedLine) -> str:
     return f"{where} is beyond {why} = {limit:g} deg"
 
 
-def _theory(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if scene.flow.model == "flat":
         return
     line = of_bed(bed)
@@ -178,51 +167,48 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Fault]:
     slope = float(np.degrees(np.arctan(seen.slopes[at])))
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
         what = f"a bed that rises by {slope:.3g} deg at x = {seen.x[at]:.4g} m is no low one"
-        yield Fault("slope", "flow.model", what, 'choose "solve"')
+        yield Limit("slope", "flow.model", what, 'choose "solve"')
     if scene.flow.model == "hill" and half_length(line) is None:
         what = "the bed does not fall to half of its height before and behind its top"
-        yield Fault("slope", "flow.model", what, 'choose "waves" or "solve"')
+        yield Limit("slope", "flow.model", what, 'choose "waves" or "solve"')
 
 
-def _solve(scene: Scene, bed: PileBed) -> Iterator[Fault]:
+def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     z0, cell = scene.solve_roughness, scene.first_cell_height
     if bed.is_level:
         what = "over a flat bed there is nothing to solve: u* is u*_0 everywhere"
-        yield Fault("slope", "flow.model", what, 'choose "flat"')
+        yield Limit("slope", "flow.model", what, 'choose "flat"')
     if z0 > cell:
-        half = f"twice z_e = {cell / 2:g} m, the height of the first cell's centre"
+        what = f"z0 = {z0:g} m is above twice z_e = {cell / 2:g} m, the centre of the first cell"
         remedy = "lower it, or raise flow.first_cell_height or bed.height; z_e of z0 is sound"
-        yield Fault("first-cell", "bed.roughness", f"z0 = {z0:g} m is above {half}", remedy)
+        yield Limit("first-cell", "bed.roughness", what, remedy)
     ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
-        what = (
-            "the flow at the bed is not turbulent: in the first cell the eddy viscosity is "
-            f"{ratio:.2g} of the molecular one"
-        )
+        what = "the flow at the bed is not turbulent: in the first cell the eddy viscosity is"
+        what = f"{what} {ratio:.2g} of the molecular one"
         remedy = "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
-        yield Fault("similarity", "flow.viscosity", what, remedy)
+        yield Limit("similarity", "flow.viscosity", what, remedy)
     if (scheme := scene.flow.convection_scheme) != "linearUpwind":
         what = f"{scheme} does not converge to the same answer, or not at all"
-        remedy = "linearUpwind"
-        yield Fault("mesh-scheme-15", "flow.convection_scheme", what, remedy, refused=False)
+        field = "flow.convection_scheme"
+        yield Limit("mesh-scheme-15", field, what, "linearUpwind", refused=False)
 
 
-def _dem(scene: Scene) -> Iterator[Fault]:
+def _dem(scene: Scene) -> Iterator[Limit]:
     rules, damping = scene.protocol, scene.grain.damping
     if rules.time_step > (most := largest_timestep(damping)):
         what = f"{rules.time_step:g} sqrt(m/K) is above {most:g} at a damping of {damping:g}"
-        yield Fault("timestep-damping", "protocol.time_step", what, "lower it, or the damping")
+        yield Limit("timestep-damping", "protocol.time_step", what, "lower it, or the damping")
     if damping < LEAST_DAMPING:
         what = f"at a damping of {damping:g} a bed does not come to rest"
-        yield Fault("timestep-damping", "grain.damping", what, "0.1 is sound")
+        yield Limit("timestep-damping", "grain.damping", what, "0.1 is sound")
     if not isinstance(scene.bed, PileBed):
         return
     if rules.waiting_time < WAITING_TIME:
-        waited = f"load steps that wait {rules.waiting_time:g} sqrt(d/g')"
-        what = f"{waited} end before slow grains pass: it is a ramp"
+        what = f"load steps that wait {rules.waiting_time:g} sqrt(d/g') are a ramp of the flow"
         remedy = "raise it, unless a ramp is what you want"
-        yield Fault("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
+        yield Limit("quiet-step", "protocol.waiting_time", what, remedy, refused=False)
     if (step := rules.load_increment) > COARSE_STEP:
         what = f"load steps {step:.0%} apart leave the threshold that wide an interval"
-        yield Fault("quiet-step", "protocol.load_increment", what, "lower it", refused=False)
+        yield Limit("quiet-step", "protocol.load_increment", what, "lower it", refused=False)

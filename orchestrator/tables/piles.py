@@ -130,7 +130,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
             "model_share": model.dominant or None,
-            "frozen_bed": calibration.frozen_bed(asked, fraction),
+            "frozen_bed": model.frozen_bed,
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
@@ -256,20 +256,20 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
 
 def check_rows(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
     """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
-    for asked, pile in decision.ready(plan.piles, plan.checks, done).items():
-        scene = plan.piles[asked].scene
-        for cheap, dem, agree in decision.compare(plan.piles[asked], pile, tolerance, cases):
-            yield {
-                "scene_id": asked,
-                **point(scene),
-                "packing": pile.bed.packing,
-                "fraction": cheap.fraction,
-                **_levels(plan.decisions[asked]),
-                "shields": shields(scene, cheap.tau),
-                "shields_dem": shields(scene, dem.tau),
-                "shields_dem_low": shields(scene, dem.tau_low),
-                "shields_dem_high": shields(scene, dem.tau_high),
-                "difference": cheap.tau / dem.tau - 1,
-                "agree": agree,
-                "case": pile.case.name,
-            }
+    compared = decision.compare(plan.piles, plan.checks, tolerance, cases, done)
+    for asked, cheap, dem, agree in compared:
+        scene, pile = plan.piles[asked].scene, plan.checks[asked]
+        yield {
+            "scene_id": asked,
+            **point(scene),
+            "packing": pile.bed.packing,
+            "fraction": cheap.fraction,
+            **_levels(plan.decisions[asked]),
+            "shields": shields(scene, cheap.tau),
+            "shields_dem": shields(scene, dem.tau),
+            "shields_dem_low": shields(scene, dem.tau_low),
+            "shields_dem_high": shields(scene, dem.tau_high),
+            "difference": cheap.tau / dem.tau - 1,
+            "agree": agree,
+            "case": pile.case.name,
+        }

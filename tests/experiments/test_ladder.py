@@ -60,7 +60,7 @@ def test_the_naive_route_is_measured_on_the_lowest_pile_with_every_grain_mobile(
     packing = planned.piles[next(iter(routes))].packing
     assert packing.mobile.sum() > 5 * packing.count
     # what did not run costs nothing that is known; what needs no run has no error by itself
-    runs = Runs(planned, tmp_path, {}, {})
+    runs = Runs(planned, tmp_path, {})
     fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
     assert ladder.naive_costs(routes, fast, runs)["core_s"].isna().all()
     points = ladder.points(pairs, runs)

@@ -33,7 +33,7 @@ forces = { law = "high" }
 def test_a_maps_file_spans_its_axes(one: Map) -> None:
     across, down = ({place[axis] for place in one.places} for axis in (0, 1))
     assert len(one.places) == len(across) * len(down)
-    assert (across == {None}) == bool(one.fractions)
+    assert (across == {None}) == ("fractions" in one.data["x"])
     assert all(place.scenes for place in one.places)
     if one.data["judge"] == "pile":
         assert all(len(place.scenes) == len(place.references) for place in one.places)
@@ -47,7 +47,7 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
     space = Workspace(tmp_path / "out")
     with claimed(space.root, EXPERIMENT, "stability"):
         pipeline.complete(planned.missing(space.cases, ()), space, workers=2, limit_s=120)
-    runs = Runs(planned, space.cases, planned.done(space.cases), {})
+    runs = Runs(planned, space.cases, planned.done(space.cases))
     good, bad = stability.judge(one, runs).sort_values("x").to_dict("records")
     assert good["verdict"] == "good"
     assert abs(good["error"]) < 0.05

@@ -120,8 +120,8 @@ def test_independent_shares_add_as_squares_and_lower_nothing_below_zero() -> Non
 
 
 def test_a_frozen_bed_is_known_to_move_a_row(pile: MakePile) -> None:
-    moved = [calibration.frozen_bed(pile(), fraction) for fraction in (0.1, 0.7)]
+    moved = [calibration.spread(pile(), fraction).frozen_bed for fraction in (0.1, 0.7)]
     # until the first update nothing has changed
     assert 0 <= moved[0] < 0.05 < moved[1]
     others = {"flow.model": "hill"}, {"protocol.update": 0.1, "flow.first_cell_height": 5e-4}
-    assert np.isnan([calibration.frozen_bed(pile(fields), 0.7) for fields in others]).all()
+    assert np.isnan([calibration.spread(pile(fields), 0.7).frozen_bed for fields in others]).all()

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator import plan
 from orchestrator.fidelity import calibration, decision
-from orchestrator.fidelity.calibration import LEVEL_BED, floor, lowest_floor, model_class
+from orchestrator.fidelity.calibration import LEVEL_BED, floors, model_class
 from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, as_asked
 from orchestrator.fidelity.levels import AS_ASKED, FLAT, FLOW, GRAINS, LEVELS, Pair, level
 from orchestrator.grains.pile import Pile
@@ -24,7 +24,7 @@ LEVEL: Mapping[str, Any] = {"packing": "poured", "shape": "flat", "slope_deg": 0
 CHANGING = {"protocol.update": 0.1, "flow.first_cell_height": 5e-4}
 
 
-def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> Decision:
+def decide(scene: Scene, tolerance: float, above: Bound = NO_BOUND) -> Decision:
     return decision.decide([scene], tolerance, {scene.id: above})[scene.id]
 
 
@@ -147,12 +147,12 @@ def test_small_grains_are_never_stiffer_than_a_file_allows(packing: str, pile: M
 
 def test_without_a_tolerance_the_error_of_the_own_levels_is_given(pile: MakePile) -> None:
     fast = level("grains", "1 layer, fast")
-    chosen = decide(fast.answer(pile()), None)
+    chosen = decide(fast.answer(pile()), 0)
     assert chosen.is_as_asked
     assert chosen.levels == (level("flow", "standard"), fast)
     on_levels = decision.on_levels(pile(), chosen.levels, "")
     assert chosen.error_estimate == on_levels.error_estimate
-    assert decide(pile(), None).levels == (level("flow", "standard"), AS_ASKED)
+    assert decide(pile(), 0).levels == (level("flow", "standard"), AS_ASKED)
 
 
 @pytest.mark.parametrize("model", ["flat", "solve"])
@@ -211,14 +211,14 @@ def _asked(bed: str = "", protocol: str = "", diameter: float = 1e-3) -> study.S
 @pytest.mark.parametrize("diameter", [2e-4, 1e-3])
 def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: float) -> None:
     (scene,) = _asked(f', packing = "{packing}"', diameter=diameter).scenes
-    (chosen,) = decision.by_default([scene]).values()
+    (chosen,) = decision.decide([scene], None).values()
     assert chosen.by_default
     assert chosen.scene.protocol.method != "dem"
     assert chosen.scene.flow.model == "solve"
-    assert chosen.known.total <= lowest_floor() <= floor(model_class(scene))
+    assert chosen.known.total <= min(floors().values()) <= floors()[model_class(scene)]
     assert chosen.levels
     above = {scene.id: Bound(*chosen.levels, "a run failed")}
-    (again,) = decision.by_default([scene], above).values()
+    (again,) = decision.decide([scene], None, above).values()
     assert again.known.cost_core_s > chosen.known.cost_core_s
     assert "a run failed" in again.why
 

@@ -1,8 +1,7 @@
 """Known errors of the fidelity levels and the spread of the model, by class of scene.
 
-The numbers are tables beside this module: ``levels.csv`` holds what ``orchestrator ladder``
-measured against the most expensive levels, ``budget.csv`` what ``orchestrator budget`` measured of
-the choices that all levels share, ``maps.csv`` what ``orchestrator stability`` found.
+The tables beside this module hold what was measured: ``levels.csv`` by `orchestrator ladder`,
+``budget.csv`` by `orchestrator budget`, ``maps.csv`` by `orchestrator stability`.
 """
 
 import math
@@ -15,35 +14,29 @@ import pandas as pd
 
 from orchestrator.fidelity.levels import AS_ASKED, FLAT, LEVELS, Level, Pair, packing, value_of
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.parts import Flow, Forces, PileBed, Protocol
+from orchestrator.study.fields import FIELDS, declared
+from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene, default_first_cell_height
 from orchestrator.types import FloatArray
 
 FOLDER = Path(__file__).parent
-DISORDERS = (0.02, 0.05, 0.2)
-"""Ends of the ranges of disorder that share their known errors, d."""
-VISCOUS, ROUGH = 3.0, 30.0
-"""Re* below which a bed is hydraulically smooth, and from which it is rough."""
+DISORDERS = (0.02, 0.05, 0.2)  # ends of the ranges of disorder that share their known errors, d
+VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it is rough
 LIFT_OFF = 0.95
 """Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
 piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
 LEVEL_BED, LIMITING = "level bed", ", limiting slope"
 """The class for the flow of beds over which u* is u*_0 everywhere; the end of a class's name."""
-BETWEEN_DEG = 5.0
-"""Degrees below the limiting slope from which slopes were measured as below it."""
-DEFAULTS = {
-    f"{part}.{name}": kind.model_fields[name].default
-    for part, kind, names in (
-        ("flow", Flow, ("turbulence_model", "convection_scheme", "lid", "upstream", "downstream")),
-        ("forces", Forces, ("averaging_length", "loaded_grains", "exposure")),
-        ("protocol", Protocol, ("displacement_criterion",)),
-    )
-    for name in names
-}
-"""Fields that move an answer and that the ladder keeps at their defaults."""
+BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")
-SAME_CELL = 0.02
-"""Relative difference from the default height of the first cell that changes no known error."""
+SETTINGS = (
+    *(*AT_LEAST, "flow.turbulence_model", "flow.convection_scheme", "forces.averaging_length"),
+    *("forces.loaded_grains", "forces.exposure", "protocol.displacement_criterion"),
+)
+DEFAULTS = {q.name: declared(q).default for q in FIELDS if q.name in SETTINGS}
+"""Fields that move an answer and that the ladder keeps at their defaults; those of `AT_LEAST` may
+be larger."""
+SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
 FROZEN = "frozen bed"
 """The choice that the flow of the whole pile acts until the last grain has gone."""
 STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
@@ -77,22 +70,23 @@ UNKNOWN = Known(math.inf, 0.0, math.inf, 0.0)
 
 
 class Spread(NamedTuple):
-    """How far the choices of all levels lower and raise a Shields number, and the widest of them.
+    """How far the choices that all levels share lower and raise a Shields number, relative.
 
-    Relative; NaN and an empty name where nothing is known.
+    With the name of the widest choice, and how far a bed that changes moves the number at most.
     """
 
-    low: float
-    high: float
-    dominant: str
+    low: float = math.nan
+    high: float = math.nan
+    dominant: str = ""
+    frozen_bed: float = math.nan
 
 
 def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     """The class under which the known error of a level is measured on a scene.
 
     The class for the flow names how the stress is read and what is above the water; the class for
-    the grains names their packing. Both name the form, and the limiting slope, on which a row
-    waits for a touch; or that there are obstacles, unless these are left out.
+    the grains names their packing. Both name the form, the limiting slope, on which a row waits for
+    a touch, and obstacles, unless these are left out.
     """
     bed, name = scene.bed, packing(scene)
     assert isinstance(bed, PileBed)
@@ -117,9 +111,9 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
 def classes(part: str, scene: Scene) -> tuple[str, ...]:
     """The measured classes that a scene belongs to; its known error is the largest of theirs.
 
-    A slope between those that were measured belongs to both of its neighbours. So do level rows on
-    any slope: which grain of a chain goes first is chaotic, and no slope is known better than
-    another. A form with obstacles has the errors of both.
+    A slope between those that were measured belongs to both of its neighbours, and so do level rows
+    on any slope: which grain of a chain goes first is chaotic. A form with obstacles has the errors
+    of both.
     """
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
@@ -127,16 +121,11 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     between = 1 <= scene.limiting_slope_deg - bed.slope_deg < BETWEEN_DEG
     if bed.is_triangle and (between or base == "horizontal"):
         return base, base + LIMITING
-    if bed.obstacles:
-        return name, scene_class(part, scene, obstacles=False)
-    return (name,)
+    return (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)
 
 
 def unmeasured(scene: Scene) -> str:
-    """The property of a pile for which no level was measured, in words; empty if there is none.
-
-    A known error holds for the settings at which it was measured.
-    """
+    """The property of a pile for which no level was measured, in words; empty if there is none."""
     if float(closed_form(scene).lift) >= LIFT_OFF * scene.weight:
         return "lift that carries grains off before they roll"
     solved, roughness = scene.flow.model == "solve", scene.flow.roughness
@@ -144,7 +133,7 @@ def unmeasured(scene: Scene) -> str:
         value = value_of(scene, name)
         other = value < default if name in AT_LEAST else value != default
         if other and (solved or not name.startswith("flow.")):
-            return f"{name} = {value:.4g}" if isinstance(value, float) else f"{name} = {value}"
+            return f"{name} = {value}"
     if solved:
         assert isinstance(scene.bed, PileBed)
         default = default_first_cell_height(scene.bed.relief, scene.solve_roughness)
@@ -158,19 +147,16 @@ def unmeasured(scene: Scene) -> str:
 def known(pair: Pair, scene: Scene) -> Known:
     """Known error of a pair of levels on a pile, at the fraction where it is largest.
 
-    Errors and uncertainties of the two parts have a cause each and add up by their squares;
-    docs/ladder.md says how often the sum holds. Numbers of a study file that are on no level have
-    the error of the most expensive level that is no finer than they are. `UNKNOWN` where it was not
-    measured.
+    Errors and uncertainties of the two parts have a cause each and add up by their squares
+    (docs/ladder.md). A study file that is on no level has the error of the most expensive level
+    that is no finer. `UNKNOWN` where it was not measured.
     """
     if unmeasured(scene):
         return UNKNOWN
     levels = list(pair)
     for place, part in enumerate(LEVELS.values()):
         if levels[place] is AS_ASKED:
-            coarser = (
-                x for x in reversed(part) if x.same_model and x.describes(scene, or_finer=True)
-            )
+            coarser = (x for x in part[::-1] if x.same_model and x.describes(scene, or_finer=True))
             levels[place] = next(coarser, AS_ASKED)
     return known_of_classes(*levels, classes("flow", scene), classes("grains", scene))
 
@@ -179,7 +165,7 @@ def known(pair: Pair, scene: Scene) -> Known:
 def known_of_classes(
     flow: Level, grains: Level, flow_classes: tuple[str, ...], grain_classes: tuple[str, ...]
 ) -> Known:
-    """Known error of two levels on scenes of some classes; arguments as in `known`."""
+    """Known error of two levels on scenes of some classes."""
     exact = flow is FLAT and flow_classes == (LEVEL_BED,)
     keys = [] if exact else [[("flow", flow.name, name) for name in flow_classes]]
     keys.append([("grains", grains.name, name) for name in grain_classes])
@@ -207,7 +193,7 @@ def measured() -> dict[tuple[str, str, str], FloatArray]:
 
 
 def model_class(scene: Scene) -> str:
-    """The class of scenes that share what the choices common to all levels do to a threshold."""
+    """The class of scenes on which the choices common to all levels have the same effect."""
     bed, reynolds = scene.bed, float(closed_form(scene).reynolds)
     assert isinstance(bed, PileBed)
     regime = "viscous" if reynolds < VISCOUS else "transitional" if reynolds < ROUGH else "rough"
@@ -216,17 +202,27 @@ def model_class(scene: Scene) -> str:
 
 
 def spread(scene: Scene, fraction: float) -> Spread:
-    """The spread of the threshold of a pile at a fraction of its grains."""
-    return _spread(model_class(scene), fraction)
+    """The spread of the threshold of a pile at a fraction of its grains; NaN where not known.
+
+    What the frozen bed does is the largest of the scenes of the class; it is not known of a bed
+    that changes already, nor of a flow that is not solved.
+    """
+    of_class = _spread(model_class(scene), fraction)
+    if scene.protocol.update or scene.flow.model != "solve":
+        return of_class._replace(frozen_bed=math.nan)
+    return of_class
 
 
 @cache
 def _spread(model: str, fraction: float) -> Spread:
-    shares = _shares(model, fraction)
+    """The spread of a class, at the measured fraction that is nearest."""
+    rows = _budget().query("model_class == @model").set_index("choice")
+    apart = (rows["fraction"] - fraction).abs()
+    shares = rows.loc[apart == apart.min(), ["shields_low", "shields_high"]]
     if shares.empty:
-        return Spread(math.nan, math.nan, "")
-    widest = (shares["shields_low"] + shares["shields_high"]).to_numpy().argmax()
-    return Spread(*together(shares), str(shares["choice"].iloc[int(widest)]))
+        return Spread()
+    frozen_bed = float(shares.max(axis=1).get(FROZEN, math.nan))
+    return Spread(*together(shares), str(shares.sum(axis=1).idxmax()), frozen_bed)
 
 
 def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, float]:
@@ -238,48 +234,16 @@ def together(shares: pd.DataFrame, quantity: str = "shields") -> tuple[float, fl
     return min(low, 1.0), high
 
 
-def frozen_bed(scene: Scene, fraction: float) -> float:
-    """How far a threshold is known to move on a bed that changes, relative; NaN if not known.
+@cache
+def floors() -> dict[str, float]:
+    """Relative error below which the model's uncertainty hides the numerics, by class of scene.
 
-    The largest over the scenes of the class: of one packing, on a smooth, transitional or rough
-    bed. It is not known of a bed that changes already, nor of a flow that is not solved.
+    Half the interval of the choices that no study file states, the smallest over the fractions.
     """
-    if scene.protocol.update or scene.flow.model != "solve":
-        return math.nan
-    return _frozen_bed(model_class(scene), fraction)
-
-
-@cache
-def _frozen_bed(model: str, fraction: float) -> float:
-    shares = _shares(model, fraction)
-    ends = shares.loc[shares["choice"] == FROZEN, ["shields_low", "shields_high"]]
-    return math.nan if ends.empty else float(ends.to_numpy().max())
-
-
-@cache
-def _shares(model: str, fraction: float) -> pd.DataFrame:
-    """The shares of a class at the measured fraction that is nearest."""
-    rows = _budget()[_budget()["model_class"] == model]
-    apart = (rows["fraction"] - fraction).abs()
-    nearest: pd.DataFrame = rows[apart == apart.min()]
-    return nearest
-
-
-@cache
-def floor(model: str) -> float:
-    """Half the interval of the model's choices, of scenes of a class whose file's values are sure.
-
-    It is relative, the smallest over the fractions; NaN if not known. Below it, an error of the
-    numerics is hidden by the uncertainty of the model.
-    """
-    rows = _budget()[(_budget()["model_class"] == model) & ~_budget()["choice"].isin(STATED)]
-    return min((sum(together(part)) / 2 for _, part in rows.groupby("fraction")), default=math.nan)
-
-
-@cache
-def lowest_floor() -> float:
-    """The smallest floor of all measured classes, relative."""
-    return min(floor(model) for model in _budget()["model_class"].unique())
+    unstated = _budget()[~_budget()["choice"].isin(STATED)]
+    groups = unstated.groupby(["model_class", "fraction"])
+    halves = pd.Series({key: sum(together(part)) / 2 for key, part in groups})
+    return {str(model): float(half) for model, half in halves.groupby(level=0).min().items()}
 
 
 @cache
