@@ -14,7 +14,7 @@ import pandas as pd
 
 from orchestrator.fidelity.levels import AS_ASKED, FLAT, LEVELS, Level, Pair, packing, value_of
 from orchestrator.study.closed_form import closed_form
-from orchestrator.study.fields import FIELDS, declared
+from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene, default_first_cell_height
 from orchestrator.types import FloatArray
@@ -33,7 +33,12 @@ SETTINGS = (
     *(*AT_LEAST, "flow.turbulence_model", "flow.convection_scheme", "forces.averaging_length"),
     *("forces.loaded_grains", "forces.exposure", "protocol.displacement_criterion"),
 )
-DEFAULTS = {q.name: declared(q).default for q in FIELDS if q.name in SETTINGS}
+DEFAULTS = {
+    f"{part}.{name}": field.default
+    for part, model in PARTS.items()
+    for name, field in model.model_fields.items()
+    if f"{part}.{name}" in SETTINGS
+}
 """Fields that move an answer and that the ladder keeps at their defaults; those of `AT_LEAST` may
 be larger."""
 SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
