@@ -45,14 +45,17 @@ def value(column: str, value: Any) -> str:
     return "none" if pd.isna(value) else amount(value, info.unit)
 
 
+def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
+    """Columns of a table with their values and heads as a reader sees them."""
+    return {
+        words(column).label: [value(column, item) for item in rows[column]] for column in columns
+    }
+
+
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     """The values of a row with their symbols, without those that the row does not have."""
-    return [plain(column, row[column]) for column in columns if is_told(column, row[column])]
-
-
-def is_told(column: str, value: Any) -> bool:
-    """Whether a row has a value; an empty list is one."""
-    return bool(pd.notna(value)) or column in LISTS
+    shown = [column for column in columns if pd.notna(row[column]) or column in LISTS]
+    return [plain(column, row[column]) for column in shown]
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:

@@ -43,6 +43,13 @@ class Results:
         return self.scenes[self.scenes["bed"] == kind]
 
     @cached_property
+    def flow_fields(self) -> list[str]:
+        """The fields of the solved flow in which the piles differ."""
+        piles, columns = self.beds("pile"), fields.COLUMNS.items()
+        solved = [name for name, item in columns if item.info.scope == "solved flows"]
+        return [name for name in solved if piles[name].nunique(dropna=False) > 1]
+
+    @cached_property
     def _joins(self) -> dict[str, pd.DataFrame]:
         return {}
 
@@ -51,8 +58,8 @@ class Results:
         if name not in self._joins:
             table = self.tables.get(name, pd.DataFrame())
             if len(table):
-                extra = [item for item in self.scenes if item not in table or item == "scene_id"]
-                scenes = self.scenes[extra]
+                columns = ["scene_id", *self.scenes.columns.difference(table.columns, sort=False)]
+                scenes = self.scenes[columns]
                 table = table.merge(scenes, on="scene_id", how="left", validate="many_to_one")
             self._joins[name] = table if len(table) else pd.DataFrame()
         return self._joins[name]
@@ -73,9 +80,8 @@ class Results:
         here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
         here = seeds_as_one(here)
         order = here.assign(dem=here["answered_method"] == "dem", wears=here["update"] > 0)
-        by = ["usable", "d_m", "dem", "wears", "z0_over_d"]
-        order = order.sort_values(by, ascending=[False] * 4 + [True], kind="stable")
-        return order.sort_values("alpha_deg", kind="stable")
+        by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
+        return order.sort_values(by, ascending=[True, *[False] * 4, True], kind="stable")
 
     def shown(self, scene_id: str) -> Pile:
         """The pile that shows how a scene's grains move: the check by DEM, where one has run."""

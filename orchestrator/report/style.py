@@ -1,9 +1,8 @@
 """How all figures look: settings of matplotlib, sizes, colours by meaning, legends, files."""
 
-import contextlib
-import logging
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import Any, Literal, TypeVar
@@ -91,19 +90,11 @@ class Figure:
         return self.first or (self.data is not None and not self.fold)
 
 
-@contextlib.contextmanager
-def settings() -> Iterator[None]:
-    """Draw by matplotlib's defaults and `RC` alone while the block runs, not by a matplotlibrc."""
-    log = logging.getLogger("matplotlib")
-    level = log.level
-    log.setLevel(logging.ERROR)  # a cache that cannot be kept is of no concern to the user
+def settings() -> AbstractContextManager[None]:
+    """Draw by matplotlib's defaults and `RC` alone while a block runs, not by a matplotlibrc."""
     defaults: dict[Any, Any] = dict(matplotlib.rcParamsDefault)
     del defaults["backend"]  # figures are made without a window
-    try:
-        with matplotlib.rc_context({**defaults, **RC}):
-            yield
-    finally:
-        log.setLevel(level)
+    return matplotlib.rc_context({**defaults, **RC})
 
 
 def palette(column: str, values: Sequence[float]) -> dict[float, str]:

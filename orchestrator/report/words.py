@@ -36,14 +36,9 @@ TELLING = 3
 """Fields beside slope and diameter that a sentence tells of a pile."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
-PACKAGES = (
-    *("gmsh", "jinja2", "matplotlib", "meshio", "numpy"),
-    *("pandas", "pydantic", "pyvista", "scipy", "vtk"),
-)
-EACH = ("alpha_deg", "d_m", "force_law")
-"""Columns that each row of a table of single piles tells."""
-RANGES = ("alpha_deg", "force_law")
-"""Columns that each row of a table of ranges tells."""
+PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
+EACH, RANGES = ("alpha_deg", "d_m", "force_law"), ("alpha_deg", "force_law")
+"""Columns that each row of a table tells, of single piles and of ranges."""
 FLUID = ("rho_f_kg_m3", "nu_m2_s")
 
 
@@ -60,14 +55,13 @@ def text(results: Results) -> str:
 
 
 def sentences(results: Results) -> list[str]:
-    """The answer, from the least slope to the largest; a warning where little is usable."""
-    piles, grains = results.joined("pile_threshold"), results.joined("single_grain")
+    """The answer, from the least slope to the largest, then warnings."""
+    piles, grains = results.joined("pile_threshold"), _single(results)
     table = piles if len(piles) else grains
     if table.empty:
         return []
-    usable = int(table["usable"].sum())
-    count = f"Usable: {usable} of {len(table)} thresholds."
-    warnings = [count] if usable < len(table) else []
+    count, usable = len(table), table["usable"].sum()
+    warnings = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
     if piles.empty:
         return [*_grains(grains), *warnings]
     hills, ends = list(_hills(results)), []
@@ -79,7 +73,7 @@ def sentences(results: Results) -> list[str]:
     telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:TELLING]
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
-        warnings.append(caption("frozen", beyond=beyond, count=len(piles), limit=FROZEN_BED))
+        warnings.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
     chosen = [d for d in results.plan.decisions.values() if d.by_default]
     if chosen:
         names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
@@ -97,9 +91,9 @@ def sentences(results: Results) -> list[str]:
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
-    size, others = f"d = {labels.millimetres(row['d_m'])}", labels.told(row, telling)
-    name = ", ".join([labels.value("alpha_deg", row["alpha_deg"]), size, *others])
-    return caption("pile", row=row, name=name, single=single, flow=_flow(row, row["ustar0_m_s"]))
+    slope = labels.value("alpha_deg", row["alpha_deg"])
+    name = ", ".join([slope, *labels.told(row, ["d_m", *telling])])
+    return caption("pile", row=row, name=name, single=single, flow=_flow(row))
 
 
 def _grains(grains: pd.DataFrame) -> Iterator[str]:
@@ -109,15 +103,13 @@ def _grains(grains: pd.DataFrame) -> Iterator[str]:
     here = here.sort_values("d_m", kind="stable")
     for at in sorted({0, len(here) - 1}):
         row = here.iloc[at]
-        by = "closed_form" if pd.isna(row["ustar_m_s"]) else "dem"
-        flow = _flow(row, row["ustar_closed_form_m_s" if by == "closed_form" else "ustar_m_s"])
-        size, slope = labels.millimetres(row["d_m"]), labels.value("alpha_deg", row["alpha_deg"])
-        shields = row[f"shields_{by}"]
-        yield caption("one_grain", row=row, size=size, slope=slope, shields=shields, flow=flow)
+        size, slope = (labels.value(column, row[column]) for column in ("d_m", "alpha_deg"))
+        yield caption("one_grain", row=row, size=size, slope=slope, flow=_flow(row))
 
 
-def _flow(row: pd.Series, ustar: float) -> str:
+def _flow(row: pd.Series) -> str:
     """A friction velocity with a speed that is measured: of a channel's mean, or of the wind."""
+    ustar = row["ustar0_m_s"]
     if pd.notna(row.get("mean_speed_m_s")):
         speed, depth = row["mean_speed_m_s"], row["depth_m"]
         return f"u* {ustar:.2g} m/s, {speed:.2g} m/s in the mean over {depth:g} m of depth"
@@ -130,7 +122,7 @@ def _flow(row: pd.Series, ustar: float) -> str:
 def _hills(results: Results) -> Iterator[str]:
     """Where reversed flow ends behind each hill that others measured, by model and as measured."""
     for hill, rows in measured_hills(results):
-        names = [labels.value("turbulence_model", name) for name in rows["turbulence_model"]]
+        names = labels.cells(rows, ["turbulence_model"]).popitem()[1]
         ends = dict(zip(names, rows["reattachment_over_h"], strict=True))
         measured = rows["measured_reattachment_over_h"].iloc[0]
         facts = {"measured": measured, "verified": rows["measured_verified"].all()}
@@ -158,92 +150,64 @@ def piles(results: Results) -> pd.DataFrame | None:
     keys = [*EACH, "z0_over_d", "nu_m2_s"]
     keys += [*labels.varying(rows, *keys, "fraction"), "seed", "fraction"]
     keys = [key for key in keys if key != "seed" or rows[key].nunique() > 1]
-    return _thresholds(rows, keys, "τ_c", more=("count", "case"))
+    return _thresholds(rows, keys, more=("count", "case"))
 
 
 def grains(results: Results) -> pd.DataFrame | None:
     """By slope, force law, fluid and method: the range of the thresholds of single grains."""
+    rows = _single(results)
+    return None if rows.empty else _thresholds(rows, [*RANGES, "by"])
+
+
+def _single(results: Results) -> pd.DataFrame:
+    """Single grains with their thresholds: by DEM, or else by the closed form."""
     rows = results.joined("single_grain")
     if rows.empty:
-        return None
-    dem = rows["answered_method"] == "dem"
-    values = {
-        f"shields{end}": rows[f"shields_dem{end}"].where(dem, rows["shields_closed_form"])
-        for end in ("", "_low", "_high")
-    }
-    values["ustar0_m_s"] = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
-    by = dem.map({True: "DEM", False: "closed form"})
-    return _thresholds(rows.assign(by=by, **values), [*RANGES, "by"], "τ_c")
+        return rows
+    dem, ends = rows["answered_method"] == "dem", ("", "_low", "_high")
+    exact = rows["shields_closed_form"]
+    values = {f"shields{end}": rows[f"shields_dem{end}"].where(dem, exact) for end in ends}
+    ustar = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
+    return rows.assign(ustar0_m_s=ustar, by=np.where(dem, "DEM", "closed form"), **values)
 
 
 def _thresholds(
-    rows: pd.DataFrame, keys: Sequence[str], tau: str, more: Sequence[str] = ()
+    rows: pd.DataFrame, keys: Sequence[str], tau: str = "τ_c", more: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """A row for all thresholds that agree in some columns: the ranges of the usable ones.
+    """A row for all thresholds that agree in some columns: the range of those that are usable.
 
-    Of single piles of which none is usable all are told. `more` are columns at the end.
+    A single pile is told even so. `more` are columns at the end.
     """
     ranges = "d_m" not in keys
     if ranges:  # fluids are never merged
         keys = [*keys, *(name for name in FLUID if rows[name].nunique() > 1)]
     rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
-    by = [rows[key] for key in keys]
-    groups = rows.groupby(by, dropna=False, sort=False)
-    count, usable, first = groups.size(), groups["usable"].sum(), groups.first()
-    told = rows["usable"] | (~groups["usable"].transform("any") & (not ranges))
-    shown = rows.select_dtypes("number").where(told).groupby(by, dropna=False, sort=False)
-    low, high = shown.min(), shown.max()
-
-    def span(form: str, *columns: str) -> list[str]:
-        values = pd.concat([low[list(columns)], high[list(columns)]], axis=1).to_numpy()
-        ends = zip(values.min(axis=1), values.max(axis=1), strict=True)
-        texts = (dict.fromkeys(format(float(end), form) for end in pair) for pair in ends)
-        return ["—" if "nan" in text else " … ".join(text) for text in texts]
-
-    index = first.index.to_frame(index=False)
-    table = {labels.words(key).label: [labels.value(key, v) for v in index[key]] for key in keys}
+    number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
+    usable, d = (rows[name].groupby(number) for name in ("usable", "d_m"))
+    shown = rows[rows["usable"] | ~usable.transform("any")].groupby(number)
+    low, high, first = shown.min(numeric_only=True), shown.max(numeric_only=True), shown.first()
+    table: dict[str, Any] = labels.cells(first, keys)
     if ranges:
-        sizes = zip(groups["d_m"].min(), groups["d_m"].max(), strict=True)
-        texts = (dict.fromkeys(f"{1e3 * d:g}" for d in ends) for ends in sizes)
-        table["diameter, mm"] = [" … ".join(text) for text in texts]
-    table[tau] = span(".4f", "shields")
-    table["interval"] = span(".4f", "shields_low", "shields_high")
+        low[~usable.any()] = np.nan
+        table["diameter, mm"] = _spans(1e3 * d.min(), 1e3 * d.max(), "g")
+    table[tau] = _spans(low["shields"], high["shields"], ".4f")
+    table["interval"] = _spans(low["shields_low"], high["shields_high"], ".4f")
     if "shields_model_low" in rows and not ranges:
-        wide = span(".3f", "shields_model_low", "shields_model_high")
+        wide = _spans(low["shields_model_low"], high["shields_model_high"], ".3f")
         shares = zip(wide, first["model_share"], strict=True)
         table["model's interval"] = [f"{a}, most by {b}" if a != "—" else a for a, b in shares]
-    table["u*₀, m/s"] = span(".3f", "ustar0_m_s")
-    ends = zip(usable, count, first["why_not"], strict=True)
+    table["u*₀, m/s"] = _spans(low["ustar0_m_s"], high["ustar0_m_s"], ".3f")
     table["usable"] = [
-        f"{n} of {of}" if ranges or (n and of > 1) else "yes" if n else f"no: {why}"
-        for n, of, why in ends
+        f"{n} of {of}" if ranges or of > 1 else "yes" if n else f"no: {why}"
+        for n, of, why in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
     ]
-    return pd.DataFrame({**table, **{name: first[name].map(str).tolist() for name in more}})
+    return pd.DataFrame({**table, **{name: first[name] for name in more}})
 
 
-def single_grains(results: Results) -> pd.DataFrame | None:
-    """How far DEM is from the closed form, by force law, whether it holds, and protocol."""
-    rows = by_dem(results.joined("single_grain"))
-    if rows.empty:
-        return None
-    exact = rows["ustar_closed_form_m_s"]
-    off = rows["ustar_m_s"] / exact - 1
-    width = (rows["ustar_high_m_s"] - rows["ustar_low_m_s"]) / exact / 2
-    keys = {
-        "force law": [labels.value("force_law", name) for name in rows["force_law"]],
-        "law holds": np.where(valid(rows), "yes", "no"),
-        "protocol": np.where(held(rows), "holds", "ramps"),
-    }
-    values = {"off": off, "size": off.abs(), "width": width}
-    groups = pd.DataFrame({**keys, **values}).groupby([*keys])
-    table = {
-        "grains": groups.size().map(str),
-        "never moved": (groups.size() - groups["off"].count()).map(str),
-        "mean of u*/u*(closed form) − 1": groups["off"].mean().map("{:+.3%}".format),
-        "largest |u*/u*(closed form) − 1|": groups["size"].max().map("{:.3%}".format),
-        "median half width of the interval": groups["width"].median().map("±{:.3%}".format),
-    }
-    return pd.DataFrame(table).reset_index()
+def _spans(low: pd.Series, high: pd.Series, form: str) -> list[str]:
+    """The range between each two values as a text, one number where they are written alike."""
+    pairs = ([format(float(end), form) for end in pair] for pair in zip(low, high, strict=True))
+    return ["—" if "nan" in pair else " … ".join(dict.fromkeys(pair)) for pair in pairs]
 
 
 def force_laws(results: Results) -> pd.DataFrame:
@@ -266,26 +230,21 @@ def parameters(results: Results) -> pd.DataFrame:
         asked, run = _values(results.scenes[column]), fields.ANSWERED + column
         answered = _values(results.scenes[run]) if run in fields.ANSWERS else asked
         if asked or answered:
-            symbol = item.info.symbol.replace("_0", "₀")
-            name = f"{item.info.label}, {symbol}" if symbol else item.info.label
-            other = "" if answered == asked else answered
+            words = filter(None, (item.info.label, item.info.symbol.replace("_0", "₀")))
+            name, other = ", ".join(words), "" if answered == asked else answered
             rows.append((name, item.info.unit, item.name or column, asked or "default", other))
     head = ["parameter", "unit", "in a study file", "asked for", "answered with, if otherwise"]
     return pd.DataFrame(rows, columns=head)
 
 
 def _values(column: pd.Series) -> str:
+    """The different values of a column, or how many there are and their range."""
     values = list(column.dropna().unique())
     if all(isinstance(value, str) for value in values):
         return ", ".join(sorted(values))
     listed = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
     many = f"{len(listed)} from {listed[0]} to {listed[-1]}"
     return ", ".join(listed) if len(listed) <= FEW else many
-
-
-def programs(results: Results) -> pd.DataFrame:
-    """The solvers by what the cases say of them, and the libraries."""
-    return versions(case.programs(results.cases, results.plan.cases))
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
@@ -299,14 +258,11 @@ def times(timings: pd.DataFrame) -> pd.DataFrame | None:
     """Wall time of the finished cases by their kind: in the solver, and outside it."""
     if timings.empty:
         return None
-    every = pd.concat([timings, timings.assign(kind="all")])
-    wall = every["solver_s"] + every["outside_s"]
-    groups = every.assign(wall=wall).groupby("kind", sort=False)
+    rows = timings.assign(wall=timings["solver_s"] + timings["outside_s"])
+    groups = pd.concat([rows, rows.assign(kind="all")]).groupby("kind", sort=False)
     sums = groups.agg({"case": "size", "solver_s": "sum", "outside_s": "sum", "wall": "max"})
-    seconds = sums[["solver_s", "outside_s", "wall"]].map("{:.1f}".format)
-    table = pd.concat([sums["case"].astype(str), seconds], axis=1).reset_index()
     head = ["kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s"]
-    return table.set_axis(head, axis=1)
+    return sums.reset_index().set_axis(head, axis=1)
 
 
 def levels(results: Results) -> pd.DataFrame | None:
@@ -315,9 +271,8 @@ def levels(results: Results) -> pd.DataFrame | None:
     table = results.joined("pile_threshold")
     for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
         meaning, error = fidelity.meaning([str(flow), str(grain)]), group["error_estimate"].max()
-        known = "not known" if pd.isna(error) else f"{error:.1%}"
-        rows.append((f"{flow} | {grain}", meaning, why, str(group["scene_id"].nunique()), known))
-    head = ["flow | grains", "description", "reason", "piles", "known error of τ_c, up to"]
+        rows.append((f"{flow} | {grain}", meaning, why, group["scene_id"].nunique(), 100 * error))
+    head = ["flow | grains", "description", "reason", "piles", "known error of τ_c, at most, %"]
     return pd.DataFrame(rows, columns=head) if rows else None
 
 
@@ -326,48 +281,45 @@ def checks(results: Results) -> pd.DataFrame | None:
     table = results.tables.get("check", pd.DataFrame())
     if table.empty:
         return None
-    keys, dem = ["alpha_deg", "packing", "force_law", "d_m", "fraction"], table["shields_dem"]
-    ends = zip(dem, table["shields_dem_low"], table["shields_dem_high"], strict=True)
     cells = {
-        **{labels.words(key).label: [labels.value(key, v) for v in table[key]] for key in keys},
-        "τ_c": table["shields"].map("{:.4g}".format),
-        "by DEM": [f"{tau:.4g} ({low:.4g} … {high:.4g})" for tau, low, high in ends],
-        "difference": table["difference"].map("{:+.1%}".format),
-        "agree": table["agree"].map({True: "yes", False: "no"}),
-        "case": table["case"].map(str),
+        **labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"]),
+        "τ_c": table["shields"],
+        "by DEM": table["shields_dem"],
+        "interval of DEM": _spans(table["shields_dem_low"], table["shields_dem_high"], ".4g"),
+        "difference, %": 100 * table["difference"],
+        "agree": table["agree"],
+        "case": table["case"],
     }
     return pd.DataFrame(cells)
 
 
 def remarks(results: Results) -> dict[str, Any]:
-    """Counts that a reader must know before using this study's results; 0 or None is no remark."""
+    """Counts that a reader must know before using this study's results; 0 is no remark."""
     scenes, thresholds = results.scenes, results.joined("pile_threshold")
     outside = scenes[~valid(scenes)]
     both = outside["force_law"].isin(theory.PAIR) & (outside["regime"] == "transition")
     counts: dict[str, Any] = {
         "outside": len(outside),
-        "transition": int(both.sum()),
-        "unreached": int(thresholds["shields"].isna().sum()) if len(thresholds) else 0,
+        "transition": both.sum(),
+        "unreached": thresholds["shields"].isna().sum() if len(thresholds) else 0,
         "thresholds": len(thresholds),
         "far": (0, 0),
         "silent": 0,
     }
     curve = results.tables.get("pile_curve", pd.DataFrame())
     for name in ("carried_off", "fallen_upstream"):
-        largest = curve.groupby("scene_id")[name].max() if len(curve) else pd.Series(dtype=int)
-        counts[name] = (int((largest > 0).sum()), int(largest.max() if len(largest) else 0))
+        largest = curve.groupby("scene_id")[name].max() if len(curve) else pd.Series([0])
+        counts[name] = (largest > 0).sum(), largest.max()
     grains = by_dem(results.joined("single_grain"))
     if len(grains):
         ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]
         far = ((ratio - 1).abs() > 0.01) & held(grains)
-        counts["far"] = (int(far.sum()), int((far & valid(grains)).sum()))
-        counts["silent"] = int(ratio.isna().sum())
+        counts |= {"far": (far.sum(), (far & valid(grains)).sum()), "silent": ratio.isna().sum()}
     return counts
 
 
 SHEETS: tuple[Callable[[Results], Any], ...] = (
-    *(short, piles, grains, single_grains, levels, checks, remarks, force_laws, parameters),
-    programs,
+    *(short, piles, grains, levels, checks, remarks, force_laws, parameters),
 )
 """The parts of the page that its template knows by the names of these functions."""
 
@@ -378,26 +330,21 @@ def contents(
     """The words and numbers of the page beside its figures, by the names of its template."""
     from orchestrator.report import flows, measured  # both import what draws
 
-    methods, root = set(results.scenes["answered_method"]), results.cases
-    piles = results.plan.piles.values()
+    root, piles = results.cases, results.plan.piles.values()
     names = [name for name in results.plan.cases if (root / name).is_dir()]
-    foams = (path for name in names for path in sorted((root / name).glob("*.foam")))
-    foam = next(foams, None)
     return {
         **{sheet.__name__: sheet(results) for sheet in SHEETS},
         "results": results,
         "title": results.study.title,
         "answer": sentences(results),
         "measured": measured.section(results),
+        "programs": versions(case.programs(root, results.plan.cases)),
         "times": times(timings),
         "failures": failures,
         "links": {name: quote(f"{root.name}/{name}/") for name in names},
         "paper_pair": results.scenes["force_law"].isin(theory.PAIR).any(),
         "eq10": flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else None,
-        "by_dem": "dem" in methods,
-        "without_dem": methods - {"dem"},
+        "methods": set(results.scenes["answered_method"]),
         "mixed": any(pile.scene.grain.sizes is not None for pile in piles),
         "strips": any(pile.bed.width for pile in piles),
-        "example_case": names[-1] if names else "NAME",
-        "example_foam": f"{foam.parent.name}/{foam.name}" if foam else "",
     }

@@ -201,16 +201,6 @@ def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
     assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (3 if rows == 1 else 1)
 
 
-def test_the_stress_on_grains_is_not_joined_across_a_gap(results: Results) -> None:
-    grains = results.tables["pile_grain"].sort_values("s_m")
-    gap = grains.drop(grains.index[10:20])
-    (figure,) = flows.stress(changed(results, pile_grain=gap))
-    (line,) = marked(axes_of(figure)[0], "grains")
-    felt = np.asarray(line.get_ydata(), float)
-    assert np.isnan(felt).sum() == 1
-    assert len(felt) == len(gap) + 1
-
-
 def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
     two = copies(results, {}, {"turbulence_model": "RNGkEpsilon"})
     pile = two.plan.piles["copy 0"]

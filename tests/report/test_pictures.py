@@ -1,13 +1,10 @@
 """Pictures of flow, mesh, bed and hills, from their study file to what is drawn."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator.bed.line import BedLine
-from orchestrator.errors import SolverError
 from orchestrator.report import bed, flows
 from orchestrator.report.bed import Steps
 from orchestrator.report.results import FRACTION, Results
@@ -77,9 +74,8 @@ def hills(tmp_path_factory: Studies) -> Results:
 def test_field_is_that_of_the_flow(results: Results) -> None:
     (figure,) = flows.flow(results)
     (pile,) = results.plan.piles.values()
-    shown = (-0.02, 0.1, 0.0, 0.03)
-    velocity = flows.velocity(results.cases / pile.flow.name, shown, (60, 240))
-    speed = np.linalg.norm(velocity, axis=-1) / 10.0
+    velocity = flows.over_u_e(pile, results.cases, (-0.02, 0.1, 0.0, 0.03), 1.0, 240)
+    speed = np.linalg.norm(velocity, axis=-1)
     assert 0.7 < speed[-1].min() < speed[-1].max() < 1.2
     # outside: the triangle of the pile, 0.01 m high and 2 · 0.01/tan 15° wide
     area = 0.01**2 / np.tan(np.radians(15))
@@ -107,11 +103,6 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     for ax in figure.canvas.axes:
         (line_,) = (line for line in ax.lines if line.get_gid() == "mesh")
         assert 30 < len(np.asarray(line_.get_xdata())) // 3 < len(edges)
-
-
-def test_a_case_without_results_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SolverError, match="no results"):
-        flows.velocity(tmp_path, (0.0, 1.0, 0.0, 1.0), (2, 2))
 
 
 @pytest.fixture(scope="module")
@@ -165,29 +156,12 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 
-@pytest.mark.parametrize(
-    ("x", "z", "marks"),
-    [
-        ((-5, 0, 4, 6, 10), (0, 0, 1, 0, 0), {"toe": 0, "crest": 4, "lee toe": 6}),
-        ((-5, 0, 4, 10), (0, 0, 1, 1), {"toe": 0, "crest": 4}),
-        ((-5, 0, 4, 10), (0, 0, -1, -1), {"crest": 0, "lee toe": 4}),
-        ((-5, 0, 10), (0, 0, 0), {}),
-    ],
-)
-def test_marks_are_where_the_form_is(
-    x: tuple[float, ...], z: tuple[float, ...], marks: dict[str, float]
-) -> None:
-    line = BedLine(x, z, 1.0)
-    assert {name: line.x[at] for name, at in flows.corners(line).items()} == marks
-
-
-def test_the_lee_toe_of_a_noisy_profile_is_not_the_end_of_its_file() -> None:
-    x = np.linspace(0, 20, 401)
-    noise = np.random.default_rng(0).normal(0, 0.01, len(x))
-    z = np.interp(x, [0, 3, 14.5, 17, 20], [0, 0, 1, 0, 0]) + noise
-    line = BedLine((-5, *x, 25), (z[0], *z, z[-1]), 1.0)
-    marks = {name: line.x[at] for name, at in flows.corners(line).items()}
-    assert marks == pytest.approx({"toe": 3, "crest": 14.5, "lee toe": 17}, abs=0.6)
+def test_marks_are_where_the_form_is(results: Results, level: Results) -> None:
+    (pile,) = results.plan.piles.values()
+    half = 0.01 / np.tan(np.radians(15))
+    assert flows.marks(pile) == pytest.approx({"toe": 0, "crest": half, "lee toe": 2 * half})
+    (flat,) = level.plan.piles.values()
+    assert flows.marks(flat) == {}
 
 
 def test_no_program_is_named_that_did_not_run(level: Results, results: Results) -> None:
