@@ -14,7 +14,7 @@ __all__ = ["open", "run", "threshold"]
 
 
 def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])
+    return ["__version__", *__all__]
 
 
 def __getattr__(name: str) -> Any:

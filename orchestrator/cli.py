@@ -2,19 +2,18 @@
 
 import argparse
 import os
-import re
 import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
 from orchestrator.calculator import cli as calculator
-from orchestrator.errors import Fault, of_exception
+from orchestrator.errors import Fault, InputError, of_exception
 from orchestrator.runs import terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
 
@@ -26,16 +25,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
     terminal.listen()
     terminal.take()
-    # numpy raises at import where this variable is not an integer
-    if not re.fullmatch("[0-9]{1,11}", os.environ.get("SOURCE_DATE_EPOCH", "0")):
-        del os.environ["SOURCE_DATE_EPOCH"]
-    # matplotlib raises where this one names no backend; figures are drawn without a window
-    os.environ.pop("MPLBACKEND", None)
+    for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):
+        # numpy and matplotlib raise at import where these are odd; figures need neither
+        os.environ.pop(name, None)
     warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
     options = _parser().parse_args(arguments)
     try:
+        if getattr(options, "workers", 1) < 1:
+            raise InputError("at least 1", "--workers")
         code = int(options.run(options))
     except (Exception, KeyboardInterrupt) as error:
         failure = of_exception(error)
@@ -53,21 +52,11 @@ def _say(message: object) -> None:
     print(f"orchestrator: {message}", file=sys.stderr)
 
 
-class Parser(argparse.ArgumentParser):
-    """A parser that takes options by their whole names alone, and negative numbers as values."""
-
-    def __init__(self, **settings: Any) -> None:
-        super().__init__(**{**settings, "allow_abbrev": False})
-        # that of Python 3.14; before, -1e-3 and -30:30:7 count as options
-        self._negative_number_matcher = re.compile(r"-\.?\d")
-
-
-def _parser() -> Parser:
+def _parser() -> argparse.ArgumentParser:
     about = "When does a sediment grain, or a whole bedform of grains, start to move?"
-    parser = Parser(prog="orchestrator", description=about)
+    parser = argparse.ArgumentParser(prog="orchestrator", description=about)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
-
     for name, run, text in (
         ("study", _study, "run what is missing of a study, and draw it"),
         ("status", _on_directory, "what of a study is done, running, failed and why"),
@@ -91,7 +80,7 @@ def _parser() -> Parser:
                 add("source", nargs="?", default=default, metavar="FILE|PRESET", help=text)
             count = os.cpu_count() or 1
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
-            add("--workers", type=_workers, default=count, metavar="N", help="cases at a time")
+            add("--workers", type=int, default=count, metavar="N", help="cases at a time")
             text = "say what would run, how long and how large, and end"
             add("--plan", action="store_true", help=text)
         if run == _study:
@@ -104,69 +93,53 @@ def _parser() -> Parser:
     return parser
 
 
-def _workers(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError("at least 1")
-    return number
-
-
 def _study(options: Namespace) -> int:
     from orchestrator.runs import workspace
 
-    again = "every case was done already; no solver was started"
     asked = options.source, options.out, options.tolerance
     if not options.plan and (answer_and_page := workspace.finished(*asked)):
-        print(again, file=sys.stderr)
+        print("every case was done already; no solver was started", file=sys.stderr)
         print(*answer_and_page, sep="\n")
         return 0
     from orchestrator import face, pipeline, plan
 
     study = face.load(options.source, options.tolerance, "--tolerance")
-    out, workers = options.out or Path("results") / study.name, options.workers
+    out = options.out or Path("results") / study.name
     if options.plan:
-        cases = workspace.Workspace(out.absolute()).cases
-        print("\n".join(plan.forecast(study, cases, workers)))
+        lines = plan.forecast(study, out.absolute() / "cases", options.workers)
+        print("\n".join(lines))
         return 0
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
-    finished = pipeline.run(study, out, workers=workers, queue=queue, guests=face.GUESTS)
-    if not finished.started:
-        print(again, file=sys.stderr)
-    if finished.left:
-        what = f"the study file has changed: {len(finished.left)} cases are not asked for any more"
-        print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
-    return _end(finished)
+    return _end(pipeline.run(study, out, workers=options.workers, queue=queue))
 
 
 def _experiment(options: Namespace) -> int:
     """Run an experiment; all but the maps of stability are on the scenes of a study."""
     from orchestrator import face, plan
-    from orchestrator.runs.workspace import Workspace
 
     module = import_module(f"orchestrator.experiments.{options.command}")
     out = options.out or Path("results") / options.command
     studies = [face.load(options.source)] if "source" in options else []
     experiment = module.experiment(*studies, out)
     if options.plan:
-        cases = Workspace(out.absolute()).cases
-        print("\n".join(plan.expected(experiment.planned, cases, options.workers)))
+        lines = plan.expected(experiment.planned, out.absolute() / "cases", options.workers)
+        print("\n".join(lines))
         return 0
     return _end(experiment.run(out, workers=options.workers))
 
 
 def _on_directory(options: Namespace) -> int:
-    directory: Path = options.directory
     if options.command == "status":
         from orchestrator.runs import workspace
 
-        text, has_failed = workspace.status(directory)
+        text, has_failed = workspace.status(options.directory)
         print(text)
         return 3 if has_failed else 0
-    from orchestrator import face, gallery, pipeline
+    from orchestrator import gallery, pipeline
 
     if options.command == "report":
-        return _end(pipeline.redraw(directory, face.GUESTS))
-    print((gallery.write if options.command == "gallery" else pipeline.prune)(directory))
+        return _end(pipeline.redraw(options.directory))
+    print((gallery.write if options.command == "gallery" else pipeline.prune)(options.directory))
     return 0
 
 

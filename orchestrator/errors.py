@@ -11,10 +11,8 @@ from typing import ClassVar
 
 LONGEST = 400
 """Characters of a message's place, cause and remedy, each."""
-_REMEDIES = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room, then the same command continues"),
-    errno.EACCES: "see its owner and mode, and those of its directory: ls -ld",
-    errno.EPERM: "is it immutable, or another user's? See lsattr -d and ls -ld",
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_REMEDIES = dict.fromkeys(_FULL, "make room, then the same command continues") | {
     errno.EMFILE: "raise the limit: ulimit -n 1024",
     errno.ENOMEM: "free memory, or raise its limit: ulimit -v",
     errno.EAGAIN: "too many processes? See ulimit -u",
@@ -88,17 +86,6 @@ class Interrupted(OrchestratorError):  # noqa: N818
     exit_code = 130
 
 
-def of_system(error: OSError, where: str = "") -> OrchestratorError:
-    """The message of a failure of the system, at `where` or the file that the error names."""
-    # shutil collects the failure of each file: the first one is given
-    text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
-    number = errno.ENOSPC if "No space left" in (text or "") else error.errno or 0
-    text = "no space is left on the disk" if number == errno.ENOSPC else text
-    file = "" if isinstance(error.filename, int | None) else os.fsdecode(error.filename)
-    remedy = _REMEDIES.get(number, "see the file system")
-    return OrchestratorError(text or str(error), where or file, remedy)
-
-
 def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
     """The message of any exception: of the system, of a shortage, of a library, or a `Fault`."""
     frames = traceback.extract_tb(error.__traceback__)
@@ -110,7 +97,12 @@ def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
         reason = "; or no thread can be started: see ulimit -u" if is_at_import else ""
         return Interrupted(f"stopped; the same command continues{reason}")
     if isinstance(error, OSError):
-        return of_system(error, "" if error.filename else where)
+        # shutil collects the failure of each file: the first one is given
+        text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
+        number = errno.ENOSPC if "No space left" in (text or "") else error.errno or 0
+        what = "no space is left on the disk" if number == errno.ENOSPC else text or str(error)
+        file = "" if isinstance(error.filename, int | None) else os.fsdecode(error.filename)
+        return OrchestratorError(what, file or where, _REMEDIES.get(number, ""))
     if "can't start new thread" in str(error):
         what, remedy = "no more threads can be started", "fewer --workers, or ulimit -u"
     elif isinstance(error, MemoryError) or (is_at_import and "failed to map" in str(error)):
@@ -133,8 +125,7 @@ def unknown_key(
     `elsewhere` has keys of other places, each with the way it is written there.
     """
     same = [written for name, written in elsewhere if name == key]
-    far = difflib.get_close_matches(key, [name for name, _ in elsewhere], n=1, cutoff=0.7)
-    near = difflib.get_close_matches(key, known, n=1)
-    close = same or near or [written for name, written in elsewhere if name in far]
+    names = dict(elsewhere) | {name: name for name in known}
+    close = same or [names[name] for name in difflib.get_close_matches(key, names, n=1)]
     meant, listed = f"did you mean {' or '.join(close)}?", f"known keys: {', '.join(sorted(known))}"
     return InputError("unknown key", where, meant if close else listed)

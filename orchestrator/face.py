@@ -1,7 +1,7 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +21,6 @@ from orchestrator.study.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GUESTS = (paper.report_card,)
-"""Guests that add to the page of a study."""
-
 
 def threshold(
     diameter: ArrayLike,
@@ -41,58 +38,43 @@ def threshold(
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    Parameters
-    ----------
-    diameter, density, fluid_density, viscosity, gravity : array_like
-        d, m; densities of grain and fluid, kg/m3; kinematic viscosity, m2/s; m/s2.
-    slope_deg, entrainment_angle_deg : array_like
-        Slope that the flow goes up, and the angle of the contact that a grain rolls over, degrees.
-    roughness : array_like
-        Roughness length z0, m, or a part of the diameter such as ``d/10``.
-    lift_coefficient : array_like
-        Coefficient of Saffman's lift.
-    depth : array_like, optional
-        Depth of a liquid, m: for its mean velocity.
-    law : str or None
-        A force law, or ``paper`` for the paper's rule; None: every law.
+    Arguments are numbers or arrays that broadcast together: diameter, m; densities, kg/m3;
+    kinematic viscosity, m2/s; the slope that the flow goes up, and the angle of the contact that a
+    grain rolls over, degrees; roughness length z0, m, or a part of the diameter such as ``d/10``;
+    coefficient of Saffman's lift; gravity, m/s2; depth of a liquid, m, for its mean velocity. `law`
+    is a force law, ``paper`` for the paper's rule, or None: every law.
 
     Returns
     -------
     DataFrame
-        The arrays broadcast together and are raveled: one row for each point, or for each point
-        and law, with units in the columns' names; ``valid`` and ``why_not`` say where a law ends.
+        A row for each point of the raveled arrays, or for each point and law, with units in the
+        columns' names; ``valid`` and ``why_not`` say where a law ends.
 
     Raises
     ------
     InputError
         For a point that is no scene, a law that is none, or if no law holds at any point.
     """
-    given = {name: values for name, values in locals().items() if name != "law"}
+    given: dict[str, Any] = {**locals()}
+    del given["law"]
     if depth is None:
         del given["depth"]
+    for name, values in given.items():
+        try:  # a roughness may have texts such as d/30
+            given[name] = np.asarray(values, object if name == "roughness" else float)
+        except (TypeError, ValueError):
+            what = f"{values!r} is neither a number nor an array of numbers"
+            raise InputError(what, where=name) from None
     try:
-        arrays = np.broadcast_arrays(*(_array(values, name) for name, values in given.items()))
+        arrays = np.broadcast_arrays(*given.values())
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
     if not arrays[0].size:
         raise InputError("an array without values", where="threshold")
-    points = pd.DataFrame(dict(zip(given, map(np.ravel, arrays), strict=True)))
-    answer = "bridged" if law is None else law
-    calculator.check_law(answer)
-    table = calculator.thresholds(points, answer)
-    chosen = table if law is None else table[table["answer"]]
+    points = dict(zip(given, map(np.ravel, arrays), strict=True))
+    rows = pd.DataFrame(calculator.thresholds(points, law or "bridged"))
+    chosen = rows if law is None else rows[rows["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)
-
-
-def _array(values: Any, name: str) -> np.ndarray[Any, Any]:
-    """An argument as an array of numbers; a roughness may have texts such as ``d/30``."""
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        if name == "roughness":
-            return np.asarray(values, dtype=object)
-        what = f"{values!r} is neither a number nor an array of numbers"
-        raise InputError(what, where=name) from None
 
 
 def run(
@@ -119,7 +101,7 @@ def run(
         raise InputError(f"{workers} is below 1", where="workers")
     asked = load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
-    finished = pipeline.run(asked, place, workers=workers, guests=GUESTS)
+    finished = pipeline.run(asked, place, workers=workers)
     if finished.failures:
         name, error = next(iter(finished.failures.items()))
         what = f"{len(finished.failures)} cases failed; {name}: {error}"
@@ -171,11 +153,6 @@ class Opened:
         """The answer, in words and a short table."""
         return report.said(self._results)
 
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The answer, in words alone."""
-        return tuple(self.answer.split("\n\n")[-1].splitlines())
-
     def case(self, name: str) -> Path:
         """The directory of the one case whose name begins so; else an `InputError`."""
         names = [case for case in self._results.plan.cases if case.startswith(name)]
@@ -185,18 +162,18 @@ class Opened:
         return self._results.cases / names[0]
 
 
+@dataclass(frozen=True)
 class Plots:
     """Figures of a study."""
 
-    def __init__(self, results: Results) -> None:
-        self._results = results
+    results: Results
 
     def shields(self) -> "Figure":
         """The extended Shields diagram of the page; an `OrchestratorError` if there is none."""
         from orchestrator.report import shields, style
 
         with style.settings():
-            for figure in shields.draw(self._results):
+            for figure in shields.draw(self.results):
                 if figure.canvas:
                     return figure.canvas
-        raise OrchestratorError("there is nothing to draw", where=str(self._results.cases.parent))
+        raise OrchestratorError("there is nothing to draw", str(self.results.cases.parent))

@@ -28,9 +28,9 @@ def write(directory: Path) -> Path:
             continue
         try:
             opened = face.open(study)
-            title, says = opened.title, opened.sentences
+            title, says = opened.title, opened.answer.split("\n\n")[-1].splitlines()
         except OrchestratorError as error:
-            title, says = study.name, (error.what,)
+            title, says = study.name, [error.what]
         figures = [path for name in PICTURES for path in sorted((study / FIGURES).glob(name))]
         image = figures[0].read_bytes() if figures else b""
         link = quote(f"{study.name}/{PAGE}")

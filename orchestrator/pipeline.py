@@ -3,17 +3,16 @@
 import os
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from orchestrator import plan, report, tables
+from orchestrator import paper, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.fidelity import limits
 from orchestrator.plan import Plan
-from orchestrator.report import Guest
 from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
 from orchestrator.runs.case import Case
@@ -27,29 +26,18 @@ Failures = Mapping[str, OrchestratorError]
 
 
 class Finished(NamedTuple):
-    """Outcome of a study: its page, the number of cases that were run, and those that failed.
-
-    `left` are the cases that the study file does not ask for any more; the answer is a text.
-    """
+    """Outcome of a command: its page, number of cases that were run, failures, answer as a text."""
 
     page: Path
     started: int
     failures: Failures
-    left: tuple[str, ...] = ()
     answer: str = ""
 
 
-def run(
-    study: Study,
-    out: Path,
-    *,
-    workers: int,
-    queue: Queue | None = None,
-    guests: Sequence[Guest] = (),
-) -> Finished:
+def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
     """Run a study, or what is missing of it, in a directory; `workers` cases at a time.
 
-    A queue of a cluster runs the cases in place of this machine; guests may add to the page.
+    A queue of a cluster runs the cases in place of this machine.
 
     Raises
     ------
@@ -73,13 +61,17 @@ def run(
             planned = plan.settled(study, space.cases, first)
             _describe(space, study, planned)
             states |= planned.done(space.cases, but=states)
-        answer = space.answer(_ids(planned))
+        if not started:
+            print("every case was done already; no solver was started", file=sys.stderr)
+        answer = space.answer(planned.ids)
         if started or answer is None:
             failures = {name: error for name, error in failures.items() if name in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
-            answer = _draw(study, planned, space, states, failures, guests)
-        left = space.left(planned.cases) if changed else ()
-        return Finished(space.page, started, failures, left, answer)
+            answer = _draw(study, planned, space, states, failures)
+        if changed and (left := space.left(planned.cases)):
+            what = f"the study file has changed: {len(left)} cases are not asked for any more"
+            print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
+        return Finished(space.page, started, failures, answer)
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -129,7 +121,7 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     return study, plan.settled(study, space.cases)
 
 
-def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
+def redraw(out: Path) -> Finished:
     """Make tables, figures and page again from the cases that are done."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
@@ -138,8 +130,8 @@ def redraw(out: Path, guests: Sequence[Guest] = ()) -> Finished:
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        answer = _draw(study, planned, space, states, failures, guests)
-        return Finished(space.page, 0, failures, answer=answer)
+        answer = _draw(study, planned, space, states, failures)
+        return Finished(space.page, 0, failures, answer)
 
 
 def prune(directory: Path) -> str:
@@ -160,7 +152,6 @@ def _draw(
     space: Workspace,
     states: Mapping[str, Mapping[str, Any]],
     failures: Failures,
-    guests: Sequence[Guest],
 ) -> str:
     """Write tables, figures and page, and last the marker of what they are made of; the answer."""
     space.drop(STATE)
@@ -172,18 +163,13 @@ def _draw(
     with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
-        report.write(results, times, causes, space, guests)
+        report.write(results, times, causes, space, (paper.report_card,))
     answer = report.said(results)
     if not failures:
         terminal.check()
         with warnings.catch_warnings(record=True) as caught:
             limits.check_study(study)
         texts = [str(each.message) for each in caught]
-        marker = {**space.drawn_of(_ids(planned)), "answer": answer, "warnings": texts}
+        marker = {**space.drawn_of(planned.ids), "answer": answer, "warnings": texts}
         space.note(STATE, text_of(marker))
     return answer
-
-
-def _ids(planned: Plan) -> dict[str, str]:
-    """The ids of the cases of a plan, by name."""
-    return {name: case.id for name, case in planned.cases.items()}

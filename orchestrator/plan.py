@@ -1,7 +1,7 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,18 +20,17 @@ from orchestrator.study.study import Study
 START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
 """Times of imports and of the first figures, of each scene, and of each grain of a bed without a
 run, s: measured on `first-look`, `dune` and `paper --tolerance 0.2`, two cores."""
-BYTES = {"flow": 2.9e6, "pile": 1.8e6, "cells": 1.5e6}
-"""Mean size of a case of the preset `paper`, by its kind; of any other, `OTHER_BYTES`."""
-OTHER_BYTES = 2e6
+BYTES = 2.2e6
+"""Mean size of a case of the preset `paper`."""
 
 
 @dataclass(frozen=True)
 class Plan:
     """How the scenes of a study are answered, and by which cases.
 
-    By the id of the scene that was asked for: the `decisions` with their reasons, the `piles`, and
-    `checks`, piles by DEM that check an answer without DEM. Each of the `cells` answers all of its
-    single grains. `cases` has every run once, by name, after those whose results it needs.
+    By the id of the scene that was asked for: `decisions`, `piles`, and `checks`, piles by DEM that
+    check an answer without DEM. Each of the `cells` answers its single grains. `cases` has every
+    run once, by name, after those whose results it needs.
     """
 
     decisions: dict[str, Decision]
@@ -47,6 +46,11 @@ class Plan:
         lengths = sum(float(s[-2] - s[1]) for s in lines)
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
+    @property
+    def ids(self) -> dict[str, str]:
+        """The ids of the cases, by name."""
+        return {name: case.id for name, case in self.cases.items()}
+
     def done(self, directory: Path, but: Container[str] = ()) -> dict[str, dict[str, Any]]:
         """The markers of the cases that are done, by name, but for some; results are checked."""
         cases = [case for name, case in self.cases.items() if name not in but]
@@ -55,10 +59,7 @@ class Plan:
         return {case.name: state for case, state in zip(cases, states, strict=True) if state}
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
-        """The cases to be run, by name: those that are not done, and those pruned that they need.
-
-        `done` has the names of those that are done.
-        """
+        """The cases to be run, by name: those not `done`, and those pruned that they need."""
         missing = {name: case for name, case in self.cases.items() if name not in done}
         starts = (need for case in missing.values() if case.needs_bulky for need in case.needs)
         return {case.name: case for case in starts if not is_whole(case, directory)} | missing
@@ -84,19 +85,16 @@ def of(
     decisions: Mapping[str, Decision], tolerance: float | None = None, cases: Path | None = None
 ) -> Plan:
     """List the cases that some decisions need; with a tolerance, those of checks by DEM too."""
-
-    def piles_of(answers: Mapping[str, Decision]) -> dict[str, Pile]:
-        scenes = {asked: answer.scene for asked, answer in answers.items()}
-        kept = {asked: scene for asked, scene in scenes.items() if isinstance(scene.bed, PileBed)}
-        return {asked: Pile(scene, cases) for asked, scene in kept.items()}
-
-    piles = piles_of(decisions)
-    checks = piles_of(decision.checks(decisions, tolerance)) if tolerance else {}
-    grains = {
-        answer.scene.id: answer.scene
-        for asked, answer in decisions.items()
-        if asked not in piles and answer.scene.protocol.method == "dem"
-    }
+    piles, checks = (
+        {
+            asked: Pile(answer.scene, cases)
+            for asked, answer in answers.items()
+            if isinstance(answer.scene.bed, PileBed)
+        }
+        for answers in (decisions, decision.checks(decisions, tolerance) if tolerance else {})
+    )
+    scenes = (answer.scene for asked, answer in decisions.items() if asked not in piles)
+    grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
     cells = tuple(batches(grains.values()))
     listed: dict[str, Case] = {}
 
@@ -107,11 +105,11 @@ def of(
                 add(need)
             listed[case.name] = case
 
-    for pile in (*piles.values(), *checks.values()):
-        for run in pile.runs:
-            add(run)
-    for cell in cells:
-        add(cell)
+    for run in (
+        *(run for pile in (*piles.values(), *checks.values()) for run in pile.runs),
+        *cells,
+    ):
+        add(run)
     first = {name: case for name, case in listed.items() if not case.needs}
     return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
 
@@ -143,18 +141,15 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
     plan = settled(study, directory)
-
-    def counted(names: Iterable[str]) -> str:
-        return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
-
     yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
     for group in study.groups:
-        regimes = counted(str(regime_of(scene)) for scene in group.scenes)
-        laws = counted(scene.forces.law for scene in group.scenes)
+        regimes = Counter(str(regime_of(scene)) for scene in group.scenes).most_common()
+        laws = Counter(scene.forces.law for scene in group.scenes).most_common()
+        of = (", ".join(f"{name} {count}" for name, count in each) for each in (regimes, laws))
         count = _number(len(group.scenes), "scene")
         outside = sum(not law_holds(scene) for scene in group.scenes)
         note = f"; in {outside} the law does not hold for a single grain" if outside else ""
-        yield f"  {group.name}: {count}; regimes: {regimes}; force laws: {laws}{note}"
+        yield f"  {group.name}: {count}; regimes: {'; force laws: '.join(of)}{note}"
     for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
         yield f"  {times} answered: {why}"
     yield from expected(plan, directory, workers)
@@ -171,10 +166,9 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
     runs = max(sum(case.cost_s for case in missing) / workers, max(chains, default=0.0))
-    size = sum(BYTES.get(case.kind, OTHER_BYTES) for case in missing)
     time = f"about {human(runs + plan.drawing_s)} with {_number(workers, 'worker')}"
-    rest = f"{human(plan.drawing_s)} of them for tables and figures; {size / 1e6:.0f} MB"
-    yield f"expected: {time}, {rest}"
+    rest = f"{human(plan.drawing_s)} of them for tables and figures"
+    yield f"expected: {time}, {rest}; {len(missing) * BYTES / 1e6:.0f} MB"
 
 
 def _number(count: int, noun: str) -> str:

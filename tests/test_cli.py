@@ -43,16 +43,6 @@ def grains(tmp_path: Path) -> str:
     return "grains.toml"
 
 
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [("--fluid=1000", ["--fluid"]), *((f"--slope={v}", ["--slope", "0"]) for v in ("-1e1", "-.5"))],
-)
-def test_options_are_whole_and_negative_numbers_are_values(
-    orchestrator: Command, option: str, words: list[str]
-) -> None:
-    refused(orchestrator("threshold", "--diameter", "1e-3", *option.split("=")), *words)
-
-
 def test_a_study_of_single_grains_and_the_same_again(
     orchestrator: Command, tmp_path: Path, grains: str
 ) -> None:

@@ -14,29 +14,30 @@ class Parameter(NamedTuple):
     field: str  # of a study file; the depth has none
     column: str  # of the table, with the unit
     label: str  # symbol and unit, for people
+    ordinary: tuple[float, float]  # range in which no limit of a scene can be exceeded
     default: float | str | None = None
     note: str = ""  # for the help
 
 
 MOST_POINTS = 100_000
 GAS_BELOW = 100.0  # density that tells gases from liquids, kg/m3: Venus has 65 at its ground
+_Z0 = Parameter("bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"')
+_NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), 1e-5, "water: 1e-6")
+_RHO = Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), 1.0, "water: 1000")
+_ALPHA = Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", (0, 30), 0.0, "the flow goes up it")
+_BETA = Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0)
+_LIFT = Parameter("forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT)
 PARAMETERS = {
-    "diameter": Parameter("grain.diameter", "d_m", "d, m"),
-    "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", 2500.0),
-    "fluid_density": Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", 1.0, "water: 1000"),
-    "viscosity": Parameter(
-        "fluid.viscosity", "nu_m2_s", "nu, m2/s", 1e-5, "kinematic; water: 1e-6"
-    ),
-    "slope_deg": Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", 0.0, "the flow goes up it"),
-    "entrainment_angle_deg": Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", 60.0),
-    "roughness": Parameter(
-        "bed.roughness", "z0_m", "z0, m", "d/30", 'or a part of the diameter as "d/10"'
-    ),
-    "lift_coefficient": Parameter(
-        "forces.lift_coefficient", "alpha_s", "alpha_s", LIFT_COEFFICIENT
-    ),
-    "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", GRAVITY),
-    "depth": Parameter("depth", "depth_m", "depth, m", None, "of a liquid, for its mean velocity"),
+    "diameter": Parameter("grain.diameter", "d_m", "d, m", (1e-7, 10)),
+    "density": Parameter("grain.density", "rho_sol_kg_m3", "rho_sol, kg/m3", (1, 2e4), 2500.0),
+    "fluid_density": _RHO,
+    "viscosity": _NU,
+    "slope_deg": _ALPHA,
+    "entrainment_angle_deg": _BETA,
+    "roughness": _Z0,
+    "lift_coefficient": _LIFT,
+    "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", (1e-5, 1e4), GRAVITY),
+    "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
 GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")

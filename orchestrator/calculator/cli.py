@@ -1,20 +1,18 @@
 """The command `threshold`: ranges and questions of the command line, and what it prints."""
 
 import argparse
+import csv
 import itertools
 import json
 import math
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from orchestrator.calculator import GAS_BELOW, GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
+from orchestrator.types import Row
 
 Value = float | str  # a number, or a part of the diameter such as ``d/30``
 OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
@@ -38,19 +36,12 @@ UNITS = (
 COHESIVE_BELOW = (6e-5, 1e-4)
 """Diameter below which cohesion is no longer small against the weight, in liquids and gases, m."""
 USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))  # usual dynamic viscosities of liquids and gases, Pa s
-RULE = {
-    "low": "Eq. 2 (low), since Re* is below 3",
-    "high": "Eq. 4 (high), since Re* is not below 30",
-    "transition": "both Eq. 2 (low) and Eq. 4 (high), since neither holds",
-}
-"""Laws that the paper's rule picks in each regime."""
 
 
 def add(commands: Any) -> None:
     """Add ``threshold`` to the parser of the program."""
-    command = commands.add_parser(
-        "threshold", help="when one grain starts to move, closed form, at once", epilog=RANGES
-    )
+    about = "when one grain starts to move, closed form, at once"
+    command = commands.add_parser("threshold", help=about, epilog=RANGES)
     for name, each in PARAMETERS.items():
         default = f"{each.default:g}" if isinstance(each.default, float) else each.default
         text = "; ".join(filter(None, (each.label, each.note, default and f"default {default}")))
@@ -65,31 +56,32 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    import pandas as pd
+    from orchestrator.calculator.table import thresholds
 
-    from orchestrator.calculator import table
-
-    table.check_law(options.law, "--law")
     texts = {name: getattr(options, name) for name in PARAMETERS}
     axes = {name: values(name, text) for name, text in texts.items() if text is not None}
     if (count := math.prod(map(len, axes.values()))) > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
         raise InputError(what, "threshold", "lower a COUNT")
     asked = questions(axes)
-    points = pd.DataFrame(itertools.product(*axes.values()), columns=list(axes))
+    points = dict(zip(axes, zip(*itertools.product(*axes.values()), strict=True), strict=True))
     try:
-        thresholds = table.thresholds(points, options.law)
+        table = thresholds(points, options.law)
     except InputError as error:
         raise _renamed(error, asked) from None
     if asked:
-        print(f"orchestrator: {'; '.join(asked.values())}", file=sys.stderr)
+        print(f"orchestrator: {'; '.join(asked)}", file=sys.stderr)
+    cells = zip(*(column.tolist() for column in table.values()), strict=True)
+    rows = [dict(zip(table, row, strict=True)) for row in cells]
     if options.csv:
-        print(thresholds.to_csv(index=False), end="")
+        lines = csv.writer(sys.stdout, lineterminator="\n")
+        lines.writerow(table)
+        lines.writerows(["" if _is_nan(x) else x for x in row.values()] for row in rows)
     elif options.json:
-        print(as_json(thresholds))
+        print(as_json(rows))
     else:
         varied = [name for name, axis in axes.items() if len(axis) > 1]
-        print("\n".join(as_text(thresholds, options.law, varied)))
+        print("\n".join(as_text(rows, options.law, varied)))
     return 0
 
 
@@ -99,8 +91,6 @@ def values(name: str, text: str) -> list[Value]:
     The text is a number, or a range ``FIRST:LAST:COUNT``, both ends included; of a roughness both
     may be parts of the diameter. An `InputError` refuses all else.
     """
-    import numpy as np
-
     ends, of_diameter = text.split(":"), name == "roughness" and "/" in text
     if of_diameter and len(ends) == 1:
         return [text]
@@ -115,120 +105,106 @@ def values(name: str, text: str) -> list[Value]:
     if not (first < last < math.inf and 2 <= count <= MOST_POINTS and count % 1 == 0):
         what = f"{text!r} is not a range of 2 to {MOST_POINTS} values that rise"
         raise InputError(what, OPTIONS[name], FORM)
+    import numpy as np
+
     space = np.geomspace if name in GEOMETRIC and first > 0 else np.linspace
-    with np.errstate(all="ignore"):  # the scene refuses values of a range wider than all floats
-        spaced = space(first, last, int(count)).tolist()
+    spaced = space(first, last, int(count)).tolist()
     return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else spaced
 
 
-def questions(axes: Mapping[str, Sequence[Value]]) -> dict[str, str]:
-    """Questions on parameters whose largest value, or smallest diameter, looks wrong, by name."""
-    numbers = {
-        name: [value for value in axis if not isinstance(value, str) and math.isfinite(value)]
-        for name, axis in axes.items()
-    }
+def questions(axes: Mapping[str, Sequence[Value]]) -> list[str]:
+    """Questions on parameters whose largest value, or smallest diameter, looks wrong."""
+    numbers = {name: [x for x in axis if not isinstance(x, str)] for name, axis in axes.items()}
     top = {name: max(values, default=0.0) for name, values in numbers.items()}
-    asked = {
-        name: f"{question.format(top[name])}, {OPTIONS[name]} {top[name] * factor:.4g}?"
+    asked = [
+        f"{question.format(top[name])}, {OPTIONS[name]} {top[name] * factor:.4g}?"
         for name, low, high, question, factor in UNITS
         if low <= top[name] < high
-    }
-    smallest, rho, nu = min(numbers["diameter"], default=0), top["fluid_density"], top["viscosity"]
-    if "diameter" not in asked and 0 < smallest < COHESIVE_BELOW[rho < GAS_BELOW]:
-        asked["diameter"] = (
-            f"{smallest:g} m: cohesion, which the force laws leave out, holds grains this small;"
-            " they need a stronger flow"
-        )
+    ]
+    smallest, rho, nu = min(numbers["diameter"]), top["fluid_density"], top["viscosity"]
     low, high = USUAL_PA_S[rho < GAS_BELOW]
-    of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
-    if rho > 0 and nu > 0 and (of_air or not low <= rho * nu <= high):
-        asked["viscosity"] = (
-            f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3: air has"
-            " --fluid-density 1.2 and --viscosity 1.5e-05, water 1000 and 1e-06; is it right?"
-        )
+    if 0 < smallest < COHESIVE_BELOW[rho < GAS_BELOW]:
+        cohesion = "cohesion, which the force laws leave out, holds grains this small"
+        asked.append(f"{smallest:g} m: {cohesion}; they need a stronger flow")
+    is_of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
+    if rho > 0 and nu > 0 and (is_of_air or not low <= rho * nu <= high):
+        unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3"
+        usual = "air has --fluid-density 1.2 and --viscosity 1.5e-05, water 1000 and 1e-06"
+        asked.append(f"{unusual}: {usual}; is it right?")
     return asked
 
 
-def _renamed(error: InputError, asked: Mapping[str, str]) -> InputError:
-    """A refusal with options for the fields of a study file; questions are its remedy."""
+def _renamed(error: InputError, asked: Sequence[str]) -> InputError:
+    """A refusal with options for the fields of a study file; questions belong to its remedy."""
     options = {each.field: OPTIONS[name] for name, each in PARAMETERS.items()}
-    named = partial(re.sub, r"\b[a-z]+\.[a-z_]+\b", lambda field: options.get(field[0], field[0]))
-    place, _, field = error.where.rpartition(": ")
-    where = f"{place}: {options.get(field, field)}" if place else field
-    about = [text for name, text in asked.items() if not place or where.endswith(OPTIONS[name])]
-    advice = about if about and not place else [named(error.remedy), *about]
-    return InputError(named(error.what), where, "; ".join(filter(None, advice)))
+    texts = error.what, error.where, "; ".join(filter(None, [error.remedy, *asked]))
+    fields = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
+    named = [re.sub(fields, lambda at: options.get(at[0], f"--{at[0]}"), text) for text in texts]
+    return InputError(*named)
 
 
-def as_json(table: "pd.DataFrame") -> str:
+def _is_nan(value: object) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def as_json(rows: Sequence[Row]) -> str:
     """A record for one point, or a list of records: parameters, rules, an object for each law."""
-    import numpy as np
-
     from orchestrator.physics.threshold import LAWS_OF
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
     names |= {"valid": "valid", "why_not": "why_not"}
-    table = table.replace([np.inf, -np.inf], np.nan)  # JSON has neither
-    rows = table.astype(object).where(table.notna(), None).to_dict("records")
-    laws = table["law"].nunique()
-    records = [
-        {
-            "input": {name: point[0][each.column] for name, each in PARAMETERS.items()},
-            "regime": point[0]["regime"],
-            "paper": list(LAWS_OF[point[0]["regime"]]),
-            "answer": [row["law"] for row in point if row["answer"]],
-            **{row["law"]: {name: row[c] for c, name in names.items()} for row in point},
-        }
-        for point in (rows[start : start + laws] for start in range(0, len(rows), laws))
-    ]
-    if len(records) == 1:
-        return json.dumps(records[0], indent=2, allow_nan=False)
-    lines = ",\n".join(json.dumps(record, allow_nan=False) for record in records)
-    return f"[\n{lines}\n]"
+    count = len({row["law"] for row in rows})
+    records = []
+    for start in range(0, len(rows), count):
+        of_laws, first = rows[start : start + count], rows[start]
+        record: Row = {"input": {name: first[each.column] for name, each in PARAMETERS.items()}}
+        record |= {"regime": first["regime"], "paper": [*LAWS_OF[first["regime"]]]}
+        record |= {"answer": [row["law"] for row in of_laws if row["answer"]]}
+        for row in of_laws:
+            record[row["law"]] = {name: row[column] for column, name in names.items()}
+        records.append(record)
+    answer = json.dumps(records if len(records) > 1 else records[0])
+    # JSON has neither NaN nor Infinity
+    return json.dumps(json.loads(answer, parse_constant=lambda _: None), indent=2)
 
 
-def as_text(table: "pd.DataFrame", answer: str, varied: Sequence[str]) -> Iterator[str]:
+def as_text(rows: Sequence[Row], answer: str, varied: Sequence[str]) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
-    chosen = table[table["answer"]]
+    from orchestrator.physics.threshold import LAWS_OF
+
+    chosen = [row for row in rows if row["answer"]]
     name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
-    shown = {c: label for c, (_, label) in QUANTITIES.items() if table[c].notna().any()}
+    quantities = {column: label for column, (_, label) in QUANTITIES.items()}
+    shown = {c: text for c, text in quantities.items() if not all(_is_nan(row[c]) for row in rows)}
+    first = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
     if varied:
         yield name
-        first = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
-        first |= {"law": "force law"} if answer == "paper" else {}
         rows = chosen
     else:
-        yield f"{name}: a grain of {table['d_m'].iloc[0] * 1000:.4g} mm starts to move at"
-        columns = [["", *shown.values()]]
-        columns += [[row["law"], *map(_text, row[[*shown]])] for _, row in chosen.iterrows()]
-        yield from (f"  {line}" for line in _aligned(columns)[len(chosen) == 1 :])
-        for law, why in zip(chosen["law"], chosen["why_not"], strict=True):
-            if why:
-                yield f"  outside the range of {law}: {why}"
+        yield f"{name}: a grain of {rows[0]['d_m'] * 1000:.4g} mm starts to move at"
+        width = max(map(len, shown.values()))
+        for column, label in (shown if len(chosen) == 1 else {"law": "", **shown}).items():
+            numbers = (f"{_text(row[column]):10}" for row in chosen)
+            yield f"  {'  '.join([label.ljust(width), *numbers])}".rstrip()
         yield ""
-        first = {"law": "force law"}
-        rows = table.sort_values("answer", ascending=False, kind="stable")
+        rows = sorted(rows, key=lambda row: not row["answer"])
         shown.pop("wind_1m_m_s", None)
+    if not varied or answer == "paper":
+        first["law"] = "force law"
     first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
-    holds = ["holds", *(f"no: {why}" if why else "yes" for why in rows["why_not"])]
-    yield from _aligned([*([label, *map(_text, rows[c])] for c, label in first.items()), holds])
+    holds = ["holds", *(f"no: {row['why_not']}" if row["why_not"] else "yes" for row in rows)]
+    columns = [[label, *(_text(row[c]) for row in rows)] for c, label in first.items()]
+    widths = [max(map(len, column)) for column in columns]
+    for *cells, last in zip(*columns, holds, strict=True):
+        yield "  ".join([*(f"{c:<{w}}" for c, w in zip(cells, widths, strict=True)), last])
     if not varied:
-        yield f"\npaper's rule: {RULE[table['regime'].iloc[0]]}"
-    liquid = table[(table["rho_f_kg_m3"] >= GAS_BELOW) & table["mean_velocity_m_s"].isna()]
-    if liquid["depth_m"].isna().any():
+        yield f"\nlaws of the paper's rule: {' and '.join(LAWS_OF[rows[0]['regime']])}"
+    liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
+    if any(_is_nan(row["depth_m"]) for row in liquid):
         yield "for the mean velocity of the liquid give its depth, --depth in m"
-    if (liquid["depth_m"].notna() & liquid["valid"]).any():
+    elif any(_is_nan(row["mean_velocity_m_s"]) and row["valid"] for row in liquid):
         yield "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
 def _text(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:.4g}"
-
-
-def _aligned(columns: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of columns of cells, each as wide as its widest cell."""
-    widths = [max(map(len, column)) for column in columns]
-    return [
-        "  ".join(f"{c:<{w}}" for c, w in zip(cells, widths, strict=True)).rstrip()
-        for cells in zip(*columns, strict=True)
-    ]

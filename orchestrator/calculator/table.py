@@ -1,113 +1,125 @@
 """Thresholds of many single grains under every force law, as one table."""
 
+import re
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
-from orchestrator.calculator import GAS_BELOW, MOST_POINTS, PARAMETERS
+from orchestrator.calculator import GAS_BELOW, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
-from orchestrator.fidelity import limits
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS, law
-from orchestrator.physics.threshold import LAWS_OF, regime, threshold, why_not
+from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, why_not
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, smooth_wall_roughness
-from orchestrator.study.closed_form import PAPER, SingleGrain, single_grain
-from orchestrator.study.fields import PARTS
-from orchestrator.study.scene import Scene
-from orchestrator.study.study import make_scene
-from orchestrator.types import FloatArray
+from orchestrator.types import FloatArray, Row
 
+Table = dict[str, NDArray[Any]]
+"""Columns of equal length by name."""
 LAMINAR_BELOW = 2000.0
 """U D/nu below which open water may be laminar, and has no logarithmic profile."""
 
 
-def check_law(name: str, where: str = "threshold: law") -> None:
-    """Refuse a name, by an `InputError`, that is neither a force law's nor the paper's rule."""
-    try:
-        _ = name == PAPER or law(name)
-    except InputError as error:
-        raise InputError(error.what, where, f"{error.remedy}, {PAPER}") from None
+def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
+    """Thresholds of single grains under every force law; `answer` is one, or the paper's rule.
 
-
-def thresholds(points: pd.DataFrame, answer: str = "bridged") -> pd.DataFrame:
-    """Thresholds of single grains under every force law.
-
-    `points` has a row for each point and keys of `PARAMETERS` as columns; a parameter that is left
-    out has its default, and the depth none. `answer` is a force law, or ``paper`` for the paper's
-    rule. The table has a row for each point and law, point by point: the parameters, ``law``, the
-    columns of `QUANTITIES`, ``valid`` and ``why_not``, ``regime``, and ``answer``, whether the law
-    is one of those asked for. A gas has winds, a liquid of a given depth a mean velocity where its
-    flow is turbulent; the others are NaN.
+    `points` has sequences of equal length by keys of `PARAMETERS`; a parameter that is left out has
+    its default, and the depth none. The table has a row for each point and law, point by point.
+    A gas has winds, a liquid of a given depth a mean velocity where its flow is turbulent; the
+    others are NaN. ``answer`` is whether the law is one of those asked for.
 
     Raises
     ------
     InputError
-        For a point that is no scene, a depth that is none, more than 100,000 points, or if no law
-        holds at any point.
+        For a law or a depth that is none, a point that is no scene, or if no law holds anywhere.
     """
-    if len(points) > MOST_POINTS:
-        what = f"{len(points)} points are more than {MOST_POINTS}"
-        raise InputError(what, "threshold", "ask in parts")
-    rows = [single_grain(_scene(point)) for point in points.to_dict("records")]
-    grains = pd.DataFrame(rows, columns=SingleGrain._fields)
-    grains["depth"] = points["depth"].to_numpy(float) if "depth" in points else np.nan
-    if "depth" in points:
-        depth, d, rho = grains["depth"], grains["diameter"], grains["fluid_density"]
-        if not (depth > d).all():
-            what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
-            raise InputError(what, "threshold: depth", "give the depth of the liquid in m")
-        if (rho < GAS_BELOW).all():
-            what, remedy = f"{rho[0]:g} kg/m3 is a gas", "set fluid.density and fluid.viscosity"
-            raise InputError(what, "threshold: depth", f"{remedy}; water: 1000, 1e-6")
-    exposure = Exposure(*(grains[name] for name in SingleGrain._fields[:5]))
-    rest = {name: grains[name].to_numpy() for name in SingleGrain._fields[5:]}
-    given = pd.DataFrame({each.column: grains[name] for name, each in PARAMETERS.items()})
+    try:
+        _ = answer == PAPER or law(answer)
+    except InputError as error:
+        raise InputError(error.what, "threshold: law", f"{error.remedy}, {PAPER}") from None
+    grains = _grains(points, count := len(points["diameter"]))
+    depth, d, rho = grains["depth"], grains["diameter"], grains["fluid_density"]
+    if "depth" in points and not ((depth > d).all() and (rho >= GAS_BELOW).any()):
+        what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
+        what = what if not (depth > d).all() else f"{rho[0]:g} kg/m3 is a gas"
+        remedy = "give the depth of a liquid in m; water: fluid.density 1000, fluid.viscosity 1e-6"
+        raise InputError(what, "threshold: depth", remedy)
+    exposure = Exposure(
+        d, grains["roughness"], rho, grains["viscosity"], grains["lift_coefficient"]
+    )
+    rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
+    beta, blocks = grains["entrainment_angle_deg"], []
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
-        by_law = {name: threshold(each, exposure, **rest) for name, each in LAWS.items()}
-        del rest["entrainment_angle_deg"]
-        regimes = regime(by_law["low"], by_law["high"])
-        blocks = []
+        by_law = {
+            name: threshold(each, exposure, entrainment_angle_deg=beta, **rest)
+            for name, each in LAWS.items()
+        }
+        regimes = regime(by_law["low"], by_law["high"]).astype(object)
+        picked = [LAWS_OF[each] if answer == PAPER else (answer,) for each in regimes]
         for name, at in by_law.items():
-            ustar, names = at.friction_velocity, (name,) if answer == name else ()
-            picked = [name in (LAWS_OF[each] if answer == PAPER else names) for each in regimes]
-            results = _results(ustar, grains) | {
-                "shields": at.shields,
-                "reynolds": at.reynolds,
-                "drag_n": at.drag,
-                "lift_n": at.lift,
-                "valid": at.valid,
-                "why_not": np.array(why_not(LAWS[name], ustar, exposure, **rest), object),
-            }
-            blocks.append(given.assign(law=name, **results, regime=regimes, answer=picked))
-    table = pd.concat(blocks).sort_index(kind="stable", ignore_index=True)
+            numbers = vars(at) | _results(at.friction_velocity, grains)
+            reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)
+            block: Table = {"law": np.full(count, name, object)}
+            block |= {column: numbers[key] for column, (key, _) in QUANTITIES.items()}
+            block |= {"valid": at.valid, "why_not": np.array(reasons, object), "regime": regimes}
+            blocks.append({**block, "answer": np.array([name in laws for laws in picked])})
+    table = {each.column: np.repeat(grains[name], len(LAWS)) for name, each in PARAMETERS.items()}
+    for column in blocks[0]:
+        table[column] = np.stack([block[column] for block in blocks], axis=1).ravel()
     if not table["valid"].any():
         raise InputError("no force law holds", "threshold", "are all numbers in SI units?")
     return table
 
 
-def _scene(point: Mapping[Any, Any]) -> Scene:
-    parts: dict[str, dict[str, Any]] = {name: {} for name in PARTS}
-    for name in SingleGrain._fields:
-        part, _, field = PARAMETERS[name].field.partition(".")
-        if (value := point.get(name, PARAMETERS[name].default)) is not None:
-            parts[part][field] = value
-    scene = make_scene(parts, "threshold")
-    limits.check(scene, "threshold")
-    return scene
+def _grains(points: Mapping[str, Any], count: int) -> Table:
+    """All parameters as numbers.
+
+    A point that may be beyond a limit is made a scene, which refuses it or warns; no other point.
+    """
+    given = {name: points.get(name, [each.default] * count) for name, each in PARAMETERS.items()}
+    lengths = [*map(_length, given["roughness"], given["diameter"])]
+    grains = {name: np.array(x, float) for name, x in {**given, "roughness": lengths}.items()}
+    is_safe = grains["density"] > grains["fluid_density"]
+    is_safe &= grains["roughness"] <= 0.3 * grains["diameter"]
+    for name, each in PARAMETERS.items():
+        low, high = each.ordinary
+        is_safe &= (name == "depth") | (grains[name] >= low) & (grains[name] <= high)
+    for index in np.flatnonzero(~is_safe):
+        from orchestrator.fidelity import limits
+        from orchestrator.study.closed_form import SingleGrain, single_grain
+        from orchestrator.study.study import make_scene
+
+        parts: dict[str, Row] = defaultdict(dict)
+        for name in SingleGrain._fields:
+            part, _, field = PARAMETERS[name].field.partition(".")
+            value = given[name][index]
+            parts[part][field] = value if isinstance(value, str) else float(value)
+        scene = make_scene(parts, "threshold")
+        limits.check(scene, "threshold")
+        for name, number in single_grain(scene)._asdict().items():
+            grains[name][index] = number
+    return grains
 
 
-def _results(ustar: FloatArray, grains: pd.DataFrame) -> dict[str, FloatArray]:
+def _length(z0: Any, diameter: float) -> float:
+    """A roughness length, m, of a number or a text such as ``d/30``; NaN of any other text."""
+    if not isinstance(z0, str):
+        return float(z0)
+    part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0)
+    return float(f"{diameter / float(part[1]):.12g}") if part else np.nan  # digits as in a scene
+
+
+def _results(ustar: FloatArray, grains: Table) -> Table:
     """What follows from u* (m/s), of shape (n,): speeds of the flow and the stress on the bed."""
-    rho, nu, depth = (grains[name].to_numpy() for name in ("fluid_density", "viscosity", "depth"))
+    rho, nu, depth = (grains[name] for name in ("fluid_density", "viscosity", "depth"))
     z0 = np.maximum(grains["roughness"], smooth_wall_roughness(ustar, nu))
-    mean = depth_mean_speed(ustar, depth, z0)
+    mean, is_gas = depth_mean_speed(ustar, depth, z0), rho < GAS_BELOW
     turbulent = mean * depth / nu >= LAMINAR_BELOW
     return {
-        "ustar_m_s": ustar,
-        "wind_1m_m_s": np.where(rho < GAS_BELOW, log_law_speed(ustar, 1.0, z0), np.nan),
-        "wind_10m_m_s": np.where(rho < GAS_BELOW, log_law_speed(ustar, 10.0, z0), np.nan),
-        "mean_velocity_m_s": np.where((rho >= GAS_BELOW) & turbulent, mean, np.nan),
-        "stress_pa": rho * ustar**2,
+        "wind_speed_1_m": np.where(is_gas, log_law_speed(ustar, 1.0, z0), np.nan),
+        "wind_speed_10_m": np.where(is_gas, log_law_speed(ustar, 10.0, z0), np.nan),
+        "mean_velocity": np.where(~is_gas & turbulent, mean, np.nan),
+        "stress": rho * ustar**2,
     }

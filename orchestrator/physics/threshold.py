@@ -19,6 +19,8 @@ LAWS_OF: dict[Regime, tuple[str, ...]] = {
     "transition": ("low", "high"),
 }
 """Names of the laws that the paper's rule picks in each regime."""
+PAPER = "paper"
+"""The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
 """Friction Reynolds numbers between which the first root is looked for.
 

@@ -12,13 +12,11 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.threshold import LAWS_OF, Regime, Threshold, regime, threshold
+from orchestrator.physics.threshold import LAWS_OF, PAPER, Regime, Threshold, regime, threshold
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray
 
 Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities (m/s)
-PAPER = "paper"
-"""The paper's rule in a study file: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 
 
 class SingleGrain(NamedTuple):

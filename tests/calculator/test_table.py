@@ -15,7 +15,7 @@ from orchestrator.study.fields import FIELDS, PARTS
 def test_every_point_and_law_is_the_closed_form_of_it() -> None:
     d = np.geomspace(5e-5, 5e-3, 40)
     slopes = np.linspace(0, 30, 40)
-    table = thresholds(pd.DataFrame({"diameter": d, "slope_deg": slopes}))
+    table = pd.DataFrame(thresholds({"diameter": d, "slope_deg": slopes}))
     assert len(table) == 40 * len(LAWS)
     for name, law in LAWS.items():
         here = Exposure(d, d / 30, 1.0, 1e-5)
@@ -41,8 +41,9 @@ def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> N
 
 def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:
     """Sand on Mars: u* z0/nu = 0.011, so that z0 is 0.11 nu/u* and the wind 45 m/s, not 55."""
-    point = {"diameter": 1e-4, "density": 3000.0, "fluid_density": 0.02, "viscosity": 5.5e-4}
-    mars = thresholds(pd.DataFrame([{**point, "gravity": 3.71}])).query("answer").iloc[0]
+    air = {"fluid_density": [0.02], "viscosity": [5.5e-4], "gravity": [3.71]}
+    table = thresholds({"diameter": [1e-4], "density": [3000.0], **air})
+    mars = {column: values[table["answer"]][0] for column, values in table.items()}
     ustar = mars["ustar_m_s"]
     z0 = 0.11 * 5.5e-4 / ustar
     assert mars["wind_1m_m_s"] == pytest.approx(ustar / 0.41 * np.log(1 + 1 / z0))

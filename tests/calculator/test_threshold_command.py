@@ -90,14 +90,14 @@ def test_the_answer_comes_first_and_the_other_laws_beside_it(run: Run, law: str)
     lines = out.splitlines()
     assert lines[1].split() == ["u*,", "m/s", f"{record[law]['friction_velocity']:.4g}"]
     for name in LAWS:
-        row = next(line.split() for line in lines if line.split()[:1] == [name])
+        row = next(line.split() for line in lines[4:] if line.split()[:1] == [name])
         assert row[1] == f"{record[name]['friction_velocity']:.4g}"
         assert row[6] == ("yes" if record[name]["valid"] else "no:")
 
 
 def test_the_papers_rule_gives_both_equations_in_the_transition(run: Run) -> None:
     lines = run(*SAND_IN_AIR, "--law", "paper")[1].splitlines()
-    assert lines[1].split() == ["low", "high"]
+    assert lines[1].split()[-2:] == ["low", "high"]
     assert lines[2].split() == ["u*,", "m/s", "0.4658", "0.2242"]
     rows = csv.DictReader(io.StringIO(run("--diameter", RANGE, "--law", "paper", "--csv")[1]))
     for row in rows:
@@ -109,8 +109,9 @@ def test_an_answer_outside_its_range_is_marked_and_laws_that_hold_are_named(run:
     gravel = ["--diameter", "1e-2", *QUARTZ_IN_WATER[2:]]
     code, out, _ = run(*gravel)
     assert code == 0
-    assert "outside the range of bridged: particle Reynolds number (Schiller and Naumann)" in out
-    assert "outside" not in run(*gravel, "--law", "bridged-gravel")[1]
+    rows = {line.split()[0]: line for line in out.splitlines()[8:] if line}
+    assert "no: particle Reynolds number (Schiller and Naumann)" in rows["bridged"]
+    assert "yes" in rows["bridged-gravel"]
 
 
 def test_ranges_give_the_same_numbers_as_points(run: Run) -> None:
@@ -192,7 +193,6 @@ def test_usual_numbers_raise_no_question(run: Run, arguments: list[str]) -> None
             (["--diameter", text], [f"--diameter: '{text}' is not a range"])
             for text in ("1:2:1", "1:2:2.5", "1:2:inf", "2e-3:1e-4:5", "1e-4:inf:5", "1:2:1e9")
         ),
-        (["--diameter", "-1e-4:1e-3:5"], ["--diameter: -0.0001", "greater than or equal"]),
         ([*D, "--roughness", "d/10:d/30:3"], ["--roughness", "values that rise"]),
         ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30:1e-4:3' is neither"]),
         ([*D, "--slope", "0:31:5"], ["--slope: 31 deg"]),

@@ -202,7 +202,7 @@ def test_the_section_counts_and_escapes(results: Results) -> None:
     assert claims.section([], [], has_tolerance=False).strip() == ""
 
 
-def test_only_the_command_line_and_the_python_face_import_it() -> None:
+def test_only_the_pipeline_and_the_python_face_import_it() -> None:
     package = Path(paper.__file__).parents[1]
     users = {
         path.relative_to(package).as_posix()
@@ -210,7 +210,7 @@ def test_only_the_command_line_and_the_python_face_import_it() -> None:
         if "paper" not in path.relative_to(package).parts
         and re.search(r"import paper|orchestrator\.paper|import .*\bpaper\b", path.read_text())
     }
-    assert users <= {"cli.py", "face.py"}
+    assert users <= {"pipeline.py", "face.py"}
     assert {"paper", "reference"} & set(study.presets()) == set()
 
 
