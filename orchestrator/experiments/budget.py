@@ -69,9 +69,8 @@ class Choice:
 
     def levels(self, scene: Scene) -> Pair:
         """The levels on which it is changed in a scene."""
-        dynamic = DYNAMIC_POURED if scene.is_poured else DYNAMIC
-        flow = COARSE if scene.flow.model == "solve" else AS_ASKED
-        return Pair(flow, dynamic if self.dynamic else PEELING)
+        grains = (DYNAMIC_POURED if scene.is_poured else DYNAMIC) if self.dynamic else PEELING
+        return Pair(COARSE if scene.flow.model == "solve" else AS_ASKED, grains)
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """The scene with each alternative that it can have, by the alternative's name."""
@@ -213,39 +212,32 @@ def _sections(
         ends = zip(100 * scene["shields_low"], 100 * scene["shields_high"], strict=True)
         share = [f"−{low:.1f} … +{high:.1f}" for low, high in ends]
         heads = [f"change of θ at {fraction:.0%}, %" for fraction in scene["fraction"]]
-        wide = scene.assign(share=share, head=heads).pivot_table(
-            "share", "choice", "head", aggfunc="first", sort=False
-        )
+        wide = scene.assign(share=share, head=heads).set_index(["choice", "head"])["share"]
         chart = Figure(f"tornado-{number}", name, words["scene"], (), tornado(largest))
-        tornados.append(Section(name, "", (chart,), [wide.reset_index()]))
-    all_scenes = [pd.DataFrame(rows)]
-    title = "All choices together"
+        tornados.append(Section(name, "", [chart], [wide.unstack(sort=False).reset_index()]))
+    title, all_scenes = "All choices together", [pd.DataFrame(rows)]
     sections = [Section(title, words["together"], (), all_scenes, [words["limit"]])]
-    worn = [
-        (runs.planned.piles[change.base], runs.planned.piles[change.other])
-        for change in listed
-        if change.choice.name == FROZEN and runs.are_done(change.base, change.other)
-    ]
-    if worn:
+    piles, changed_beds = runs.planned.piles, [c for c in listed if c.choice.name == FROZEN]
+    both = [(c.base, c.other) for c in changed_beds if runs.are_done(c.base, c.other)]
+    if both:
         frozen = moved[moved["choice"] == FROZEN]
         table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
         table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
-        drawn, title = curves(worn[:MOST_PILES], runs.cases), "Frozen bed and bed that changes"
-        chart = Figure("wear", title, words["wear"], (), drawn)
-        title, text = "The bed that changes", words["changing"]
-        sections.append(Section(title, text, (chart,), [table]))
+        drawn = curves([(piles[one], piles[other]) for one, other in both[:MOST_PILES]], runs.cases)
+        chart = Figure("wear", "Frozen bed and bed that changes", words["wear"], (), drawn)
+        sections.append(Section("The bed that changes", words["changing"], [chart], [table]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
-    sheets = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
+    tables = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
     lost = [
         (label(change.scene), change.choice.name, change.alternative)
         for change in listed
         if not runs.are_done(change.other)
     ]
     if lost:
-        sheets.append(pd.DataFrame(lost, columns=["scene", "choice", "alternative"]))
+        tables.append(pd.DataFrame(lost, columns=["scene", "choice", "alternative"]))
     text = "The alternatives of the second table have no answer." * bool(lost)
-    last = Section("The choices and their alternatives", text, tables=sheets)
+    last = Section("The choices and their alternatives", text, (), tables)
     return [*sections, *tornados, last]
 
 

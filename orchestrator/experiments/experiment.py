@@ -22,8 +22,7 @@ from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
 Results = tuple[Mapping[str, pd.DataFrame], Sequence[Section]]
-_FILE = Path(__file__).with_name("texts.toml")
-TEXTS: Mapping[str, Mapping[str, str]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
 """The texts of the pages, by experiment and by what they are about."""
 
 
@@ -77,9 +76,8 @@ class Experiment:
                 done = planned.done(space.cases)
                 tables, sections = self.results(Runs(planned, space.cases, done))
                 if not tables:
-                    remedy = "`orchestrator status` names the causes; the same command continues"
-                    what = "no reference ran to its end: nothing is known"
-                    raise OrchestratorError(what, where=str(out), remedy=remedy)
+                    what = "no reference ran to its end: `orchestrator status` names the causes"
+                    raise OrchestratorError(what, str(out))
                 with folder.renewed():
                     for key, table in tables.items():
                         folder.put(f"tables/{key}.csv", csv(table))

@@ -1,13 +1,11 @@
 """The ladder: what each fidelity level costs, and how far its thresholds are from the reference.
 
-The piles of a study are answered on pairs of levels. The levels of the grains are run on the flow
-of the reference, those of the flow with the grains by peeling, so that each error is that of one
-part; a few pairs as they are used show that the errors add up.
-
-Beside them stands the naive route: a run of the whole pile for each Re*, with every grain mobile,
-which settles the bed and holds the flow. It is measured on a small pile with few load steps and
-extrapolated: the time of a run is that of a load step, in proportion to the grains, and the runs
-are as many as the load steps by which the fast level finds the same curve.
+The levels of the grains are run on the flow of the reference, those of the flow with the grains by
+peeling, so that each error is that of one part; a few pairs as they are used show that the errors
+add up. Beside them stands the naive route: a run of the whole pile for each Re*, with every grain
+mobile. It is measured on a small pile with few load steps and extrapolated: the time of a run is
+that of a load step, in proportion to the grains, and the runs are as many as the load steps by
+which the fast level finds the same curve.
 """
 
 import math
@@ -31,7 +29,6 @@ from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity import calibration, levels, limits
 from orchestrator.fidelity.decision import Decision, as_asked, on_levels
 from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, changed, level
-from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
@@ -69,8 +66,13 @@ BANDS = {
     "reference_error": ("error of the reference itself", "0.88"),
     "model_floor": ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
 }
+MARKS: Mapping[str, Look] = {
+    "threshold too high": {"marker": "^", "mfc": "0.2"},
+    "threshold too low": {"marker": "v", "mfc": "0.2"},
+    "hollow: another model": {"marker": "^", "mfc": "white"},
+}
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
-"""How the grains were answered; colours that are told apart by all."""
+"""Colours of the ways to answer the grains."""
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
@@ -86,13 +88,10 @@ def experiment(study: Study, out: Path) -> Experiment:
             return {}, ()
         means = together(compared)
         fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
-        front = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
-        tables = {
-            "points": front.fillna({"pareto": False}),
-            "levels": known_errors(measured),
-            "naive": naive_costs(routes, fast, runs),
-        }
-        return tables, _sections(means, tables["levels"], tables["naive"])
+        rows = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
+        known, naive = known_errors(measured), naive_costs(routes, fast, runs)
+        tables = {"points": rows.fillna({"pareto": False}), "levels": known, "naive": naive}
+        return tables, _sections(means, known, naive)
 
     return Experiment("ladder", "Speed against accuracy", planned, results, study.time_limit_s)
 
@@ -215,41 +214,33 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     """Known error of each level, by class of scene and fraction; `calibration` reads it.
 
     The error is the largest over the scenes, infinite where only one of level and reference reached
-    the fraction. The uncertainty is how far the reference itself moved on scenes of that class.
+    the fraction, zero where neither did. The uncertainty is how far the reference itself moved.
     """
     beside = np.where(points["class_flow"] == calibration.LEVEL_BED, FLAT.name, FINE.name)
     grains = points[(points["flow_level"] == beside) & (points["asked"] == "dem")]
     flow = points[(points["grain_level"] == PEELING.name) & points["same_model"]]
-    rows: list[Row] = []
-    for part, name, table, best, again in (
+    taus, tables = [name for name in points if str(name).startswith("tau_")], []
+    key, place = ["part", "level", "scene_class", "fraction"], ["scene_class", "fraction"]
+    for part, column, table, best, again in (
         ("grains", "grain_level", grains, "reference", "soft reference"),
         ("flow", "flow_level", flow, "fine", "finest"),
     ):
-        for scene_class, alike in table.groupby(f"class_{part}"):
-            levels = {key: rows.set_index("scene_id") for key, rows in alike.groupby(name)}
-            if best not in levels:
-                continue
-            base = levels[best].filter(regex="^tau_")
-            # a finer flow is run on small piles alone, other grains on every pile
-            unsure = dict.fromkeys(base, 0.0 if part == "flow" else math.inf)
-            if again in levels:
-                unsure = {tau: _shift(levels[again][tau], base[tau]) for tau in base}
-            for key, one in levels.items():
-                row = {"part": part, "level": key, "scene_class": scene_class}
-                means = {"cost_core_s": float(one[f"{part}_s"].mean()), "scenes": len(one)}
-                for tau in base:
-                    error = {"error": _shift(one[tau], base[tau]), "uncertainty": unsure[tau]}
-                    rows.append({**row, "fraction": float(str(tau)[4:]), **error, **means})
-    return pd.DataFrame(rows).sort_values(["part", "level", "scene_class", "fraction"])
-
-
-def _shift(values: pd.Series, reference: pd.Series) -> float:
-    """The largest relative difference over the scenes that both have; infinite if there is none."""
-    both = values.index.intersection(reference.index)
-    value, base = values[both], reference[both]
-    # where neither reaches the fraction they agree; where one does, they could not differ more
-    apart = (value / base - 1).abs().fillna(math.inf).where(value.notna() | base.notna(), 0.0)
-    return float(apart.max()) if len(both) else math.inf
+        names = {column: "level", f"class_{part}": "scene_class", f"{part}_s": "cost_core_s"}
+        rows = table.rename(columns=names).assign(part=part)
+        rows = rows.melt(["scene_id", *key[:-1], "cost_core_s"], taus, "fraction", "tau")
+        base = rows.loc[rows["level"] == best, ["scene_id", "fraction", "tau"]]
+        rows = rows.merge(base, on=["scene_id", "fraction"], suffixes=("", "_best"))
+        neither = rows["tau"].isna() & rows["tau_best"].isna()
+        error = (rows["tau"] / rows["tau_best"] - 1).abs().fillna(math.inf).mask(neither, 0.0)
+        rows = rows.assign(error=error, fraction=rows["fraction"].str[4:].astype(float))
+        largest = {"error": ("error", "max"), "cost_core_s": ("cost_core_s", "mean")}
+        known = rows.groupby(key).agg(**largest, scenes=("scene_id", "size")).reset_index()
+        shift = known.loc[known["level"] == again, [*place, "error"]]
+        known = known.merge(shift.rename(columns={"error": "uncertainty"}), "left", place)
+        # a finer flow is run on small piles alone, other grains on every pile
+        tables.append(known.fillna({"uncertainty": 0.0 if part == "flow" else math.inf}))
+    columns = [*key, "error", "uncertainty", "cost_core_s", "scenes"]
+    return pd.concat(tables)[columns].sort_values(key)
 
 
 def naive_routes(study: Study) -> dict[str, Decision]:
@@ -271,50 +262,43 @@ def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
     """
     piles = runs.planned.piles
     pile, rows = piles[fast], []
-
-    def load_steps(route: str) -> int:
-        return len(Motion.from_csv(runs.cases / piles[route].case.name).flow) - 1
-
     for route in routes:
         small, naive_s = piles[route], math.nan
         if runs.are_done(route, fast):
             whole = Pile(WHOLE.answer(pile.scene), runs.cases)
             grains = float(whole.packing.mobile.sum() / small.packing.mobile.sum())
-            step_s = runs.cpu_s(small.method.cases) / load_steps(route)
-            naive_s = step_s * grains * load_steps(fast)
+            steps, of_small = (len(each.motion(runs.cases).flow) - 1 for each in (pile, small))
+            naive_s = runs.cpu_s(small.method.cases) / of_small * grains * steps
         rows.append((route, naive_s, True))
     rows.append((FAST.name, runs.cpu_s(pile.method.cases), False))
     return pd.DataFrame(rows, columns=["route", "core_s", "extrapolated"])
 
 
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame, naive: pd.DataFrame) -> list[Section]:
-    words, columns = TEXTS["ladder"], ["part", "level", "what it is"]
+    words, index = TEXTS["ladder"], ["part", "scene_class", "level", "scenes", "cost_core_s"]
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
     heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
     heads["scene_class"] = "scene class"
     means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))
     means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(columns=heads)
-    meanings = [(part, one.name, one.meaning) for part, lv in LEVELS.items() for one in lv]
-    order = {name: place for place, (_, name, _) in enumerate(meanings)}
-    index = ["part", "scene_class", "level", "scenes", "cost_core_s"]
-    table = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
-    table = table.rename(columns="{:.0%}".format).sort_index(
+    rows = [(part, each.name, each.meaning) for part, levels in LEVELS.items() for each in levels]
+    meanings = pd.DataFrame(rows, columns=["part", "level", "what it is"])
+    order = {name: place for place, name in enumerate(meanings["level"])}
+    errors = (100 * known.set_index([*index, "fraction"])["error"]).unstack("fraction")
+    errors = errors.rename(columns="{:.0%}".format).sort_index(
         level=index[:3], key=lambda keys: keys.map(order) if keys.name == "level" else keys
     )
-    sheets = [pd.DataFrame(meanings, columns=columns)]
-    sheets.append(table.reset_index().rename(columns=heads))
-    error, each = "Cost against error", "The error at each fraction"
-    largest = chart(pairs, {"largest": ""})
-    charts = [
-        Figure("speed-against-accuracy", error, words["largest"], (), largest),
-        Figure("error-at-fractions", each, words["fractions"], (), chart(pairs, HEADS)),
-    ]
-    gained, routes = Figure("gains", "Factors gained", "", (), gains(naive)), [naive]
+    of_levels = [meanings, errors.reset_index().rename(columns=heads)]
+    title, largest = "Cost against error", chart(pairs, {"largest": ""})
+    charts = [Figure("speed-against-accuracy", title, words["largest"], (), largest)]
+    title, each = "The error at each fraction", chart(pairs, HEADS)
+    charts.append(Figure("error-at-fractions", title, words["fractions"], (), each))
+    gained = [Figure("gains", "Factors gained", "", (), gains(naive))]
     title = "The fidelity levels, and what is known of them"
     return [
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
-        Section("What is gained over the naive route", words["naive"], [gained], routes),
-        Section(title, words["levels"], (), sheets, [words["limit"]]),
+        Section("What is gained over the naive route", words["naive"], gained, [naive]),
+        Section(title, words["levels"], (), of_levels, [words["limit"]]),
     ]
 
 
@@ -337,9 +321,10 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         line[0].set_ylabel("largest error of $τ_c$, %" if single else f"{title}\nerror of $τ_c$, %")
         for ax, (column, head) in zip(line, columns.items(), strict=True):
             ax.set_title(head or title, loc="left" if single else "center")
+            ends = {"reference_error": rows["reference_error"].max()}
+            ends["model_floor"] = rows["model_floor"].min()
             for name, (_, colour) in BANDS.items():
-                end = rows[name].max() if name == "reference_error" else rows[name].min()
-                ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=len(name) / 100)
+                ax.axhspan(0, np.nan_to_num(ends[name]), color=colour, lw=0, zorder=len(name) / 100)
             tags.append((ax, _points(ax, rows, column, named=single)))
     for ax in grid.ravel():
         ax.set(xscale="log", yscale="log", ylim=(FLOOR / 1.5, None))
@@ -347,9 +332,17 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for tolerance in (0.05, 0.2):
             ax.axhline(tolerance, color="0.45", lw=0.7, ls=(0, (4, 2)), zorder=1)
     grid[-1, len(columns) // 2].set_xlabel("cost, s of one core")
-    used = [style.entry(name, colour) for name, colour in METHODS.items()]
-    numbered = (table if single else table[table["pareto"]]).drop_duplicates("number")
-    style.legends(canvas, used, _samples(numbered, single=single))
+    numbered: Any = (table if single else table[table["pareto"]]).drop_duplicates("number")
+    mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
+    samples: list[Artist] = [
+        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
+        for row in numbered.itertuples(index=False)
+    ]
+    samples += [Line2D([], [], label=text, **mark, **look) for text, look in MARKS.items()]
+    samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()]
+    if single:
+        samples.append(Line2D([], [], label="no pair of levels is cheaper and better", **FRONT))
+    style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)
     canvas.draw_without_rendering()  # labels are placed in a finished layout
     arrow = {"arrowstyle": "-", "lw": 0.4, "color": "0.5"}
     for ax, texts in tags:
@@ -370,10 +363,9 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
     tags: list[Any] = []
     each: Any = shown.itertuples(index=False)
     for row in each:
-        marker = "v" if getattr(row, column) < 0 else "^"
         face = row.colour if row.same_model else "white"
-        point: Look = {"mfc": face, "mec": row.colour, "marker": marker, "ms": 5, "mew": 0.9}
-        ax.plot(row.cost_core_s, row.y, gid="point", zorder=3, **point)
+        mark: Look = {"marker": "v" if getattr(row, column) < 0 else "^", "ms": 5, "mew": 0.9}
+        ax.plot(row.cost_core_s, row.y, gid="point", zorder=3, mfc=face, mec=row.colour, **mark)
         if named or row.pareto:
             text = f"{row.number}" + f": {row.name}" * (named and row.pareto)
             tags.append(ax.text(row.cost_core_s, row.y, text, path_effects=halo, **look))
@@ -383,43 +375,22 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
     return tags
 
 
-def _samples(pairs: pd.DataFrame, *, single: bool) -> list[Artist]:
-    """Samples of the pairs' numbers, the markers, the bands, and the front of a single column."""
-    mark: Look = {"ls": "", "ms": 5, "mec": "0.2", "mew": 0.9}
-    each: Any = pairs.itertuples(index=False)
-    samples: list[Artist] = [
-        Line2D([], [], ls="", marker=f"${row.number}$", ms=5, label=row.name, color=row.colour)
-        for row in each
-    ]
-    for marker, face, text in (
-        ("^", "0.2", "threshold too high"),
-        ("v", "0.2", "threshold too low"),
-        ("^", "white", "hollow: another model"),
-    ):
-        samples.append(Line2D([], [], marker=marker, mfc=face, label=text, **mark))
-    samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()]
-    front = Line2D([], [], label="no pair of levels is cheaper and better", **FRONT)
-    return [*samples, front] if single else samples
-
-
 def gains(routes: pd.DataFrame) -> Canvas:
     """How many times cheaper each route is than the first, the naive one; hatched if extrapolated.
 
     `routes` is as `naive_costs` gives it; what was not measured has no bar.
     """
-    canvas = style.canvas(0.34 * len(routes) + 0.75)
-    ax = canvas.subplots()
-    factor = routes["core_s"].iloc[0] / routes["core_s"]
-    bars = ax.barh(routes["route"], factor - 1, left=1, height=0.62, ec="#0072b2", fc="#0072b2")
-    for bar, extrapolated in zip(bars, routes["extrapolated"], strict=True):
-        if extrapolated:
-            bar.set(facecolor="white", hatch="////")
+    canvas, factor = style.canvas(0.34 * len(routes) + 0.75), routes["core_s"].iloc[0]
+    ax, factor = canvas.subplots(), factor / routes["core_s"]
+    look: Look = {"fc": "white", "ec": "#0072b2", "hatch": "////"}
+    hatches = np.where(routes["extrapolated"], look["hatch"], "")
+    faces = np.where(routes["extrapolated"], "white", look["ec"])
+    bars = ax.barh(routes["route"], factor - 1, 0.62, 1, ec=look["ec"], color=faces, hatch=hatches)
     costs = zip(factor, routes["core_s"], strict=True)
     ax.bar_label(bars, [f" {gain:,.0f} × ({cost:,.1f} s)" for gain, cost in costs], fontsize=7)
     ax.set(xscale="log", xlabel="times cheaper than the naive route")
     ax.set_xlim(0.8, factor.max() ** 1.5)  # the texts beyond the bars need a third of the width
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)
-    sample = Patch(label="extrapolated, not run", fc="white", ec="#0072b2", hatch="////")
-    style.legends(canvas, [], [sample])
+    style.legends(canvas, [], [Patch(label="extrapolated, not run", **look)])
     return canvas

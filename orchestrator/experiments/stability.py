@@ -23,7 +23,6 @@ from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
-from orchestrator.plan import Plan
 from orchestrator.report import style
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure, Look
@@ -50,12 +49,9 @@ VERDICTS = {
 
 
 class Place(NamedTuple):
-    """A place of a map: its values on the axes, its scenes, and those they are compared with.
+    """A place of a map: its values on the axes, its scenes, and those they are compared with."""
 
-    x is None where the run is read at several fractions.
-    """
-
-    x: float | str | None
+    x: float | str | None  # None where the run is read at several fractions
     y: float | str
     scenes: tuple[Scene, ...]
     references: tuple[Scene, ...]
@@ -67,11 +63,6 @@ class Map(NamedTuple):
     name: str
     data: Mapping[str, Any]
     places: tuple[Place, ...]
-
-
-def load_all() -> list[Map]:
-    """Every map of the package, by name."""
-    return [load(path) for path in sorted(FOLDER.glob("*.toml"))]
 
 
 def load(path: Path) -> Map:
@@ -110,33 +101,27 @@ def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> 
     return next(resolved([make_scene(parts, where)]))
 
 
-def experiment(out: Path) -> Experiment:
-    """Where each method fails: every map of the package."""
-    maps = load_all()
+def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
+    """Where each method fails: every map of a folder, by default those of the package."""
+    maps = [load(path) for path in sorted(folder.glob("*.toml"))]
+    scenes: dict[str, Scene] = {}
+    for each in maps:
+        for place in each.places:
+            references = place.references if each.data["judge"] == "pile" else ()
+            scenes |= {scene.id: scene for scene in (*place.scenes, *references)}
 
     def results(runs: Runs) -> Results:
         table = pd.concat([judge(each, runs) for each in maps], ignore_index=True)
         whole = Figure("maps", TITLE, "", (), draw(maps, table))
-        sections = [Section("All maps", TEXTS["stability"]["maps"], (whole,))]
+        sections = [Section("All maps", TEXTS["stability"]["maps"], [whole])]
         for each in maps:
             title, question = each.data["title"], each.data["question"]
             drawn = Figure(f"map-{each.name}", title, "", (), draw([each], table))
-            sections.append(Section(title, question, (drawn,), (), each.data.get("limits", ())))
+            sections.append(Section(title, question, [drawn], (), each.data.get("limits", ())))
         return {"maps": table}, sections
 
-    planned = planned_for(maps)
+    planned = plan.of({name: as_asked(scene) for name, scene in scenes.items()})
     return Experiment("stability", TITLE, planned, results, verdicts=NOTICED, failing=())
-
-
-def planned_for(maps: Sequence[Map]) -> Plan:
-    """The runs of some maps, those that they share once."""
-    scenes = {
-        scene.id: as_asked(scene)
-        for one in maps
-        for place in one.places
-        for scene in (*place.scenes, *(place.references if one.data["judge"] == "pile" else ()))
-    }
-    return plan.of(scenes)
 
 
 def judge(one: Map, runs: Runs) -> pd.DataFrame:
@@ -236,16 +221,13 @@ def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
         x, y = places["x"][cell.x], places["y"][cell.y]
         colour, ink, letter = VERDICTS[cell.verdict]
         ax.add_patch(Rectangle((x, y), 1, 1, fc=colour, ec="white", lw=1, gid=cell.verdict))
-        text = letter if math.isnan(cell.error) else f"{letter}\n{percent(cell.error)}"
+        size, text = 100 * abs(cell.error), letter
+        if size >= 1000:
+            text = f"{letter}\n{cell.error:+.0f}×"
+        elif not math.isnan(size):
+            text = f"{letter}\n{100 * cell.error:+.{int(size < 9.95)}f} %".replace("-", "−")
         look: Look = {"ha": "center", "va": "center", "fontsize": font, "color": ink}
         ax.text(x + 0.5, y + 0.5, text, **look)
     ax.set(xlim=(0, len(places["x"])), ylim=(0, len(places["y"])))
     ax.set_title(one.data["title"], loc="left")
     ax.tick_params(length=0)
-
-
-def percent(error: float) -> str:
-    """A signed error, to two digits at most."""
-    size = 100 * abs(error)
-    text = f"{error:+.0f}×" if size >= 1000 else f"{100 * error:+.{int(size < 9.95)}f} %"
-    return text.replace("-", "−")

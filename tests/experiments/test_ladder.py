@@ -175,4 +175,4 @@ def test_bars_are_the_factors_gained() -> None:
     (ax,) = ladder.gains(routes).axes
     bars = [bar for bar in ax.patches if isinstance(bar, Rectangle)]
     assert [bar.get_x() + bar.get_width() for bar in bars] == pytest.approx([1, 100])
-    assert [bar.get_hatch() is not None for bar in bars] == [True, False]
+    assert [bool(bar.get_hatch()) for bar in bars] == [True, False]

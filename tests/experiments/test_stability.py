@@ -7,12 +7,9 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
-from orchestrator import pipeline
 from orchestrator.experiments import stability
-from orchestrator.experiments.experiment import Runs
-from orchestrator.experiments.stability import NOTICED, Map
+from orchestrator.experiments.stability import FOLDER, NOTICED, Map
 from orchestrator.fidelity import calibration, limits
-from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
 
 SMALL = """
 title = "Small"
@@ -29,26 +26,22 @@ forces = { law = "high" }
 """
 
 
-@pytest.mark.parametrize("one", stability.load_all(), ids=lambda one: one.name)
-def test_a_maps_file_spans_its_axes(one: Map) -> None:
-    across, down = ({place[axis] for place in one.places} for axis in (0, 1))
-    assert len(one.places) == len(across) * len(down)
-    assert (across == {None}) == ("fractions" in one.data["x"])
-    assert all(place.scenes for place in one.places)
-    if one.data["judge"] == "pile":
-        assert all(len(place.scenes) == len(place.references) for place in one.places)
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_maps_file_spans_its_axes(path: Path) -> None:
+    read = stability.load(path)
+    across, down = ({place[axis] for place in read.places} for axis in (0, 1))
+    assert len(read.places) == len(across) * len(down)
+    assert (across == {None}) == ("fractions" in read.data["x"])
+    assert all(place.scenes for place in read.places)
+    if read.data["judge"] == "pile":
+        assert all(len(place.scenes) == len(place.references) for place in read.places)
 
 
 def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
-    path = tmp_path / "small.toml"
-    path.write_text(SMALL)
-    one = stability.load(path)
-    planned = stability.planned_for([one])
-    space = Workspace(tmp_path / "out")
-    with claimed(space.root, EXPERIMENT, "stability"):
-        pipeline.complete(planned.missing(space.cases, ()), space, workers=2, limit_s=120)
-    runs = Runs(planned, space.cases, planned.done(space.cases))
-    good, bad = stability.judge(one, runs).sort_values("x").to_dict("records")
+    (tmp_path / "small.toml").write_text(SMALL)
+    stability.experiment(tmp_path / "out", tmp_path).run(tmp_path / "out", workers=2)
+    table = pd.read_csv(tmp_path / "out" / "tables" / "maps.csv")
+    good, bad = table.sort_values("x").to_dict("records")
     assert good["verdict"] == "good"
     assert abs(good["error"]) < 0.05
     assert bad["verdict"] in ("exploded", "noisy")
