@@ -12,9 +12,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.errors import OrchestratorError, SolverError
+from orchestrator.errors import SolverError
 from orchestrator.runs import files
-from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json, write_json
+from orchestrator.runs.files import Folder, canonical_json, digest_text, read_json
 
 PACKAGE = Path(__file__).absolute().parents[1]
 NAME = re.compile(r"[a-z]+-[0-9a-f]{12}")
@@ -42,9 +42,6 @@ def templates() -> Path:
 def template_files(name: str) -> tuple[tuple[str, int, bytes], ...]:
     """Path, mode and content of each file of a template, read once."""
     root = templates() / name
-    if not root.is_dir():
-        what, remedy = "the package lacks this directory of templates", "install the package again"
-        raise OrchestratorError(what, where=str(root), remedy=remedy)
     return tuple(
         ("/".join(parts), stat.S_IMODE(path.stat().st_mode), path.read_bytes())
         for path in sorted(path for path in root.rglob("*") if path.is_file())
@@ -63,8 +60,8 @@ def _template_digest(name: str) -> str:
 class Case(ABC):
     """One run of a solver: what it depends on, how its inputs are written, what its end means.
 
-    A subclass is a frozen value. Its `parameters` and the template it copies are its identity,
-    so two scenes that need the same run name the same directory.
+    A subclass is a frozen value. Its `parameters` and its template are its identity, so two scenes
+    that need the same run name the same directory.
     """
 
     kind: ClassVar[str]
@@ -173,7 +170,7 @@ def prepare(case: Case, cases: Path) -> Path:
         "inputs_sha256": files.digest_files(written, root=directory),
         "programs": case.versions(),
     }
-    write_json(directory / IDENTITY, identity)
+    files.write_durably(directory / IDENTITY, files.text_of(identity))
     return directory
 
 
@@ -183,23 +180,23 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     The times are `solver_s`, `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
     results, derived = (
-        files.digest_files(_matching(directory, patterns), root=directory)
+        {name: files.digest_file(directory / name) for name in _matching(directory, patterns)}
         for patterns in (case.results, case.derived)
     )
-    bulky = [path.relative_to(directory).as_posix() for path in _matching(directory, case.bulky)]
+    bulky = _matching(directory, case.bulky)
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     files.write_durably(directory / CHECKSUMS, sums)
-    (directory / FAILED).unlink(missing_ok=True)
     stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
-    marker = {"id": case.id, "ended": "done", **times, "bytes": files.size_of(directory)}
     digests = {"results_sha256": results, "derived_sha256": derived}
-    write_json(directory / DONE, {**marker, **digests, "bulky": bulky, "stamps": stamps})
+    marker = {"id": case.id, "ended": "done", **times, **digests, "bulky": bulky, "stamps": stamps}
+    files.write_durably(directory / DONE, files.text_of(marker))
 
 
 def fail(directory: Path, error: SolverError) -> None:
     """Leave a note of how and why a case failed; the next study run tries it again."""
     if directory.is_dir():
-        write_json(directory / FAILED, {"ended": error.ended, "cause": str(error)})
+        note = {"ended": error.ended, "cause": str(error)}
+        files.write_durably(directory / FAILED, files.text_of(note))
 
 
 def failure(directory: Path) -> tuple[str, str]:
@@ -256,22 +253,11 @@ def prune(case: Case, cases: Path) -> None:
     Their digests stay in the marker and in `CHECKSUMS`: a rerun by hand is still compared with the
     run that the tables were made of. No link is followed. A disk without any room is no obstacle.
     """
-    directory, state = cases / case.name, done_state(case, cases)
-    if state:
-        for path in _matching(directory, state.get("bulky", ())):
-            path.unlink()
-            with contextlib.suppress(OSError):  # it is not empty
-                os.removedirs(path.parent)
-        size_without_marker = files.size_of(directory) - files.size_of(directory / DONE)
-        if state["bytes"] != size_without_marker:
-            write_json(directory / DONE, {**state, "bytes": size_without_marker})
-
-
-def size(directory: Path) -> int:
-    """Bytes on disk of the case in a directory; the marker has those of a finished one."""
-    state = read_json(directory / DONE)
-    size = state.get("bytes") if isinstance(state, dict) else None
-    return size + files.size_of(directory / DONE) if type(size) is int else files.size_of(directory)
+    directory, state = cases / case.name, done_state(case, cases) or {}
+    for name in _matching(directory, state.get("bulky", ())):
+        (directory / name).unlink()
+        with contextlib.suppress(OSError):  # it is not empty
+            os.removedirs((directory / name).parent)
 
 
 def names_in(cases: Path) -> list[str]:
@@ -292,11 +278,12 @@ def _stamp(path: Path) -> tuple[int, int]:
     return state.st_size, state.st_mtime_ns
 
 
-def _matching(directory: Path, patterns: Iterable[str]) -> list[Path]:
-    """The files in a directory that fit a pattern; no link is followed."""
+def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:
+    """Names of the files in a directory that fit a pattern; no link is followed."""
     walked = (Path(path, name) for path, _, names in os.walk(directory) for name in names)
     paths = (path for path in walked if path.is_file() and not path.is_symlink())
-    return sorted(path for path in paths if _fits(path.relative_to(directory).as_posix(), patterns))
+    names = sorted(path.relative_to(directory).as_posix() for path in paths)
+    return [name for name in names if _fits(name, patterns)]
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:

@@ -1,7 +1,6 @@
 """Cases in the jobs of a queue: Slurm, PBS and the others that dask-jobqueue knows."""
 
 import contextlib
-import fcntl
 import logging
 import math
 import shlex
@@ -12,6 +11,8 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock
 
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import engine, process
@@ -26,11 +27,9 @@ SYSTEMS = {
 AHEAD = 2
 """Cases handed to a job for each core: no core waits for the next while this process is busy."""
 LOST_S = 5.0
-"""A worker without a sign of life for this long is lost: its job is asked for again."""
-AWKWARD = frozenset(" \t\n'\"\\$`%#")
-"""Characters of a path that the head of a job's script cannot hold."""
+"""Time after which a worker without a sign of life is lost, and its job is asked for again, s."""
 PATIENCE_S = 60.0
-"""After this long without a job that has begun, a line says so; after twice as long again."""
+"""Time without a job that has begun until a line says so, s; the next line takes twice as long."""
 
 
 @dataclass(frozen=True)
@@ -43,26 +42,19 @@ class Queue:
 
 @contextlib.contextmanager
 def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
-    """Jobs of a queue, for as long as the block runs; a job that is lost is asked for again.
+    """Jobs of a queue that run so many solvers at a time; a job that is lost is asked for again.
 
-    The parameters are those of `engine.local`. There are as many jobs as it takes to run so many
-    solvers at a time. Wrong settings are an InputError, and jobs that the queue does not take an
-    OrchestratorError.
+    Wrong settings are an InputError, and jobs that the queue does not take an OrchestratorError.
     """
     try:
-        libraries: list[Any] = [*map(import_module, ("dask", "dask_jobqueue", "distributed"))]
+        dask, jobqueue, distributed = map(import_module, ("dask", "dask_jobqueue", "distributed"))
     except ImportError as error:
         what = f"a cluster needs the package's extra [cluster]: {error.name} is not installed"
         remedy = "pip install 'dask-jobqueue>=0.9', with the Python that runs this"
         raise InputError(what, where="--cluster", remedy=remedy) from None
-    dask, jobqueue, distributed = libraries
     kind = getattr(jobqueue, SYSTEMS[queue.system])
     cases.mkdir(exist_ok=True)
     logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
-    if awkward := sorted(AWKWARD.intersection(logs)):
-        what = f"jobs cannot write logs into {logs}: it has {' '.join(map(repr, awkward))} in it"
-        remedy = "name a directory without these there; the study's own may stay as it is"
-        raise InputError(what, where="cluster.log_directory", remedy=remedy)
     name = queue.settings.get("config_name", kind.job_cls.config_name)
     given = {**dask.config.get(f"jobqueue.{name}"), **queue.settings}
     # a job begins in an environment of its own, where this package need not be installed
@@ -82,39 +74,33 @@ def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator
         what = f"these settings make no jobs: {str(error).splitlines()[0]}"
         remedy = "see [cluster] in the study file, and dask's own configuration of jobqueue"
         raise InputError(what, where="cluster", remedy=remedy) from None
-    cores = int(given["cores"])
-    jobs = math.ceil(workers / cores)
+    jobs = math.ceil(workers / int(given["cores"]))
     with cluster, distributed.Client(cluster) as client:
-        _submit(cluster, jobs, queue.system)
+        _submit(cluster, jobs, queue.system, distributed.Status.failed)
         print(f"asked {queue.system} for {jobs} jobs; logs: {logs}", file=sys.stderr)
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
         _await_first(client, Path(logs))
         task = partial(execute_unless_done, cases=cases, limit_s=limit_s)
-        places, executor = AHEAD * jobs * cores, client.get_executor(pure=False)
+        places, executor = AHEAD * jobs * int(given["cores"]), client.get_executor(pure=False)
         yield Pool(executor, task, places, (distributed.KilledWorker,))
     for name in names_in(cases):
         (cases / f".{name}.lock").unlink(missing_ok=True)
 
 
 def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
-    """Run one case on a machine of the cluster, unless it is done by now; what it took, s.
+    """Run one case on a machine of the cluster, unless it is done by now; its time, s.
 
-    A worker that was given up as lost may still be at work on it, and so may be one of an earlier
-    study's: until that has ended, this one waits.
+    A worker that was given up as lost, or one of an earlier study, may still be at work on the
+    case: this one waits for its end.
     """
-    with (cases / f".{case.name}.lock").open("a") as stream:
-        # a file system without locks leaves it to the queue to end what it cancelled
-        with contextlib.suppress(OSError):
-            fcntl.flock(stream, fcntl.LOCK_EX)
+    with FileLock(cases / f".{case.name}.lock"):
         state = done_state(case, cases)
         return float(state["wall_s"]) if state else engine.execute(case, cases, limit_s)
 
 
-def _submit(cluster: Any, jobs: int, system: str) -> None:
+def _submit(cluster: Any, jobs: int, system: str, failed: object) -> None:
     """Ask for the jobs, and wait until the queue has taken them."""
-    from distributed import Status
-
     # a connection that closes with its job is no news: distributed logs it with a traceback
     logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     while len(cluster.worker_spec) < jobs:
@@ -124,8 +110,7 @@ def _submit(cluster: Any, jobs: int, system: str) -> None:
         cluster.sync(lambda: cluster)
     except (RuntimeError, OSError, ValueError) as error:
         for job in cluster.workers.values():
-            # else the cluster's end trips over jobs that never began
-            job.status = Status.failed
+            job.status = failed  # else the cluster's end trips over jobs that never began
         what = f"{system} does not take the job: {' '.join(str(error).split())}"
         remedy = "see [cluster] in the study file; this machine must be one that may submit jobs"
         raise OrchestratorError(what, "--cluster", remedy) from None

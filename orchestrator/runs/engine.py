@@ -24,8 +24,6 @@ POLL_S, LOOK_S = 0.2, 1.0
 """Time between two looks at the pool, and at how far the running cases are, s."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """Threads of a solver's process: solvers hold all cores, and more threads would take others'."""
-Report = Callable[[Case, float, OrchestratorError | None], None]
-"""Takes a case that has ended, its time, s (0: not known), and why it failed, if it did."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +67,8 @@ class Cores:
 def local(cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
     """Threads of this process, whose solvers take so many cores as there are workers.
 
-    While solvers hold all cores, other threads prepare the next cases and read what the last ones
-    left, so that no solver waits for Python. An exception ends all children before it goes on.
+    Further threads prepare cases and read results while solvers hold all cores. An exception ends
+    all children before it goes on.
     """
     stop = threading.Event()
     task = partial(execute, cases=cases, limit_s=limit_s, stop=stop, cores=Cores(workers))
@@ -126,15 +124,15 @@ def execute(
 def run(
     todo: Mapping[str, Case],
     pool: Pool,
-    report: Report,
+    report: Callable[[Case, float, OrchestratorError | None], None],
     watch: Callable[[Collection[Case]], None] = lambda _: None,
 ) -> dict[str, OrchestratorError]:
-    """Run cases that are not done yet; return those that failed, or need one that did, with why.
+    """Run the cases that are not done, by name; return why cases failed, or need one that did.
 
-    A case, by name in `todo`, starts once those that it needs have ended. Of the cases that may
-    start, the one with the most expensive chain of cases behind it is the first. `report` receives
-    each case that has ended, and `watch`, a few times a second, the cases that run. SolverError is
-    raised if the pool lacks a program, and Interrupted if it is stopped.
+    Of the cases whose needs have ended, the one with the most expensive chain of cases behind it
+    starts first. `report` receives each case that has ended, its time, s, and its failure; `watch`,
+    a few times a second, the cases that run. SolverError is raised if the pool lacks a program,
+    Interrupted if it is stopped.
     """
     needs = {name: {need.name for need in case.needs} & todo.keys() for name, case in todo.items()}
     behind, chains = dict.fromkeys(todo, 0.0), {}  # costs, s, of the cases that wait for each
@@ -196,6 +194,7 @@ class Display:
     """Shows how far a study is: a bar on a terminal, elsewhere a line for each case that ends.
 
     The cases share so many cores as `workers`; `after_s` is expected after the last of them, s.
+    `done` is the share of the work that is done, 0 to 1, and `left_s` the time until all is, s.
     """
 
     def __init__(
@@ -205,15 +204,13 @@ class Display:
         from rich.progress import BarColumn, Progress, TextColumn
 
         self._cases, self._workers, self._after_s = cases, workers, after_s
-        self._left = sum(case.cost_s for case in todo)
-        self._whole = self._left / workers + after_s
-        self._expected = self._took = 0.0  # costs and times of the cases that have ended, s
-        self._going: dict[str, float] = {}
+        self._whole_s = self._left_s = sum(case.cost_s for case in todo)
+        self._expected_s = self._took_s = 0.0  # costs and times of the cases that have ended
+        self._going_s: dict[str, float] = {}
         self._count, self._ended, self._looked = len(todo), 0, -math.inf
         self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
-        cases_column = TextColumn("{task.fields[ended]} cases")
-        text_column = TextColumn("{task.description}")
-        self._bar = Progress(cases_column, BarColumn(), text_column, console=self._console)
+        ended, text = TextColumn("{task.fields[ended]} cases"), TextColumn("{task.description}")
+        self._bar = Progress(ended, BarColumn(), text, console=self._console)
         self._task = self._bar.add_task("", total=1.0, ended="")
         self._show()
 
@@ -229,11 +226,11 @@ class Display:
     def __call__(self, case: Case, seconds: float, error: OrchestratorError | None) -> None:
         """Take note of a case that has ended."""
         self._ended += 1
-        self._going.pop(case.name, None)
-        self._left -= case.cost_s
+        self._going_s.pop(case.name, None)
+        self._left_s -= case.cost_s
         if not error:
-            self._expected += case.cost_s
-            self._took += seconds * case.ranks
+            self._expected_s += case.cost_s
+            self._took_s += seconds * case.ranks
         state, text = "failed" if error else "done", self._show()
         self._console.print(f"[{self._ended}/{self._count}] {state}  {case.name}  {text}")
         if error:
@@ -244,24 +241,17 @@ class Display:
         if sys.stderr.isatty() and time.monotonic() > self._looked + LOOK_S:
             self._looked = time.monotonic()
             shares = {case: case.share(self._cases / case.name) for case in running}
-            self._going = {case.name: share * case.cost_s for case, share in shares.items()}
+            self._going_s = {case.name: share * case.cost_s for case, share in shares.items()}
             self._show()
-
-    @property
-    def done(self) -> float:
-        """Share of the work that is done, 0 to 1."""
-        return 1 - self.left_s(1.0) / self._whole if self._whole else 1.0
-
-    def left_s(self, pace: float | None = None) -> float:
-        """Time until all is done, s, at a pace: that of the cases so far, over their costs."""
-        if pace is None:
-            pace = self._took / self._expected if self._took else 1.0
-        left = max(0.0, self._left - sum(self._going.values()))
-        return pace * left / self._workers + self._after_s
 
     def _show(self) -> str:
         """Show on the bar how far the study is; the same in words."""
-        text = f"{self.done:.0%} of the work, about {human(self.left_s())} left"
+        whole_s = self._whole_s / self._workers + self._after_s
+        left_s = max(0.0, self._left_s - sum(self._going_s.values())) / self._workers
+        pace = self._took_s / self._expected_s if self._took_s else 1.0
+        self.left_s = pace * left_s + self._after_s
+        self.done = 1 - (left_s + self._after_s) / whole_s if whole_s else 1.0
+        text = f"{self.done:.0%} of the work, about {human(self.left_s)} left"
         ended = f"{self._ended}/{self._count}"
         self._bar.update(self._task, completed=self.done, ended=ended, description=text)
         return text

@@ -7,7 +7,6 @@ import itertools
 import json
 import os
 import re
-import stat
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from io import BufferedReader
@@ -51,11 +50,9 @@ def digest_files(paths: Iterable[Path], *, root: Path) -> dict[str, str]:
 
 def opened(path: Path) -> BufferedReader:
     """Open a file to read it; OSError also for a pipe or a device, which might never end."""
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-    if not stat.S_ISREG(os.fstat(handle).st_mode):
-        os.close(handle)
+    if path.is_fifo() or path.is_char_device():
         raise OSError(errno.EINVAL, "not a file", str(path))
-    return os.fdopen(handle, "rb")
+    return path.open("rb")
 
 
 def read_json(path: Path) -> Any:
@@ -67,13 +64,8 @@ def read_json(path: Path) -> Any:
         return None
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write a JSON file durably, indented for people, with its keys sorted."""
-    write_durably(path, text_of(value))
-
-
 def write_durably(path: Path, content: str | bytes) -> None:
-    """Replace a file as one step: a reader, or a crash, sees the old or the new content whole."""
+    """Replace a file in one step: a reader, or a crash, sees the old or the new content whole."""
     temporary = path.with_name(f".{path.name}.tmp")
     try:
         temporary.unlink(missing_ok=True)
@@ -85,20 +77,18 @@ def write_durably(path: Path, content: str | bytes) -> None:
         handle = os.open(path.parent, os.O_RDONLY)
         os.fsync(handle)  # the name, too, survives a crash
         os.close(handle)
-    except OSError as error:
+    finally:
         temporary.unlink(missing_ok=True)
-        error.filename, error.filename2 = str(path), None
-        raise
 
 
 def size_of(path: Path) -> int:
     """Size of a file, or of all files below a directory, bytes; a file that vanishes counts 0."""
-    if path.is_dir() and not path.is_symlink():
-        walked = os.walk(path)
-        return sum(size_of(Path(folder, name)) for folder, _, names in walked for name in names)
-    with contextlib.suppress(OSError):
-        return path.lstat().st_size
-    return 0
+    paths = (Path(folder, name) for folder, _, names in os.walk(path) for name in names)
+    total = 0
+    for file in paths if path.is_dir() else [path]:
+        with contextlib.suppress(OSError):
+            total += file.lstat().st_size
+    return total
 
 
 class Folder:
@@ -139,10 +129,7 @@ class Folder:
         self._place(name, is_ours=True).unlink(missing_ok=True)
 
     def clear(self, name: str, is_ours: Callable[[str], bool]) -> Path:
-        """Make way for a sub-directory, and return its place; files of others are kept aside.
-
-        A file in it is this program's if `is_ours` says so of its path from there.
-        """
+        """Make way for a sub-directory: files that are not ours by their path in it are kept."""
         path = self.path(name)
         for place, _, files in os.walk(path, topdown=False):
             for file in (Path(place, each) for each in files):

@@ -18,8 +18,6 @@ POLL_S, GRACE_S = 0.1, 2.0
 """Time between two looks at a program, and between SIGTERM and SIGKILL."""
 TRIES = 3
 """Runs of a program that is killed from outside. One killed three times is out of memory, say."""
-TAIL = 2**16
-"""Part of a log in which its last line is looked for, bytes: a log may be of any size."""
 _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 """Signals that come from outside; those of a crash would come again."""
 _GUARD = """
@@ -59,23 +57,13 @@ def run(
     file_limit: int | None = None,
     tries: int = 1,
 ) -> Ended:
-    """Run a program to its end in a process group of its own, and keep its output.
+    """Run a program to its end in a process group of its own, with both its outputs in `log`.
 
     The whole group is killed when the program has ended, when this process ends in whatever way,
-    and at the first limit that is reached.
-
-    Parameters
-    ----------
-    cwd, log : Path
-        Working directory; file that takes both output streams.
-    limit_s, output_limit, file_limit : float, optional
-        Limits of wall time, s, of the log's size and of that of any file that is written, bytes.
-    stop : threading.Event, optional
-        Set by another thread to end the program early: then Interrupted is raised.
-    env : mapping, optional
-        Added to this process's environment; None removes a variable.
-    tries : int, optional
-        Number of runs in all if the program is killed from outside; it must start afresh each time.
+    and at the first limit: `limit_s` of wall time, s, `output_limit` of the log's size and
+    `file_limit` of any file that is written, bytes. `stop`, set by another thread, ends the run by
+    Interrupted. `env` is added to this process's environment; None removes a variable. A program
+    that is killed from outside is started again, `tries` times in all.
     """
     # OpenFOAM takes its case directory from PWD, not from getcwd; a relative PATH would be
     # another one in another working directory
@@ -133,20 +121,15 @@ def _end_group(process: "subprocess.Popen[bytes]") -> None:
 
 def last_words(log: Path) -> str:
     """The last 200 letters of the last line of a log; nothing where it holds none."""
-    try:
-        with log.open("rb") as stream:
-            stream.seek(max(0, stream.seek(0, os.SEEK_END) - TAIL))
-            lines = stream.read().decode(errors="replace").strip().splitlines()
-    except OSError:
-        return ""
-    return lines[-1][-200:] if lines else ""
+    with contextlib.suppress(OSError), log.open("rb") as stream:
+        # a log may be of any size
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - 2**16))
+        return stream.read().decode(errors="replace").strip().rpartition("\n")[2][-200:]
+    return ""
 
 
 def shortage() -> str:
-    """The limit of the shell that is too low for a study, or nothing: libraries crash beyond it.
-
-    A small study on two cores took 40 files; and 1.9e6 kB of addresses, a tenth of it in use.
-    """
+    """The limit of the shell that is too low for a small study, or nothing: libraries crash."""
     for what, number, least, unit, option in (
         ("open files", resource.RLIMIT_NOFILE, 64, 1, "n"),
         ("memory", resource.RLIMIT_AS, 2_000_000, 1024, "v"),

@@ -36,8 +36,7 @@ def _interrupt(number: int, frame: object) -> NoReturn:
 def check() -> None:
     """Raise KeyboardInterrupt again if a signal of `ENDING` has come since `listen`.
 
-    Python drops an exception that is raised in a callback of compiled code, as it may be while
-    matplotlib draws.
+    Python drops an exception that is raised in a callback of compiled code, such as matplotlib's.
     """
     if _interrupted.is_set():
         raise KeyboardInterrupt
@@ -69,10 +68,7 @@ def take() -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         given: TextIO | None = getattr(sys, name)
         if given is getattr(sys, f"__{name}__"):
-            stream, encoding = Stream(number, "w", closefd=False), "utf-8"
-            if given is not None:
-                given.flush()
-                encoding = given.encoding
+            stream, encoding = Stream(number, "w", closefd=False), given.encoding if given else None
             buffer, by_line = io.BufferedWriter(stream), number == 2 or stream.isatty()
             text = io.TextIOWrapper(buffer, encoding, "backslashreplace", line_buffering=by_line)
             setattr(sys, name, text)

@@ -19,14 +19,10 @@ from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError, printable
 from orchestrator.runs import case as case_states
 from orchestrator.runs import files, process
-from orchestrator.runs.case import DONE, Case, failure, names_in, size
+from orchestrator.runs.case import DONE, Case, failure, names_in
 from orchestrator.runs.files import RECORD, Folder, canonical_json, digest_text, read_json
 
 LOCK = ".lock"
-WAIT_S = 1.0
-"""Time to wait for a lock that a dying process may still hold, s."""
-NAMED = 5
-"""Cases of an earlier study file that are listed by name."""
 
 
 class Kind(NamedTuple):
@@ -51,23 +47,16 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
     """Make a directory for contents of a kind and a name, and hold it while the block runs.
 
     It may also be empty, or hold these contents already. Without a marker it gets one if `new`.
-
-    Raises
-    ------
-    InputError
-        If the directory holds something else, which is named, or cannot be written, or if a
-        link stands where this program writes.
-    OrchestratorError
-        If another process holds it, or the shell's limits are too low for any work.
+    InputError is raised if it holds something else, cannot be written, or has a link where this
+    program writes; OrchestratorError if another process holds it, or the shell's limits are low.
     """
     if shortage := process.shortage():
         raise OrchestratorError(shortage)
-    folder, lock = Folder(root), FileLock(root / LOCK, timeout=WAIT_S)
+    # a process that is ending may hold the lock for a moment
+    folder, lock = Folder(root), FileLock(root / LOCK, timeout=1.0)
     try:
         root.mkdir(parents=True, exist_ok=True)
         _check(folder, kind, name)
-        with contextlib.suppress(OSError):
-            (root / LOCK).rmdir()
         lock.acquire()
     except Timeout:
         holder = (root / LOCK).read_text(errors="replace").strip() or "another process"
@@ -117,10 +106,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
 
 
 class Workspace(Folder):
-    """The directory that holds one study's cases, tables, figures and page.
-
-    `cases` has the directories of the cases, and `drawn` is the file `STATE`.
-    """
+    """The directory of a study: of its `cases`, its tables, its `page`; `drawn` is `STATE`."""
 
     def __init__(self, root: Path) -> None:
         super().__init__(root)
@@ -137,9 +123,8 @@ class Workspace(Folder):
 
     def describe(self, kind: Kind, name: str, cases: list[str], **about: Any) -> None:
         """Write which study this is, of which cases, and more about it; only the holder may."""
-        whose = {"orchestrator": __version__, "kind": kind.word, "name": name}
-        value = {**whose, **about, "cases": cases}
-        if read_marker(self.root, kind) != value:
+        whose = {"orchestrator": __version__, "kind": kind.word, "name": name, "cases": cases}
+        if read_marker(self.root, kind) != (value := whose | about):
             self.note(kind.marker, files.text_of(value))
 
     def description(self) -> dict[str, Any]:
@@ -176,10 +161,9 @@ class Workspace(Folder):
         text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
         names = [row.get("case", "") for row in csv.DictReader(text.splitlines())]
         if lost := [name for name in names if name not in done]:
-            share = f"{len(lost)} of the {len(names)} cases that the tables were made of"
-            missing = f"{share} are not here as this version makes them, {lost[0]} for one"
+            share = f"{len(lost)} of the {len(names)} cases that they were made of"
+            what = f"the tables stay as they are: {share} are not here as this version makes them"
             remedy = "`orchestrator study` runs them again; to draw the others, move tables away"
-            what = f"{missing}: the tables stay as they are"
             raise OrchestratorError(what, str(self.root), remedy)
 
 
@@ -197,8 +181,8 @@ def _code_digest() -> str:
 def finished(source: str, out: Path | None, tolerance: float | None) -> tuple[str, Path] | None:
     """The answer and the page of a study file, or preset, that is finished and has not changed.
 
-    None where anything may have changed: the file, its profiles, the tolerance, a case, a table, a
-    figure, this package. The scenes are not made, so no library of numbers is imported.
+    None where its file, its profiles, the tolerance, a case, a table, a figure or this package may
+    have changed. The scenes are not made, so no library of numbers is imported.
     """
     brought = {path.stem: path for path in case_states.PACKAGE.glob("*/presets/*.toml")}
     file = brought.get(source, Path(source)).absolute()
@@ -252,9 +236,8 @@ def status(directory: Path) -> tuple[str, bool]:
 def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> str:
     """Drop the bulky files of the finished cases, but for those that the page shows, by name.
 
-    The inputs, and all that tables and page are made of, stay: ``./Allrun`` in a case makes the
-    dropped files anew, and compares them with the digests of the first run. The workspace is held
-    by the caller, who gets a summary for people.
+    The inputs, and all that tables and page are made of, stay. The workspace is held by the caller,
+    who gets a summary for people.
     """
     before, *_ = _sizes(space)
     pruned = [case for name, case in done.items() if name not in shown]
@@ -270,12 +253,11 @@ def prune(space: Workspace, done: Mapping[str, Case], shown: Container[str]) -> 
 def _sizes(space: Workspace) -> list[str]:
     """Bytes on disk, for people: by kind of case and of the rest, the largest first.
 
-    The size of a finished case is that at its end, or after it was pruned. A second line has the
-    cases that an earlier study file asked for, if any.
+    A second line has the cases that an earlier study file asked for, if any.
     """
     from rich.filesize import decimal
 
-    cases = {name: size(space.cases / name) for name in names_in(space.cases)}
+    cases = {name: files.size_of(space.cases / name) for name in names_in(space.cases)}
     kinds: Counter[str] = Counter()
     for name, count in cases.items():
         kinds[f"{name.partition('-')[0]} cases"] += count
@@ -284,7 +266,7 @@ def _sizes(space: Workspace) -> list[str]:
     named = ", ".join(f"{decimal(count)} {kind}" for kind, count in kinds.most_common() if count)
     lines = [f"{decimal(kinds.total())} ({named})"]
     if left := space.left(space.description()["cases"]):
-        total, names = decimal(sum(cases[name] for name in left)), ", ".join(left[:NAMED])
+        total, names = decimal(sum(cases[name] for name in left)), ", ".join(left[:5])
         what = f"{len(left)} cases of an earlier study file, {total}, such as {names}"
         lines.append(f"not asked for: {what}; they stay until you remove them")
     return lines

@@ -53,7 +53,7 @@ HARMS: dict[str, Callable[[Path], None]] = {
     "removed": Path.unlink,
 }
 OF_A_STUDY = (
-    *("study.json", ".lock", "report.json", "report.html", RECORD, "figures/shields.svg"),
+    *("study.json", "report.json", "report.html", RECORD, "figures/shields.svg"),
     *("timings/timings.csv", "tables/scenes.csv", "tables/columns.csv"),
 )
 OF_CELLS = (

@@ -122,12 +122,12 @@ def test_a_failure_costs_the_cases_that_need_it_and_no_others(tmp_path: Path) ->
 def test_the_time_left_follows_the_pace_of_the_cases_so_far(tmp_path: Path) -> None:
     first, second, third = Step(10.0), Step(20.0), Step(400.0)
     display = Display([first, second, third], tmp_path, workers=2, after_s=20.0)
-    assert display.left_s() == pytest.approx(430 / 2 + 20)
+    assert display.left_s == pytest.approx(430 / 2 + 20)
     display(first, 5.0, None)
-    assert display.left_s() == pytest.approx(0.5 * 420 / 2 + 20)
+    assert display.left_s == pytest.approx(0.5 * 420 / 2 + 20)
     assert display.done == pytest.approx(1 - 230 / 235)
     display(third, 0.0, SolverError("died"))
-    assert display.left_s() == pytest.approx(0.5 * 20 / 2 + 20)
+    assert display.left_s == pytest.approx(0.5 * 20 / 2 + 20)
     display(second, 10.0, None)
     assert display.done == pytest.approx(1 - 20 / 235)
 
