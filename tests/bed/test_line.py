@@ -58,13 +58,12 @@ def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
 
 
 def test_the_nearest_place_on_a_line() -> None:
-    line = triangle(30.0, 10.0)
-    points = np.array([[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0]])
-    np.testing.assert_allclose(line.nearest(points)[1], [0.0, 20.0, 40.0], atol=1e-12)
-    far = 10 * line.x[-1]
-    segment, s = line.nearest(np.array([[-far, 0.0], [far, 0.0]]))
-    assert segment.tolist() == [0, len(line.lengths) - 1]
-    assert s.tolist() == [line.arc_lengths[0], line.arc_lengths[-1]]
+    line, far = triangle(30.0, 10.0), 1e4
+    points = [[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0], [-far, 0.0], [far, 0.0]]
+    segment, s = line.nearest(np.array(points))
+    ends = line.arc_lengths[[0, -1]]
+    np.testing.assert_allclose(s, [0.0, 20.0, 40.0, *ends], atol=1e-12)
+    assert segment[3:].tolist() == [0, len(line.lengths) - 1]
 
 
 def test_forms_of_a_train_are_alike_and_do_not_overlap() -> None:

@@ -52,15 +52,11 @@ def strip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return _run(_strip(), tmp_path_factory.mktemp("cases"))
 
 
-def _grains(directory: Path, width: float = 0.0) -> tuple[Places, FloatArray]:
-    rows = pd.read_csv(directory / BED)
-    centres = rows[["x_over_d", "z_over_d"]].to_numpy(float)
-    return Places.of(centres, rows["y_over_d"].to_numpy(float), width), rows["size"].to_numpy(float)
-
-
-def _contacts(places: Places, sizes: FloatArray) -> IntArray:
-    """How many grains each grain touches."""
-    return np.bincount(places.contacts(sizes)[0], minlength=len(sizes))
+def _grains(directory: Path, width: float = 0.0) -> tuple[Places, FloatArray, IntArray]:
+    """Places and sizes of the grains, and how many others each touches."""
+    x, y, z, sizes, _ = pd.read_csv(directory / BED).to_numpy(float).T
+    places = Places.of(np.column_stack([x, z]), y, width)
+    return places, sizes, np.bincount(places.contacts(sizes)[0], minlength=len(sizes))
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
@@ -79,9 +75,8 @@ def test_the_same_seed_gives_the_same_bytes_by_hand(
 
 
 def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
-    places, sizes = _grains(mixed)
+    places, sizes, number = _grains(mixed)
     lying = np.arange(len(sizes)) >= len(_plane().floor)
-    number = _contacts(places, sizes)
     assert np.mean(number[lying] >= 2) > 0.98
     x, _, z = places.xyz.T
     # settled again after the cut, a grain may have come up by a little, never by a layer
@@ -95,14 +90,14 @@ def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
 
 
 def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Path) -> None:
-    places, sizes = _grains(strip, WIDTH)
+    places, sizes, number = _grains(strip, WIDTH)
     x, _, z = places.xyz.T
     low, high, half = -2.5, -1.0, 6.0
     inner, r = np.abs(x - x.mean()) < half, sizes / 2
     below, above = (np.clip(end - z, -r, r)[inner] for end in (low, high))
     cut = np.pi * (r[inner] ** 2 * (above - below) - (above**3 - below**3) / 3)
     assert LOOSE < cut.sum() / (2 * half * WIDTH * (high - low)) < CLOSE
-    number = _contacts(places, sizes)[inner & (z > low) & (z < high)]
+    number = number[inner & (z > low) & (z < high)]
     assert 4 < number.mean() < 6
     assert np.mean(number >= 3) > 0.98
 

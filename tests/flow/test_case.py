@@ -19,9 +19,8 @@ from orchestrator.flow.stress import APPROACH_ERROR, WallStress, bubble
 from orchestrator.runs import case
 from orchestrator.runs.files import read_json
 from orchestrator.solvers import openfoam
-from orchestrator.study.scene import default_first_cell_height
 from orchestrator.study.study import parse
-from tests.flow.conftest import OPEN, PILE, SLOW, Solve, allrun, changed, edit
+from tests.flow.conftest import OPEN, PILE, Solve, allrun, changed, edit
 
 MESH_FILES = ("points", "faces", "owner", "neighbour", "boundary")
 FACE = PILE.height_m / np.sin(np.radians(PILE.slope_deg))
@@ -55,11 +54,9 @@ def test_the_geometry_of_the_bed(solve: Solve) -> None:
     np.testing.assert_allclose(stress.z_m, bed, atol=1e-7)
     windward = (stress.x_m > 0.0) & (stress.x_m < crest)
     assert np.count_nonzero(windward) == PILE.settings.cells_per_face
-    np.testing.assert_allclose(
-        stress.s_m[windward], stress.x_m[windward] / np.cos(np.radians(15.0)), rtol=1e-5
-    )
-    upstream = stress.x_m < 0.0
-    np.testing.assert_allclose(stress.s_m[upstream], stress.x_m[upstream], rtol=1e-5)
+    near = windward | (stress.x_m < 0.0)
+    x = stress.s_m * np.where(windward, np.cos(np.radians(15.0)), 1.0)
+    np.testing.assert_allclose(stress.x_m[near], x[near], rtol=1e-5)
     np.testing.assert_allclose(stress.edges_m[:-1], stress.s_m - stress.length_m / 2, atol=1e-8)
     np.testing.assert_allclose(stress.z_e_m[windward], PILE.first_cell_m / 2.0, rtol=2e-3)
 
@@ -135,13 +132,6 @@ def test_a_broken_file_is_not_a_result(solve: Solve, tmp_path: Path, name: str) 
     os.truncate(file, file.stat().st_size * 9 // 10)
     with pytest.raises(SolverError, match="the results are not whole"):
         PILE.collect(copy)
-
-
-def test_the_default_first_cell() -> None:
-    assert default_first_cell_height(0.02, 1e-6) == pytest.approx(5e-4)
-    assert default_first_cell_height(0.02, 4e-4) == pytest.approx(1e-3)
-    assert default_first_cell_height(0.02, 1e-6, viscous=4e-4) == pytest.approx(1e-3)
-    assert default_first_cell_height(0.02, 5e-3) == pytest.approx(5e-3)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small file system")
@@ -240,18 +230,10 @@ def test_a_fine_flow_starts_near_where_it_ends(solve: Solve) -> None:
 def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) -> None:
     """A finished flow runs once: again only where a finer one starts from what prune dropped."""
     text = """
-        [grain]
-        diameter = 1e-3
-        [bed]
-        kind = "pile"
-        slope_deg = 15.0
-        [flow]
-        lid = 10.0
-        upstream = 10.0
-        downstream = 20.0
-        cells_per_face = {}
-        [protocol]
-        method = "pivot"
+        grain = {{ diameter = 1e-3 }}
+        bed = {{ kind = "pile", slope_deg = 15.0 }}
+        flow = {{ lid = 10.0, upstream = 10.0, downstream = 20.0, cells_per_face = {} }}
+        protocol = {{ method = "pivot" }}
     """
     coarse, fine = (parse(text.format(n), name="a", where="a") for n in (FINE // 2, FINE))
     pipeline.run(coarse, tmp_path, workers=1)
@@ -262,18 +244,15 @@ def test_a_pruned_flow_runs_again_for_a_finer_one(tmp_path: Path, pruned: bool) 
     assert (finished.started, finished.failures) == (1 + pruned, {})
 
 
-def test_the_stress_scales_with_the_size(solve: Solve) -> None:
+def test_the_stress_scales_with_the_size_and_grows_in_shallow_water(solve: Solve) -> None:
     lengths = ("roughness", "first_cell_height", "viscosity")
     settings = {name: 10 * getattr(PILE.settings, name) for name in lengths}
     larger = replace(changed(PILE, **settings), height_m=10 * PILE.height_m)
-    expected = windward_mean(solve(PILE), PILE)
-    assert windward_mean(solve(larger), larger) == pytest.approx(expected, rel=1e-4)
-
-
-def test_shallow_water_is_faster_over_a_form(solve: Solve) -> None:
-    """The water that passes the form has less than the depth."""
     shallow = changed(OPEN, depth=3.0 * PILE.height_m)
-    deep, six, three = (windward_mean(solve(flow), flow) for flow in (PILE, OPEN, shallow))
+    flows = PILE, larger, OPEN, shallow
+    deep, scaled, six, three = (windward_mean(solve(flow), flow) for flow in flows)
+    assert scaled == pytest.approx(deep, rel=1e-4)
+    # the water that passes the form has less than the depth
     assert deep < 0.95 * six < 0.9 * three
 
 
@@ -311,9 +290,7 @@ def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
         changed(PILE, first_cell_height=1e-3).collect(solve(PILE))
 
 
-def test_the_identity_of_a_case_and_its_cost() -> None:
+def test_the_identity_of_a_case() -> None:
     assert replace(PILE, slope_deg=15).id == changed(PILE, speed=10.0).id == PILE.id
     others = (changed(PILE, roughness=3.4e-5), changed(PILE, turbulence_model="kOmegaSST"), OPEN)
-    assert len({PILE.id, *(one.id for one in others)}) == 4
-    assert set(PILE.versions()) == {"gmsh", "openfoam"}
-    assert PILE.cost_s < replace(PILE, slope_deg=35.0).cost_s < SLOW.cost_s
+    assert len({PILE.id, *(flow.id for flow in others)}) == 4

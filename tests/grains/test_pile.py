@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import plan, tables
+from orchestrator import tables
 from orchestrator.errors import InputError
 from orchestrator.grains import pile as pile_of_grains
-from orchestrator.grains import threshold
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
@@ -21,7 +20,6 @@ from orchestrator.report.results import Results
 from orchestrator.study import study
 from orchestrator.study.study import Study
 from orchestrator.tables.piles import Answer, size_class_rows
-from orchestrator.types import FloatArray
 from tests import small_study
 
 SMALL = """
@@ -32,7 +30,6 @@ kind = "pile"
 slope_deg = 20.0
 height = 0.01
 roughness = "d/30"
-packing = "{packing}"
 [flow]
 cells_per_face = 20
 [protocol]
@@ -41,47 +38,41 @@ final_fraction = 0.75
 """
 
 
-def _study(packing: str = "aligned", step: float = 0.05) -> study.Study:
-    return study.parse(SMALL.format(packing=packing, step=step), name="small", where="test")
+class Done(NamedTuple):
+    """A study whose runs are done."""
+
+    asked: Study
+    plan: Plan
+    cases: Path
+    tables: dict[str, pd.DataFrame]
+
+    def pile(self, method: str) -> Pile:
+        """The pile by a method."""
+        piles = self.plan.piles.values()
+        return next(pile for pile in piles if pile.scene.protocol.method == method)
 
 
-def _run(asked: study.Study, cases: Path) -> Pile:
-    (pile,) = small_study.in_turn(asked, cases).piles.values()
-    return pile
+def _done(cases: Path, text: str) -> Done:
+    asked = study.parse(text, name="pile", where="test")
+    planned = small_study.in_turn(asked, cases)
+    return Done(asked, planned, cases, dict(tables.make(asked, planned, cases, [*planned.cases])))
 
 
-@pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cases")
-
-
-@pytest.fixture(scope="module")
-def slow(cases: Path) -> Pile:
-    return _run(_study(step=0.01), cases)
-
-
-def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(
-    slow: Pile, cases: Path
-) -> None:
-    motion, speed = Motion.from_csv(cases / slow.case.name), slow.speed(cases)
+def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(tmp_path: Path) -> None:
+    done = _done(tmp_path, SMALL.format(step=0.01))
+    slow = done.pile("dem")
+    motion, speed = slow.motion(tmp_path), slow.speed(tmp_path)
     pivot = slow.pivot_thresholds(speed)
-    for fraction in (0.1, 0.3, 0.5, 0.7):
-        found = threshold.of_pile(motion, speed, fraction, slow.scene.fluid.density)
-        expected = pivot[int(np.ceil(fraction * motion.count)) - 1]
-        assert found.ustar0 == pytest.approx(expected, rel=0.03)
-
-
-def test_tables_reconcile(slow: Pile, cases: Path) -> None:
-    asked = _study(step=0.01)
-    planned = plan.make(asked)
-    made = tables.make(asked, planned, cases, planned.done(cases))
-    curve, found, grains = (made[f"pile_{name}"] for name in ("curve", "threshold", "grain"))
+    for at in slow.thresholds(tmp_path, (0.1, 0.3, 0.5, 0.7)):
+        expected = pivot[int(np.ceil(at.fraction * motion.count)) - 1]
+        assert at.ustar0 == pytest.approx(expected, rel=0.03)
+    curve, rows, grains = (done.tables[f"pile_{name}"] for name in ("curve", "threshold", "grain"))
     assert ((curve["moved"] + curve["not_moved"]) == slow.packing.count).all()
-    assert found["shields"].is_monotonic_increasing
-    assert (found["shields"].between(found["shields_low"], found["shields_high"])).all()
+    assert rows["shields"].is_monotonic_increasing
+    assert (rows["shields"].between(rows["shields_low"], rows["shields_high"])).all()
     # Re* and tau are two views of one stress
-    ustar = np.sqrt(found["shields"] * 2499 * 9.81 * 1e-3)
-    np.testing.assert_allclose(found["reynolds"], ustar * 1e-3 / 1e-5, rtol=1e-12)
+    ustar = np.sqrt(rows["shields"] * 2499 * 9.81 * 1e-3)
+    np.testing.assert_allclose(rows["reynolds"], ustar * 1e-3 / 1e-5, rtol=1e-12)
     assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]
 
 
@@ -97,11 +88,10 @@ def test_tables_reconcile(slow: Pile, cases: Path) -> None:
 def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     tmp_path: Path, fields: str, least: float, most: float
 ) -> None:
-    text = SMALL.format(packing="aligned", step=0.05).replace("slope_deg = 20.0", fields)
+    text = SMALL.format(step=0.05).replace("slope_deg = 20.0", fields)
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="row", where="test").scenes
-    pile = Pile(scene)
-    assert least <= pile.loads(tmp_path).row_hold() <= most
+    assert least <= Pile(scene).loads(tmp_path).row_hold() <= most
 
 
 STUDY = """
@@ -135,35 +125,16 @@ mobile_layers = 1
 """
 
 
-class Done(NamedTuple):
-    """A study whose runs are done."""
-
-    asked: Study
-    plan: Plan
-    cases: Path
-    tables: dict[str, pd.DataFrame]
-
-    def pile(self, method: str) -> Pile:
-        """The pile by a method."""
-        piles = self.plan.piles.values()
-        return next(one for one in piles if one.scene.protocol.method == method)
-
-
-def _done(cases: Path, fields: str, methods: list[str]) -> Done:
-    text = STUDY.format(fields=fields, methods=methods)
-    asked = study.parse(text, name="poured", where="test")
-    planned = small_study.in_turn(asked, cases)
-    return Done(asked, planned, cases, dict(tables.make(asked, planned, cases, [*planned.cases])))
-
-
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Done:
-    return _done(tmp_path_factory.mktemp("cases"), MIXED, ["pivot", "peeling", "dem"])
+    text = STUDY.format(fields=MIXED, methods=["pivot", "peeling", "dem"])
+    return _done(tmp_path_factory.mktemp("cases"), text)
 
 
 @pytest.fixture(scope="module")
 def strip(tmp_path_factory: pytest.TempPathFactory) -> Done:
-    return _done(tmp_path_factory.mktemp("cases"), STRIP, ["pivot", "dem"])
+    text = STUDY.format(fields=STRIP, methods=["pivot", "dem"])
+    return _done(tmp_path_factory.mktemp("cases"), text)
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
@@ -209,27 +180,23 @@ def test_each_size_class_has_its_threshold(mixed: Done) -> None:
     assert loose["hiding"].isna().all()
 
 
-def _written(done: Done) -> FloatArray:
-    """The grains that LIGGGHTS was given: id, type, diameter, density, x, y, z."""
-    text = (done.cases / done.pile("dem").case.name / "grains.data").read_text()
-    return np.array([row.split() for row in text.partition("Atoms\n\n")[2].splitlines()], float)
-
-
-def test_each_grain_weighs_and_is_driven_by_its_own_size(mixed: Done) -> None:
-    pile = mixed.pile("dem")
-    packed = pile.packing
-    assert packed.sizes.max() / packed.sizes.min() > 1.5
-    np.testing.assert_allclose(_written(mixed)[:, 2], packed.sizes * 1e-3, rtol=1e-14)
-    force = np.linalg.norm(pile.loads(mixed.cases).loading.at(0.02), axis=1)[packed.windward]
-    assert (np.diff(force[np.argsort(packed.sizes[packed.windward])]) > 0).all()
-
-
-def test_grains_lie_between_the_sides_and_feel_the_flow_along_x(strip: Done) -> None:
-    y, pile = _written(strip)[:, 5] / 1e-3, strip.pile("dem")
-    assert 0 <= y.min() < y.max() < 3.0
-    assert np.ptp(y) > 2.0
-    exposed = pile.packing.windward
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, name: str) -> None:
+    done: Done = request.getfixturevalue(name)
+    pile = done.pile("dem")
+    text = (done.cases / pile.case.name / "grains.data").read_text()
+    rows = [row.split() for row in text.partition("Atoms\n\n")[2].splitlines()]
+    _, _, diameter, _, _, y, _ = np.array(rows, float).T
+    force, exposed = pile.loads(done.cases).loading.at(0.02), pile.packing.windward
+    np.testing.assert_allclose(diameter, pile.packing.sizes * 1e-3, rtol=1e-14)
+    if name == "mixed":  # each is driven by its own size
+        sizes = pile.packing.sizes[exposed]
+        assert pile.packing.sizes.max() / pile.packing.sizes.min() > 1.5
+        assert (np.diff(np.linalg.norm(force[exposed], axis=1)[np.argsort(sizes)]) > 0).all()
+        return
+    assert 0 <= y.min() < y.max() < 3e-3
+    assert np.ptp(y) > 2e-3
     # some lie beside others at one x
     assert exposed.sum() > 4.0
-    assert (pile.loads(strip.cases).loading.at(0.02)[exposed] > 0).all()
-    assert strip.tables["pile_grain"]["y_m"].between(0, 0.003).all()
+    assert (force[exposed] > 0).all()
+    assert done.tables["pile_grain"]["y_m"].between(0, 0.003).all()

@@ -1,44 +1,33 @@
 """The bed that changes."""
 
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 
-from orchestrator import pipeline, plan, tables
 from orchestrator.grains import pile as wear
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.pile import Pile, Worn
 from orchestrator.report import bed
 from orchestrator.report.results import Results
-from orchestrator.runs.workspace import STUDY, Workspace, claimed
-from orchestrator.study import study
 from orchestrator.study.parts import Grain
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
+from tests import small_study
 from tests.bed.test_line import BEDS
 from tests.bed.test_line import bed as bed_of
 
 PILE = """
-grain = {{ diameter = 1e-3, stiffness = 1e3 }}
-bed = {{ kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30", mobile_layers = 1 }}
-flow = {{ expansion_ratio = 1.4 }}
+grain = { diameter = 1e-3, stiffness = 1e3 }
+bed = { kind = "pile", slope_deg = 25.0, height = 0.01, roughness = "d/30", mobile_layers = 1 }
+flow = { expansion_ratio = 1.4 }
 [protocol]
 load_increment = 0.03
 waiting_time = 6.0
 time_step = 0.3
 fractions = [0.25, 0.5, 0.75]
-{more}
 """
-
-
-def _scene(more: str = "") -> Scene:
-    (found,) = study.parse(PILE.format(more=more), name="one", where="test").scenes
-    return found
-
-
 METHODS = """
 [[group]]
 [group.axes]
@@ -47,33 +36,15 @@ METHODS = """
 """
 
 
-class Done(NamedTuple):
-    """A pile whose runs are done, and where they lie."""
-
-    pile: Pile
-    cases: Path
-
-
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """One pile by both methods, on a bed that changes and on a frozen one."""
-    space = Workspace(tmp_path_factory.mktemp("wear") / "out")
-    asked = study.parse(PILE.format(more=METHODS), name="wear", where="test")
-    planned = plan.make(asked)
-    with claimed(space.root, STUDY, "wear"):
-        assert not pipeline.complete(planned.cases, space, workers=2, limit_s=600.0)
-    made = tables.make(asked, planned, space.cases, planned.done(space.cases))
-    return Results(asked, planned, made, space.cases)
+    return small_study.run(tmp_path_factory.mktemp("wear") / "out", PILE + METHODS)
 
 
-@pytest.fixture(scope="module")
-def worn(results: Results) -> dict[str, Done]:
-    """The same piles by the method, and whether they are frozen."""
-    return {
-        rules.method + ("" if rules.update else ", frozen"): Done(pile, results.cases)
-        for pile in results.plan.piles.values()
-        for rules in (pile.scene.protocol,)
-    }
+def _pile(results: Results, method: str, *, frozen: bool = False) -> Pile:
+    piles = [pile for pile in results.plan.piles.values() if pile.scene.protocol.method == method]
+    return next(pile for pile in piles if (pile.scene.protocol.update == 0) == frozen)
 
 
 X, Z = (0.0, 0.02, 0.06, 0.1, 0.14, 0.18), (0.0, 0.0, -0.01, 0.005, 0.0, 0.0)
@@ -88,16 +59,14 @@ WORN: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
 @pytest.mark.parametrize("name", WORN)
 def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, packing: str) -> None:
-    scene = Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name]))
-    bed = Geometry(scene)
+    bed = Geometry(Scene(grain=Grain(diameter=1e-3), bed=bed_of(packing=packing, **WORN[name])))
     whole, counted = Worn.whole(bed.packing), bed.packing.windward
     x = np.linspace(bed.line.x[0], bed.line.x[-1], 2000)
     line = wear.sunk(bed, whole)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
     # the gap between rows, over the cosine of at most 40 degrees, and a grain of level rows
-    sunk = bed.line.height(x) - wear.sunk(
-        bed, Worn(whole.without(counted), whole.left, whole.speed)
-    ).height(x)
+    bared = Worn(whole.without(counted), whole.left, whole.speed)
+    sunk = bed.line.height(x) - wear.sunk(bed, bared).height(x)
     places = np.sort(bed.packing.centres[counted, 0])
     away = np.abs(x[:, None] - places).min(axis=1)
     assert sunk[away > wear.EDGE + 3] == pytest.approx(0.0, abs=1e-9)
@@ -106,8 +75,8 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, pack
 
 
 @pytest.mark.parametrize("method", ["peeling", "dem"])
-def test_a_bed_changes_after_each_part_of_its_grains(worn: dict[str, Done], method: str) -> None:
-    pile, cases = worn[method]
+def test_a_bed_changes_after_each_part_of_its_grains(results: Results, method: str) -> None:
+    pile, cases = _pile(results, method), results.cases
     assert [flow.kind for flow in pile.flows] == ["flow", "worn", "worn"]
     count, windward = pile.packing.count, pile.packing.windward
     begun = (wear.grains(pile, flow, cases) for flow in pile.flows)
@@ -147,13 +116,12 @@ def test_the_table_sets_both_beds_side_by_side(results: Results) -> None:
 
 
 @pytest.mark.parametrize("method", ["peeling", "dem"])
-def test_the_picture_has_the_line_as_it_sinks(worn: dict[str, Done], method: str) -> None:
-    pile, cases = worn[method]
-    steps = bed.read(pile, cases)
+def test_the_picture_has_the_line_as_it_sinks(results: Results, method: str) -> None:
+    steps = bed.read(_pile(results, method), results.cases)
     starts = [step for step, _ in steps.lines]
     assert len(starts) == 3
     assert starts[0] == 0
     assert all(steps.moved(step - 1) < steps.moved(step) for step in starts[1:])
     assert [step for step, _ in bed.data(steps, steps.first(0.5))["lines"]] == starts
-    frozen = worn[f"{method}, frozen"]
-    assert "lines" not in bed.data(bed.read(frozen.pile, cases), 0)
+    frozen = bed.read(_pile(results, method, frozen=True), results.cases)
+    assert "lines" not in bed.data(frozen, 0)
