@@ -14,7 +14,6 @@ from orchestrator.errors import InputError, SolverError
 from orchestrator.fidelity import limits
 from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.mesh import made_by_gmsh
-from orchestrator.flow.model import model
 from orchestrator.runs import case
 from orchestrator.runs.case import templates
 from orchestrator.study import study
@@ -104,16 +103,6 @@ def test_a_mesh_that_is_no_such_mesh(
     edit(template / file, old, new)
     with pytest.raises(SolverError, match=rf"pile\.msh: .*{cause}"):
         made_by_gmsh(template)
-
-
-def test_a_gentle_profile_has_a_mesh(tmp_path: Path) -> None:
-    (tmp_path / "scan.csv").write_text("x_m,z_m\n0,0\n1,0.01\n2,0\n")
-    text = 'grain = { diameter = 1e-3 }\nbed = { kind = "pile", profile = "scan.csv" }'
-    scene = study.parse(text, name="a", where=str(tmp_path / "a.toml")).scenes[0]
-    (flow,) = model(scene).cases
-    directory = case.prepare(flow, tmp_path)
-    assert (directory / "profile.csv").read_text() == (tmp_path / "scan.csv").read_text()
-    np.testing.assert_allclose(first_cells(directory)[1], flow.first_cell_m, rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -39,14 +39,11 @@ def overlap_mean(stress: WallStress, values: np.ndarray, s: float, length: float
 @pytest.mark.parametrize("length", [1e-6, 5e-4, 1e-2])
 def test_mean_is_the_integral_of_the_faces(stress: WallStress, length: float) -> None:
     places = np.linspace(stress.edges_m[0] + length, stress.edges_m[-1] - length, 97)
-    expected = [overlap_mean(stress, stress.tau_wall, s, length) for s in places]
-    np.testing.assert_allclose(stress.mean_over(places, length), expected, rtol=1e-8, atol=1e-8)
-
-
-def test_mean_of_eq10_is_that_of_its_signed_square(stress: WallStress) -> None:
-    squares = np.sign(stress.ustar_over_ustar0_eq10) * stress.ustar_over_ustar0_eq10**2
-    expected = overlap_mean(stress, squares, 0.01, 4e-3)
-    assert stress.mean_over(0.01, 4e-3, "eq10") == pytest.approx(expected, rel=1e-12)
+    eq10 = np.sign(stress.ustar_over_ustar0_eq10) * stress.ustar_over_ustar0_eq10**2
+    means = stress.mean_over(places, length), stress.mean_over(places, length, "eq10")
+    for mean, values in zip(means, (stress.tau_wall, eq10), strict=True):
+        expected = [overlap_mean(stress, values, s, length) for s in places]
+        np.testing.assert_allclose(mean, expected, rtol=1e-8, atol=1e-8)
 
 
 def _bent(slope_deg: float, tau: Callable[[FloatArray], FloatArray]) -> WallStress:
@@ -64,16 +61,12 @@ def test_a_stress_that_is_linear_is_read_exactly(slope_deg: float) -> None:
     np.testing.assert_allclose(stress.mean_over(places, 2e-4), 1.0 + 30.0 * places, rtol=1e-9)
 
 
-def test_a_jump_at_a_bend_is_not_smeared() -> None:
-    stress = _bent(15.0, lambda s: np.where(s > 0, 2.0, 0.5))
-    np.testing.assert_allclose(stress.mean_over([-2e-4, 2e-4], 2e-4), [0.5, 2.0], rtol=1e-9)
-
-
-def test_no_face_reaches_beyond_its_neighbours() -> None:
-    stress = _bent(0.0, lambda s: np.where(s > 0.0101, 2.0, np.where(s > 0, 0.5, 0.4)))
-    read = stress.mean_over(np.linspace(-19e-3, 19e-3, 400), 1e-5)
-    assert read.min() >= 0.4 - 1e-9
-    assert read.max() <= 2.0 + 1e-9
+def test_no_face_reaches_beyond_its_neighbours_or_over_a_bend() -> None:
+    bent = _bent(15.0, lambda s: np.where(s > 0, 2.0, 0.5))
+    np.testing.assert_allclose(bent.mean_over([-2e-4, 2e-4], 2e-4), [0.5, 2.0], rtol=1e-9)
+    flat = _bent(0.0, lambda s: np.where(s > 0.0101, 2.0, np.where(s > 0, 0.5, 0.4)))
+    read = flat.mean_over(np.linspace(-19e-3, 19e-3, 400), 1e-5)
+    assert 0.4 - 1e-9 <= read.min() <= read.max() <= 2.0 + 1e-9
 
 
 @pytest.mark.parametrize(("s", "length"), [(0.0, 0.0), (0.0, -1.0), (0.0, 1.0), (9.0, 1e-4)])
@@ -83,12 +76,10 @@ def test_no_mean_beyond_the_bed(stress: WallStress, s: float, length: float) -> 
 
 
 def test_table_gives_the_same_numbers_back(stress: WallStress, tmp_path: Path) -> None:
-    stress.to_csv(tmp_path / "one.csv")
-    again = WallStress.from_csv(tmp_path / "one.csv")
+    stress.to_csv(tmp_path / "stress.csv")
+    again = WallStress.from_csv(tmp_path / "stress.csv")
     for field in fields(stress):
         np.testing.assert_array_equal(getattr(again, field.name), getattr(stress, field.name))
-    again.to_csv(tmp_path / "two.csv")
-    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
 
 
 def test_vtk_is_not_loaded_before_it_is_needed() -> None:
@@ -110,20 +101,18 @@ def sound() -> WallStress:
     )
 
 
-def unsound(
-    stress: WallStress, roughness: float = 3e-5, reynolds: float = 5e4, approach: float = 1.0
-) -> set[str]:
-    table = diagnostics(stress, approach, reynolds, 15.0, HEIGHT, roughness)
-    return set(table.index[table["sound"] == "no"])
-
-
 def test_each_flaw_is_named(sound: WallStress) -> None:
-    assert unsound(sound) == set()
-    assert unsound(sound, roughness=1.1e-3) == {"z_e_over_z0"}
-    assert unsound(sound, reynolds=4e3) == {"y_plus"}
-    assert unsound(replace(sound, tau_wall=np.abs(sound.tau_wall))) == {"reattachment_over_h"}
-    for approach in (0.9, 1.09, np.nan):
-        assert unsound(sound, approach=approach) == {"approach_ustar_over_log_law"}
+    attached = replace(sound, tau_wall=np.abs(sound.tau_wall))
+    for flaw, stress, approach, reynolds, z0 in (
+        ([], sound, 1.0, 5e4, 3e-5),
+        (["z_e_over_z0"], sound, 1.0, 5e4, 1.1e-3),
+        (["y_plus"], sound, 1.0, 4e3, 3e-5),
+        (["reattachment_over_h"], attached, 1.0, 5e4, 3e-5),
+        (["approach_ustar_over_log_law"], sound, 0.9, 5e4, 3e-5),
+        (["approach_ustar_over_log_law"], sound, np.nan, 5e4, 3e-5),
+    ):
+        table = diagnostics(stress, approach, reynolds, 15.0, HEIGHT, z0)
+        assert table.index[table["sound"] == "no"].tolist() == flaw
 
 
 def test_a_corners_eddy_does_not_end_the_reversed_flow(sound: WallStress) -> None:

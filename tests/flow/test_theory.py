@@ -1,6 +1,5 @@
 """The linear theories: their integrals against exact ones, their stress against the solved."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -51,8 +50,8 @@ def test_each_wave_is_answered_by_its_own_coefficients() -> None:
     np.testing.assert_allclose([a, b], asked, rtol=0.01)
 
 
-def test_coefficients_fulfil_the_equation_of_the_inner_layer() -> None:
-    """B gives ln(l/z0) back, which must solve l ln(l/z0) = 2 kappa^2 L."""
+def test_coefficients_of_hills_and_wavelengths() -> None:
+    # B gives ln(l/z0) back, which must solve l ln(l/z0) = 2 kappa^2 L
     for ratio in (30.0, 1e3, 4e5):
         strength, asymmetry = theory.of_hill(ratio)
         depth = np.pi / asymmetry - 1 - 2 * np.log(np.pi / 2) - 4 * np.euler_gamma
@@ -60,25 +59,20 @@ def test_coefficients_fulfil_the_equation_of_the_inner_layer() -> None:
         assert strength > 0
     # of a smooth hill, as for dunes
     assert theory.of_hill(4e5) == pytest.approx((4.26, 0.228), rel=5e-3)
-
-
-def test_coefficients_of_wavelengths_fall_to_those_of_potential_flow() -> None:
-    """Far above z0 the stress is that of the outer flow, tau = 1 + 2 H, and its lag vanishes."""
+    # far above z0 the stress is that of the outer flow, tau = 1 + 2 H, and its lag vanishes
     a, b = theory.of_wavelength(np.array([1e4, 1e60, 1e300]))
     assert (np.diff(a) < 0).all()
     assert a[2] == pytest.approx(2, abs=0.05)
     assert 0 < b[2] < 0.01 < 1 < b[0]
-    # shorter than z0: no more than a number
-    assert theory.of_wavelength(np.array([1e-3])) == theory.of_wavelength(np.array([1.0]))
 
 
 def test_the_streamline_leaves_and_meets_the_bed_smoothly() -> None:
     for slope in (10.0, 15.0, 20.0):
-        seen = theory.seen_by_the_flow(triangle(slope, HEIGHT))
-        (bubble,) = seen.bubbles
         crest = HEIGHT / np.tan(np.radians(slope))
-        assert bubble[0] == pytest.approx(crest)
-        falls = seen.slopes[(seen.x[:-1] >= crest) & (seen.x[1:] <= bubble[1])]
+        seen = theory.seen_by_the_flow(triangle(slope, HEIGHT))
+        ((start, end),) = seen.bubbles
+        assert start == pytest.approx(crest)
+        falls = seen.slopes[(seen.x[:-1] >= crest) & (seen.x[1:] <= end)]
         assert falls[0] == pytest.approx(np.tan(np.radians(slope)), rel=0.05)
         assert falls[-1] == pytest.approx(0, abs=0.01)
         # to second order in the slope
@@ -113,34 +107,23 @@ def test_a_hills_length_is_that_of_its_upper_half() -> None:
     assert theory.half_length(step) is None
 
 
-@pytest.mark.parametrize(
-    ("model", "slope", "within"),
-    [
-        (theory.hill, 15.0, 0.12),
-        (theory.hill, 20.0, 0.12),
-        (theory.waves, 15.0, 0.12),
-        (theory.waves, 20.0, 0.2),  # the foot of steep faces comes out too high
-    ],
-)
-def test_the_theories_against_the_solved_flow(
-    solve: Solve, model: Callable[[BedLine, float], WallStress], slope: float, within: float
-) -> None:
+@pytest.mark.parametrize("slope", [15.0, 20.0])
+def test_the_theories_against_the_solved_flow(solve: Solve, slope: float) -> None:
     pile = replace(PILE, slope_deg=slope)
-    solved = WallStress.from_csv(solve(pile) / WALL_STRESS)
     face = pile.height_m / np.sin(np.radians(slope))
     places = np.array([0.3, 0.5, 0.7, 0.9]) * face
-    found = model(triangle(slope, pile.height_m), pile.roughness_m)
-    theirs, ours = (np.sqrt(one.mean_over(places, 0.2 * face)) for one in (solved, found))
-    np.testing.assert_allclose(ours, theirs, rtol=within)
-    lee = (found.s_m > face + 0.06 * pile.height_m) & (found.s_m < 2 * face)
-    assert not found.tau_wall[lee].any()
+    solved = WallStress.from_csv(solve(pile) / WALL_STRESS).mean_over(places, 0.2 * face)
+    # by waves the foot of steep faces comes out too high
+    for model, within in ((theory.hill, 0.12), (theory.waves, 0.12 if slope == 15.0 else 0.2)):
+        stress = model(triangle(slope, pile.height_m), pile.roughness_m)
+        ustar = np.sqrt(stress.mean_over(places, 0.2 * face))
+        np.testing.assert_allclose(ustar, np.sqrt(solved), rtol=within)
+        lee = (stress.s_m > face + 0.06 * pile.height_m) & (stress.s_m < 2 * face)
+        assert not stress.tau_wall[lee].any()
 
 
 def test_a_flat_beds_stress_is_the_undisturbed_one() -> None:
-    stress = theory.flat(triangle(15.0, HEIGHT))
+    stress, face = theory.flat(triangle(15.0, HEIGHT)), HEIGHT / np.sin(np.radians(15.0))
     assert (stress.tau_wall == 1).all()
-    face = HEIGHT / np.sin(np.radians(15.0))
     np.testing.assert_allclose(stress.edges_m[[0, -1]], [-0.2, 2 * face + 0.4], rtol=1e-12)
-    assert stress.mean_over(face, face) == pytest.approx(1)
-    top = stress.z_m.argmax()
-    assert stress.s_m[top] == pytest.approx(face, rel=0.01)
+    assert stress.s_m[stress.z_m.argmax()] == pytest.approx(face, rel=0.01)

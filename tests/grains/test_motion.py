@@ -11,15 +11,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from orchestrator import pipeline, plan
+from orchestrator import pipeline
 from orchestrator.bed.deck import GrainTable, read_table
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.grains import motion, threshold
 from orchestrator.grains.motion import Motion
-from orchestrator.report import bed
 from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
@@ -50,22 +47,6 @@ def test_what_a_track_counts_as(
         found = motion.count(np.array(track)[:, None], 0.3, falls_out=falls_out)
         states = (found.moved, found.fallen, found.carried)
         assert tuple(int(state[-1, 0]) for state in states) == ends
-
-
-@settings(deadline=None)
-@given(
-    st.lists(st.floats(-1, 1) | st.just(GONE), min_size=1, max_size=9), st.booleans(), st.booleans()
-)
-def test_the_rule_is_latched_and_nobody_is_both_moved_and_not(
-    track: list[float], falls_out: bool, goes_aside: bool
-) -> None:
-    travel = np.array(track)[:, None]
-    aside = np.full_like(travel, 0.3 * goes_aside)
-    found = motion.count(travel, 0.3, falls_out=falls_out, aside=aside)
-    for state in found:
-        assert (np.diff(state[:, 0].astype(int)) >= 0).all()
-    assert (found.moved >= found.carried).all()
-    assert found.moved.all() or not goes_aside
 
 
 LIFT_OFF = """
@@ -99,10 +80,6 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     # at the threshold of one grain lift over drag is steeper than the bed
     alone = closed_form(asked.scenes[0])
     assert float(alone.lift / alone.drag) > 1 / np.tan(np.radians(20.0))
-    # the pictures count as the tables do
-    (pile,) = plan.make(asked).piles.values()
-    steps = bed.read(pile, tmp_path / "cases")
-    assert steps.moved(len(steps.places) - 1) == last["moved"]
 
 
 @pytest.fixture(scope="module")
@@ -130,41 +107,30 @@ def _copied(folder: Path, **numbers: float) -> Path:
     return folder
 
 
-def _run(copy: Path) -> Path:
-    subprocess.run(["./Allrun"], cwd=copy, check=True)
-    return copy
-
-
-def test_a_load_step_ends_at_rest_and_moves_the_same_grains(
-    tmp_path: Path, grains: GrainTable
-) -> None:
-    ends = {"rest": {}, "waiting": {"rest_energy": 0.0}, "long": {"waiting_time": 40.0}}
-    runs = [_run(_copied(tmp_path / name, **numbers)) for name, numbers in ends.items()]
-    rest, waiting, long = (motion.read(folder, grains, 0.3, falls_out=False) for folder in runs)
+def test_rest_and_lines_left_out_change_no_grain(tmp_path: Path, grains: GrainTable) -> None:
+    changes = {"rest": {}, "waiting": {"rest_energy": 0.0}, "long": {"waiting_time": 40.0}}
+    runs = {name: _copied(tmp_path / name, **numbers) for name, numbers in changes.items()}
+    runs["whole"] = _copied(tmp_path / "whole", stir=0.0)
+    for folder in runs.values():
+        subprocess.run(["./Allrun"], cwd=folder, check=True)
+    rest, *others = (motion.read(run, grains, 0.3, falls_out=False) for run in runs.values())
     assert rest.moved[-1] > 0
-    np.testing.assert_array_equal(rest.level, waiting.level)
-    np.testing.assert_array_equal(rest.level, long.level)
-    samples = [len(read_table(folder / motion.SAMPLES)) for folder in runs]
+    for other in others:
+        np.testing.assert_array_equal(rest.level, other.level)
     # the waiting time is only the bound for what never rests
-    assert samples[0] == samples[2] < 0.6 * samples[1]
-
-
-def test_grains_at_their_places_need_no_line(tmp_path: Path, grains: GrainTable) -> None:
-    short, whole = (_run(_copied(tmp_path / str(stir), stir=stir)) for stir in (0.02, 0.0))
+    samples = {name: read_table(folder / motion.SAMPLES) for name, folder in runs.items()}
+    assert len(samples["rest"]) == len(samples["long"]) < 0.6 * len(samples["waiting"])
+    # grains at their places need no line in the dump
+    pd.testing.assert_frame_equal(samples["rest"], samples["whole"])
+    short, whole = (runs[name] for name in ("rest", "whole"))
     sizes = [(folder / motion.PASSAGE).stat().st_size for folder in (short, whole)]
     assert sizes[0] < sizes[1]
-    samples = pd.read_csv(short / motion.SAMPLES)
-    pd.testing.assert_frame_equal(samples, pd.read_csv(whole / motion.SAMPLES))
-    few, every = (motion.read_track(folder, grains, samples) for folder in (short, whole))
-    np.testing.assert_array_equal(np.isnan(few.travel), np.isnan(every.travel))
-    np.testing.assert_allclose(few.travel, every.travel, rtol=0, atol=0.02)
-    found, expected = (motion.read(f, grains, 0.3, falls_out=False) for f in (short, whole))
-    for value, other in zip(vars(found).values(), vars(expected).values(), strict=True):
-        np.testing.assert_array_equal(value, other)
+    few, every = (motion.read_track(run, grains, samples["rest"]).travel for run in (short, whole))
+    np.testing.assert_allclose(few, every, rtol=0, atol=0.02)
     frames = (short / motion.BED).read_text().split("ITEM: TIMESTEP")
     (short / motion.BED).write_text("ITEM: TIMESTEP".join(frames[:-1]))
     with pytest.raises(SolverError, match=r"bed.dump: its frames are not the ends"):
-        motion.read_track(short, grains, samples)
+        motion.read_track(short, grains, samples["rest"])
 
 
 @pytest.mark.parametrize(
@@ -246,22 +212,6 @@ def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_thei
     assert (curve[1:] > 0).all()
     some = threshold.of_pile(MOTION, np.where(LEVEL == 1, -SPEED, SPEED), 0.5, DENSITY)
     assert some.against_the_flow == 0.4
-
-
-@settings(deadline=None)
-@given(
-    level=st.lists(st.integers(0, 4), min_size=2, max_size=50),
-    fraction=st.floats(0.01, 1),
-)
-def test_intervals_enclose_their_value_where_the_stress_is_uniform(
-    level: list[int], fraction: float
-) -> None:
-    motion = Motion(FLOW, np.array(level), *(np.zeros(len(level), int),) * 3)
-    found = threshold.of_pile(motion, np.ones(len(level)), fraction, 1.0)
-    if math.isnan(found.tau):
-        assert motion.fraction[-1] < fraction
-    else:
-        assert found.tau_low < found.tau < found.tau_high
 
 
 def test_a_class_is_at_its_threshold_when_its_own_grains_have_moved() -> None:

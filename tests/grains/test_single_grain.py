@@ -13,7 +13,6 @@ from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.runs import case, engine
 from orchestrator.study import study
-from orchestrator.study.closed_form import regime_of
 from orchestrator.study.parts import Grain
 
 BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
@@ -61,18 +60,13 @@ protocol = { load_increment = 0.02, displacement_criterion = 1e-3 }
 
 @pytest.mark.parametrize(("text", "within"), [(FIGURE, 0.005), (POCKETS, 0.002), (SHORT, 0.02)])
 def test_one_grain_moves_at_its_closed_form(tmp_path: Path, text: str, within: float) -> None:
+    cells = _cells(text)
+    assert [batch.id for batch in batches(reversed(cells.scenes))] == [cells.id]
     # the deck's flow is the friction velocity over that of the closed form
-    at = threshold.of_grains(_run(_cells(text), tmp_path))
+    at = threshold.of_grains(_run(cells, tmp_path))
     np.testing.assert_allclose(at.value, 1.0, atol=within)
     assert np.all(at.low < 1 + within)
     assert np.all(at.high > 1 - within)
-
-
-def test_a_batch_holds_both_regimes_in_any_order() -> None:
-    cells = _cells(FIGURE)
-    assert len(cells.scenes) == 24
-    assert [batch.id for batch in batches(reversed(cells.scenes))] == [cells.id]
-    assert {regime_of(scene) for scene in cells.scenes} == {"low", "high"}
 
 
 def test_a_bed_has_no_scale(tmp_path: Path) -> None:
