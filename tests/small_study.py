@@ -3,11 +3,9 @@
 from pathlib import Path
 
 from orchestrator import plan, tables
-from orchestrator.plan import Plan
 from orchestrator.report.results import Results
 from orchestrator.runs import engine
 from orchestrator.study import study
-from orchestrator.study.study import Study
 
 TITLE = """<script>alert(1)</script> & "sand" d'été"""
 TEXT = f"""title = '''{TITLE}'''
@@ -42,18 +40,10 @@ def run(out: Path, text: str = TEXT) -> Results:
     cases = out / "cases"
     cases.mkdir(parents=True, exist_ok=True)
     asked = study.parse(text, name="small", where="test")
-    planned = plan.make(asked)
+    planned = plan.make(asked, cases=cases)
     done = planned.done(cases)
     todo = {name: one for name, one in planned.cases.items() if name not in done}
     with engine.local(cases, workers=2, limit_s=300.0) as pool:
         assert not engine.run(todo, pool, lambda *_: None)
     made = tables.make(asked, planned, cases, planned.done(cases))
     return Results(asked, planned, made, cases)
-
-
-def in_turn(asked: Study, cases: Path) -> Plan:
-    """The plan of a study, with its cases run one after the other."""
-    planned = plan.make(asked, cases=cases)
-    for one in planned.cases.values():
-        engine.execute(one, cases, 600.0)
-    return planned

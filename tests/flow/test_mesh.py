@@ -15,7 +15,6 @@ from orchestrator.fidelity import limits
 from orchestrator.flow.foam import SolvedFlow
 from orchestrator.flow.mesh import made_by_gmsh
 from orchestrator.runs import case
-from orchestrator.runs.case import templates
 from orchestrator.study import study
 from orchestrator.types import FloatArray
 from tests.bed.test_line import BEDS as SHAPES
@@ -72,8 +71,6 @@ def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
 def test_the_mesh_of_the_template_is_that_of_its_geometry(template: Path) -> None:
     given = meshio.read(template / "pile.msh").points
     np.testing.assert_allclose(made_by_gmsh(template).points, given, atol=1e-9)
-    geometry = templates() / "openfoam/pile/pile.geo"
-    assert (template / "pile.geo").read_bytes() == geometry.read_bytes()
 
 
 def test_threads_make_their_meshes_in_turn(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import shutil
 import subprocess
 import time
 from collections.abc import Callable
@@ -18,7 +17,7 @@ from orchestrator.bed import deck
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.physics.force_law import Exposure, ForceLaw
 from orchestrator.physics.laws import LAWS
-from orchestrator.runs.case import templates
+from tests.grains.test_motion import copied
 
 WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
@@ -68,13 +67,6 @@ def test_files_hold_every_digit_and_all_grains_are_well_inside_the_box(tmp_path:
     assert [float(line) for line in flows] == load_steps.tolist()
 
 
-def _shared(copy: Path, ranks: int) -> None:
-    """Let some processes share the template's grains."""
-    shutil.copytree(templates() / "liggghts" / "bed", copy)
-    numbers = copy / "parameters.liggghts"
-    numbers.write_text(numbers.read_text().replace("ranks equal 1 ", f"ranks equal {ranks} "))
-
-
 def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":
     """Grains that lie at the end of each load step; the results."""
     subprocess.run(["./Allrun"], cwd=copy, check=True)
@@ -85,7 +77,7 @@ def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":
 
 def test_processes_that_share_the_grains_find_the_same(tmp_path: Path) -> None:
     for name, ranks in (("one", 1), ("two", 2), ("again", 2)):
-        _shared(tmp_path / name, ranks)
+        copied(tmp_path / name, ranks=ranks)
     untouched = os.stat(tmp_path).st_mtime_ns
     # MPI's directory would be made here, and removed while another run starts
     with pytest.MonkeyPatch.context() as patch:
@@ -112,10 +104,7 @@ def _at_work_in(folder: Path, enough: Callable[[int], bool]) -> int:
 
 
 def test_processes_that_share_the_grains_die_with_their_shell(tmp_path: Path) -> None:
-    bed = tmp_path / "bed"
-    _shared(bed, 2)
-    numbers = bed / "parameters.liggghts"
-    numbers.write_text(numbers.read_text().replace("time_step equal 0.2", "time_step equal 2e-4"))
+    bed = copied(tmp_path / "bed", ranks=2, time_step=2e-4)
     shell = subprocess.Popen(["./Allrun"], cwd=bed)
     assert _at_work_in(bed, lambda count: count >= 4) >= 4
     shell.kill()

@@ -97,7 +97,7 @@ def grains() -> GrainTable:
     )
 
 
-def _copied(folder: Path, **numbers: float) -> Path:
+def copied(folder: Path, **numbers: float) -> Path:
     """The template's pile with other values of some parameters."""
     shutil.copytree(templates() / "liggghts" / "bed", folder)
     text = (folder / "parameters.liggghts").read_text()
@@ -109,8 +109,8 @@ def _copied(folder: Path, **numbers: float) -> Path:
 
 def test_rest_and_lines_left_out_change_no_grain(tmp_path: Path, grains: GrainTable) -> None:
     changes = {"rest": {}, "waiting": {"rest_energy": 0.0}, "long": {"waiting_time": 40.0}}
-    runs = {name: _copied(tmp_path / name, **numbers) for name, numbers in changes.items()}
-    runs["whole"] = _copied(tmp_path / "whole", stir=0.0)
+    runs = {name: copied(tmp_path / name, **numbers) for name, numbers in changes.items()}
+    runs["whole"] = copied(tmp_path / "whole", stir=0.0)
     for folder in runs.values():
         subprocess.run(["./Allrun"], cwd=folder, check=True)
     rest, *others = (motion.read(run, grains, 0.3, falls_out=False) for run in runs.values())
@@ -150,7 +150,7 @@ def test_a_bed_comes_to_rest_unless_its_step_is_too_large(
     error: type[SolverError] | None,
     what: str,
 ) -> None:
-    settled = _copied(tmp_path / "a", time_step=time_step, damping=damping, stiffness=STIFFNESS)
+    settled = copied(tmp_path / "a", time_step=time_step, damping=damping, stiffness=STIFFNESS)
     subprocess.run(["./Allrun"], cwd=settled, capture_output=True)
     check = partial(motion.check_rest, settled, weight=WEIGHT, stiffness=STIFFNESS, all_rest=True)
     table = read_table(settled / motion.SETTLING)

@@ -2,23 +2,19 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import tables
 from orchestrator.errors import InputError
 from orchestrator.grains import pile as pile_of_grains
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
-from orchestrator.plan import Plan
 from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
-from orchestrator.study.study import Study
 from orchestrator.tables.piles import Answer, size_class_rows
 from tests import small_study
 
@@ -38,35 +34,20 @@ final_fraction = 0.75
 """
 
 
-class Done(NamedTuple):
-    """A study whose runs are done."""
-
-    asked: Study
-    plan: Plan
-    cases: Path
-    tables: dict[str, pd.DataFrame]
-
-    def pile(self, method: str) -> Pile:
-        """The pile by a method."""
-        piles = self.plan.piles.values()
-        return next(pile for pile in piles if pile.scene.protocol.method == method)
-
-
-def _done(cases: Path, text: str) -> Done:
-    asked = study.parse(text, name="pile", where="test")
-    planned = small_study.in_turn(asked, cases)
-    return Done(asked, planned, cases, dict(tables.make(asked, planned, cases, [*planned.cases])))
+def _pile(results: Results, method: str) -> Pile:
+    piles = results.plan.piles.values()
+    return next(pile for pile in piles if pile.scene.protocol.method == method)
 
 
 def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(tmp_path: Path) -> None:
-    done = _done(tmp_path, SMALL.format(step=0.01))
-    slow = done.pile("dem")
-    motion, speed = slow.motion(tmp_path), slow.speed(tmp_path)
-    pivot = slow.pivot_thresholds(speed)
-    for at in slow.thresholds(tmp_path, (0.1, 0.3, 0.5, 0.7)):
+    results = small_study.run(tmp_path, SMALL.format(step=0.01))
+    slow, cases = _pile(results, "dem"), results.cases
+    motion, pivot = slow.motion(cases), slow.pivot_thresholds(slow.speed(cases))
+    for at in slow.thresholds(cases, (0.1, 0.3, 0.5, 0.7)):
         expected = pivot[int(np.ceil(at.fraction * motion.count)) - 1]
         assert at.ustar0 == pytest.approx(expected, rel=0.03)
-    curve, rows, grains = (done.tables[f"pile_{name}"] for name in ("curve", "threshold", "grain"))
+    names = "pile_curve", "pile_threshold", "pile_grain"
+    curve, rows, grains = (results.tables[name] for name in names)
     assert ((curve["moved"] + curve["not_moved"]) == slow.packing.count).all()
     assert rows["shields"].is_monotonic_increasing
     assert (rows["shields"].between(rows["shields_low"], rows["shields_high"])).all()
@@ -126,47 +107,47 @@ mobile_layers = 1
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> Done:
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Results:
     text = STUDY.format(fields=MIXED, methods=["pivot", "peeling", "dem"])
-    return _done(tmp_path_factory.mktemp("cases"), text)
+    return small_study.run(tmp_path_factory.mktemp("mixed"), text)
 
 
 @pytest.fixture(scope="module")
-def strip(tmp_path_factory: pytest.TempPathFactory) -> Done:
+def strip(tmp_path_factory: pytest.TempPathFactory) -> Results:
     text = STUDY.format(fields=STRIP, methods=["pivot", "dem"])
-    return _done(tmp_path_factory.mktemp("cases"), text)
+    return small_study.run(tmp_path_factory.mktemp("strip"), text)
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
 def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, name: str) -> None:
-    done: Done = request.getfixturevalue(name)
-    assert sorted(one.kind for one in done.plan.cases.values()) == ["pile", "poured"]
-    assert len({id(pile.packing) for pile in done.plan.piles.values()}) == 1
-    made = done.tables
+    results: Results = request.getfixturevalue(name)
+    assert sorted(one.kind for one in results.plan.cases.values()) == ["pile", "poured"]
+    assert len({id(pile.packing) for pile in results.plan.piles.values()}) == 1
+    made = results.tables
     rows = made["pile_threshold"].merge(made["scenes"][["scene_id", "method"]], on="scene_id")
     early = rows[rows["fraction"] == 0.1].set_index("method")["shields"]
-    assert set(early.index) == {pile.scene.protocol.method for pile in done.plan.piles.values()}
+    assert set(early.index) == {pile.scene.protocol.method for pile in results.plan.piles.values()}
     assert early.between(0.003, 0.2).all()
     held = made["pile_grain"]["pivot_deg"].dropna()
     assert len(held) > 0.3 * len(made["pile_grain"])
     assert held.between(-90, 180).all()
-    drawn = piles.poured(Results(done.asked, done.plan, made, done.cases))
+    drawn = piles.poured(results)
     names = {f"poured-{method}" for method in early.index}
     assert {figure.name for figure in drawn} >= names | {"pivots"}
 
 
 def test_a_bed_none_of_whose_grains_is_held_is_refused(
-    mixed: Done, monkeypatch: pytest.MonkeyPatch
+    mixed: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pile, none = mixed.pile("dem"), np.zeros(mixed.pile("dem").packing.count)
+    pile = _pile(mixed, "dem")
     for name in ("alone", "leaving"):
-        monkeypatch.setattr(Loads, name, lambda loads: none)
+        monkeypatch.setattr(Loads, name, lambda loads: np.zeros(pile.packing.count))
     with pytest.raises(InputError, match="lets it go"):
         pile_of_grains.flows(pile.loads(mixed.cases))
 
 
-def test_each_size_class_has_its_threshold(mixed: Done) -> None:
-    rows, pile = mixed.tables["size_class"], mixed.pile("dem")
+def test_each_size_class_has_its_threshold(mixed: Results) -> None:
+    rows, pile = mixed.tables["size_class"], _pile(mixed, "dem")
     assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count).all()
     middle = rows[np.abs(np.log(rows["size_over_d"])) < np.log(2) / 4]
     assert (middle["hiding"].dropna() == 1).all()
@@ -182,12 +163,12 @@ def test_each_size_class_has_its_threshold(mixed: Done) -> None:
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
 def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, name: str) -> None:
-    done: Done = request.getfixturevalue(name)
-    pile = done.pile("dem")
-    text = (done.cases / pile.case.name / "grains.data").read_text()
+    results: Results = request.getfixturevalue(name)
+    pile = _pile(results, "dem")
+    text = (results.cases / pile.case.name / "grains.data").read_text()
     rows = [row.split() for row in text.partition("Atoms\n\n")[2].splitlines()]
     _, _, diameter, _, _, y, _ = np.array(rows, float).T
-    force, exposed = pile.loads(done.cases).loading.at(0.02), pile.packing.windward
+    force, exposed = pile.loads(results.cases).loading.at(0.02), pile.packing.windward
     np.testing.assert_allclose(diameter, pile.packing.sizes * 1e-3, rtol=1e-14)
     if name == "mixed":  # each is driven by its own size
         sizes = pile.packing.sizes[exposed]
@@ -199,4 +180,4 @@ def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, nam
     # some lie beside others at one x
     assert exposed.sum() > 4.0
     assert (force[exposed] > 0).all()
-    assert done.tables["pile_grain"]["y_m"].between(0, 0.003).all()
+    assert results.tables["pile_grain"]["y_m"].between(0, 0.003).all()

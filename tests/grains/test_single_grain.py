@@ -15,8 +15,6 @@ from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.parts import Grain
 
-BETAS, SLOPES = (45.0, 50.0, 55.0, 60.0), (0.0, 15.0, 30.0)
-
 
 def _cells(text: str) -> SingleGrainCase:
     (cells,) = batches(study.parse(text, name="cells", where="test").scenes)
@@ -28,16 +26,16 @@ def _run(cells: SingleGrainCase, cases: Path, limit_s: float = 120.0) -> Motion:
     return Motion.from_csv(cases / cells.name)
 
 
-FIGURE = f"""
-protocol = {{ load_increment = 0.002 }}
+FIGURE = """
+protocol = { load_increment = 0.002 }
 [axes]
-"bed.entrainment_angle_deg" = {list(BETAS)}
-"bed.slope_deg" = {list(SLOPES)}
+"bed.entrainment_angle_deg" = [45.0, 50.0, 55.0, 60.0]
+"bed.slope_deg" = [0.0, 15.0, 30.0]
 [[group]]
-grain = {{ diameter = 1e-4 }}
-fluid = {{ viscosity = 1e-3 }}
+grain = { diameter = 1e-4 }
+fluid = { viscosity = 1e-3 }
 [[group]]
-grain = {{ diameter = 1e-3 }}
+grain = { diameter = 1e-3 }
 """
 FEW = """
 protocol = { load_increment = 0.005 }
