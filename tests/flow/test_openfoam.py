@@ -54,8 +54,8 @@ def test_a_run_that_did_not_end_well(tmp_path: Path, text: str, cause: str) -> N
     ("stated", "cause"),
     [
         ("Using: OpenFOAM-v1812 (see www.OpenFOAM.com)", "OpenFOAM 1812 is older than 1912"),
-        ("Using: OpenFOAM-10 (see https://openfoam.org)", "not of the openfoam.com line: .*-10"),
-        ("foo", "not of the openfoam.com line: it ended with 0 and printed “foo”"),
+        ("Using: OpenFOAM-10 (see https://openfoam.org)", "is not a known OpenFOAM: .*-10"),
+        ("foo", "is not a known OpenFOAM: it ended with 0 and printed “foo”"),
         ("Using: OpenFOAM-v2312 (2312) - visit www.openfoam.com", None),
     ],
 )
