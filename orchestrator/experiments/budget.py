@@ -19,10 +19,18 @@ from matplotlib.figure import Figure as Canvas
 from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
-from orchestrator.fidelity import calibration, limits
-from orchestrator.fidelity.calibration import FROZEN
+from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import AS_ASKED, PEELING, Fields, Pair, changed, level, value_of
+from orchestrator.fidelity.levels import (
+    AS_ASKED,
+    FROZEN,
+    PEELING,
+    Fields,
+    Pair,
+    changed,
+    level,
+    value_of,
+)
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile import line as bed_line
 from orchestrator.grains.threshold import PileThreshold
@@ -165,7 +173,7 @@ def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
         {
             "scene_id": change.scene.id,
             "scene": label(change.scene),
-            "model_class": calibration.model_class(change.scene),
+            "model_class": levels.model_class(change.scene),
             "choice": change.choice.name,
             "alternative": change.alternative,
             "fraction": before.fraction,
@@ -204,7 +212,7 @@ def _sections(
         name, largest = str(scene["scene"].iloc[0]), scene.groupby("choice", sort=False)[ENDS].max()
         row = {"scene": name}
         for quantity, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
-            low, high = calibration.together(largest, quantity)
+            low, high = levels.together(largest, quantity)
             row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
             widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
             row[f"{symbol}: largest share"] = str(widths.idxmax())
@@ -244,7 +252,7 @@ def _sections(
 def tornado(largest: pd.DataFrame) -> Canvas:
     """The largest share of each choice of one scene over the fractions; rows are the choices."""
     largest = largest.loc[largest.max(axis=1).sort_values().index]
-    total = [end for name in QUANTITIES for end in calibration.together(largest, name)]
+    total = [end for name in QUANTITIES for end in levels.together(largest, name)]
     rows = pd.concat([largest, pd.DataFrame([total], columns=ENDS, index=["all together"])])
     canvas = style.canvas(0.28 * len(rows) + 1.0)
     ax, bar = canvas.subplots(), 0.38

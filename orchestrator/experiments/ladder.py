@@ -26,7 +26,7 @@ from matplotlib.patheffects import Normal, Stroke
 from orchestrator import plan
 from orchestrator.bed.line import of_bed
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
-from orchestrator.fidelity import calibration, levels, limits
+from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, as_asked, on_levels
 from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, changed, level
 from orchestrator.grains.pile import Pile
@@ -125,7 +125,7 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
     """A row for each scene and pair whose runs are done: its cost and its thresholds."""
-    rows, floors = [], calibration.floors()
+    rows, floors = [], levels.floors()
     for key, decision in pairs.items():
         pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
         if not pair or not runs.are_done(key):
@@ -142,12 +142,12 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
             **point(scene),
             "packing": levels.packing(scene) + (", level bed" if pile.bed.is_level else ""),
             "asked": scene.protocol.method,
-            **{f"class_{part}": calibration.scene_class(part, scene) for part in LEVELS},
+            **{f"class_{part}": levels.scene_class(part, scene) for part in LEVELS},
             "count": motion.count,
             "flow_level": pair.flow.name,
             "grain_level": pair.grains.name,
             "same_model": pair.flow.same_model and pair.grains.same_model,
-            "model_floor": floors.get(calibration.model_class(scene), math.nan),
+            "model_floor": floors.get(levels.model_class(scene), math.nan),
             "flow_s": runs.cpu_s([run for flow in pile.model.cases for run in (*flow.needs, flow)]),
             "grains_s": here_s + runs.cpu_s(pile.method.cases),
         }
@@ -211,12 +211,12 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def known_errors(points: pd.DataFrame) -> pd.DataFrame:
-    """Known error of each level, by class of scene and fraction; `calibration` reads it.
+    """Known error of each level, by class of scene and fraction; `levels.measured` reads it.
 
     The error is the largest over the scenes, infinite where only one of level and reference reached
     the fraction, zero where neither did. The uncertainty is how far the reference itself moved.
     """
-    beside = np.where(points["class_flow"] == calibration.LEVEL_BED, FLAT.name, FINE.name)
+    beside = np.where(points["class_flow"] == levels.LEVEL_BED, FLAT.name, FINE.name)
     grains = points[(points["flow_level"] == beside) & (points["asked"] == "dem")]
     flow = points[(points["grain_level"] == PEELING.name) & points["same_model"]]
     taus, tables = [name for name in points if str(name).startswith("tau_")], []

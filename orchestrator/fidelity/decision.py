@@ -14,9 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from orchestrator.fidelity import calibration
-from orchestrator.fidelity.calibration import UNKNOWN, Known
-from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Level, Pair, changed, level, pair_of
+from orchestrator.fidelity import levels
+from orchestrator.fidelity.levels import LEVELS, Known, Level, Pair, changed, level, pair_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.fields import FIELDS
@@ -77,7 +76,7 @@ NO_BOUND = Bound()
 NO_BOUNDS: Mapping[str, Bound] = {}
 THEORY = level("flow", "waves")
 """Above it the flow is solved."""
-CHECK = Bound(level("flow", "coarse"), PEELING, "it checks answers without DEM")
+CHECK = Bound(level("flow", "coarse"), levels.PEELING, "it checks answers without DEM")
 """Above it are the levels that check an answer without DEM."""
 
 
@@ -98,7 +97,7 @@ def decide(
     tolerance : float or None
         Relative error of tau_c at the scene's fractions, the uncertainty of the reference
         included; 0: the scenes as they are asked. None: a pile whose file sets no field about the
-        answer is answered on a solved flow, within the lowest `calibration.floors` of all classes,
+        answer is answered on a solved flow, within the lowest `levels.floors` of all classes,
         so that the scenes of a figure are answered alike; all others, and poured beds, as asked.
     above : mapping of str to Bound, optional
         Levels that turned out to be not good enough, by the id of the scene.
@@ -113,7 +112,7 @@ def decide(
         else:
             exact = changed(scene, {"protocol.method": "pivot"})
             why = "the closed form is exact for a single grain in a held flow"
-            decided[scene.id] = Decision(scene, exact, None, UNKNOWN, why)
+            decided[scene.id] = Decision(scene, exact, None, levels.UNKNOWN, why)
     return decided | _cheapest(offered)
 
 
@@ -122,10 +121,10 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
     rules, model, bed = scene.protocol, scene.flow.model, scene.bed
     limit, start = "within the tolerance", ""
     if tolerance is None:
-        floors = calibration.floors()
+        floors = levels.floors()
         is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in ANSWERS)
         is_lattice = isinstance(bed, PileBed) and not scene.is_poured
-        if is_set or not is_lattice or calibration.model_class(scene) not in floors:
+        if is_set or not is_lattice or levels.model_class(scene) not in floors:
             return (), ASKED
         tolerance, start = min(floors.values()), "chosen by default: "
         limit = f"within the model's own spread of {tolerance:.0%}"
@@ -144,11 +143,11 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
     if not isinstance(bed, PileBed):
         beyond = bed.slope_deg > bed.entrainment_angle_deg
         return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
-    if name := calibration.unmeasured(scene):
+    if name := levels.unmeasured(scene):
         return (), f"no error is known for {name}: {ASKED}"
-    levels = (tuple(level for level in part if level.takes(scene)) for part in LEVELS.values())
-    classes = (calibration.classes(part, scene) for part in LEVELS)
-    pairs, why = _good_enough(*levels, *classes, above, tolerance)
+    taken = (tuple(level for level in part if level.takes(scene)) for part in LEVELS.values())
+    classes = (levels.classes(part, scene) for part in LEVELS)
+    pairs, why = _good_enough(*taken, *classes, above, tolerance)
     why = f"{start}{why} {limit}" if pairs else why
     return pairs, f"{why}; {above.because}" if above.because else why
 
@@ -164,13 +163,13 @@ def _good_enough(
 ) -> tuple[Sequence[Pair], str]:
     """Pairs of some levels that are good enough, of which any may be the cheapest, and why."""
     offered = []
-    for levels, bound in ((flow, above.flow), (grains, above.grains)):
-        start = levels.index(bound) + 1 if bound in levels else 0
-        offered.append([level for level in levels[start:] if level.same_model])
-    if flow_classes == (calibration.LEVEL_BED,):
-        offered[0] = [FLAT]
+    for part, bound in ((flow, above.flow), (grains, above.grains)):
+        start = part.index(bound) + 1 if bound in part else 0
+        offered.append([level for level in part[start:] if level.same_model])
+    if flow_classes == (levels.LEVEL_BED,):
+        offered[0] = [levels.FLAT]
     known = {
-        Pair(*pair): calibration.known_of_classes(*pair, flow_classes, grain_classes)
+        Pair(*pair): levels.known_of_classes(*pair, flow_classes, grain_classes)
         for pair in itertools.product(*offered)
     }
     pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
@@ -212,7 +211,7 @@ class _Option(NamedTuple):
 @cache  # a plan is made several times
 def _option(scene: Scene, pair: Pair, why: str, by_default: bool) -> _Option:
     """The option to answer a scene on a pair of levels."""
-    pile, known = Pile(pair.answer(scene)), calibration.known(pair, scene)
+    pile, known = Pile(pair.answer(scene)), levels.known(pair, scene)
     flows_s = {run.name: run.cost_s for flow in pile.model.cases for run in (*flow.needs, flow)}
     grains_s = sum(run.cost_s for run in pile.method.cases) or known.grains_s
     return _Option(Decision(scene, pile.scene, pair, known, why, by_default), flows_s, grains_s)
@@ -245,16 +244,16 @@ def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
 def as_asked(scene: Scene, why: str = ASKED) -> Decision:
     """The decision to answer a scene as it is."""
     if not isinstance(scene.bed, PileBed):
-        return Decision(scene, scene, None, UNKNOWN, why)
-    pair, name = pair_of(scene), calibration.unmeasured(scene)
+        return Decision(scene, scene, None, levels.UNKNOWN, why)
+    pair, name = pair_of(scene), levels.unmeasured(scene)
     if name and name not in why:
         why = f"{why}; no error is known for {name}"
-    return Decision(scene, scene, pair, calibration.known(pair, scene), why)
+    return Decision(scene, scene, pair, levels.known(pair, scene), why)
 
 
 def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
     """The decision to answer a pile on a pair of levels."""
-    return Decision(scene, pair.answer(scene), pair, calibration.known(pair, scene), why)
+    return Decision(scene, pair.answer(scene), pair, levels.known(pair, scene), why)
 
 
 def _best_model(scene: Scene) -> str:

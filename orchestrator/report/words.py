@@ -11,7 +11,6 @@ import pandas as pd
 
 from orchestrator import __version__
 from orchestrator.fidelity import levels as fidelity
-from orchestrator.fidelity.calibration import floors
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
@@ -77,7 +76,7 @@ def sentences(results: Results) -> list[str]:
     chosen = [d for d in results.plan.decisions.values() if d.by_default]
     if chosen:
         names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
-        error, floor = max(item.known.total for item in chosen), min(floors().values())
+        error, floor = max(item.known.total for item in chosen), min(fidelity.floors().values())
         warnings.append(caption("defaults", names=names, error=error, floor=floor))
     rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
     if tolerance and len(rows):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.fidelity import calibration, decision, limits
+from orchestrator.fidelity import decision, levels, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
 from orchestrator.grains import threshold
@@ -116,7 +116,7 @@ def threshold_rows(answer: Answer) -> Iterator[Row]:
     z0, depth, place = scene.bed.roughness, scene.flow.depth, point(scene)
     pivot = pile.pivot_thresholds(answer.speed)
     for fraction in scene.protocol.fractions:
-        found, model = answer.at(fraction), calibration.spread(asked, fraction)
+        found, model = answer.at(fraction), levels.spread(asked, fraction)
         value, factor = shields(scene, found.tau), np.nan if error is None else 1 + error
         row = {
             "scene_id": answer.scene_id,

@@ -14,8 +14,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments import ladder
 from orchestrator.experiments.experiment import Runs
 from orchestrator.experiments.ladder import FAST, HEADS, REFERENCES
-from orchestrator.fidelity.calibration import LEVEL_BED
-from orchestrator.fidelity.levels import FLAT, LEVELS
+from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 

@@ -10,10 +10,20 @@ import numpy as np
 import pytest
 
 from orchestrator import plan
-from orchestrator.fidelity import calibration, decision
-from orchestrator.fidelity.calibration import LEVEL_BED, floors, model_class
+from orchestrator.fidelity import decision, levels
 from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, as_asked
-from orchestrator.fidelity.levels import AS_ASKED, FLAT, FLOW, GRAINS, LEVELS, Pair, level
+from orchestrator.fidelity.levels import (
+    AS_ASKED,
+    FLAT,
+    FLOW,
+    GRAINS,
+    LEVEL_BED,
+    LEVELS,
+    Pair,
+    floors,
+    level,
+    model_class,
+)
 from orchestrator.grains.pile import Pile
 from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
@@ -49,7 +59,7 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
     chosen = decide(scene, tolerance)
     pairs = (Pair(*pair) for pair in itertools.product(FLOW, GRAINS))
     known = {
-        pair: calibration.known(pair, scene)
+        pair: levels.known(pair, scene)
         for pair in pairs
         if all(one.same_model and one.takes(scene) for one in pair)
     }
@@ -85,8 +95,8 @@ def test_a_flow_that_many_piles_share_counts_once(
         key: np.array([error * column, 0 * column, time * column])
         for key, (error, time) in known.items()
     }
-    monkeypatch.setattr(calibration, "measured", lambda: made)
-    for module, name in ((calibration, "known_of_classes"), (decision, "_good_enough")):
+    monkeypatch.setattr(levels, "measured", lambda: made)
+    for module, name in ((levels, "known_of_classes"), (decision, "_good_enough")):
         monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
     scenes = [pile({"grain.diameter": 1e-4}, roughness=z0) for z0 in np.geomspace(4e-6, 3e-5, 9)]
     names = {
@@ -160,7 +170,7 @@ def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
     model: str, pile: MakePile
 ) -> None:
     asked = pile({"flow.model": model}, **LEVEL)
-    assert calibration.classes("flow", asked) == (LEVEL_BED,)
+    assert levels.classes("flow", asked) == (LEVEL_BED,)
     for tolerance in (0.9, 0.7, 0.1):
         chosen = decide(asked, tolerance)
         assert chosen.levels

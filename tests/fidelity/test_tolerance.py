@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import cli, pipeline
-from orchestrator.fidelity import calibration, decision
+from orchestrator.fidelity import decision, levels
 from orchestrator.fidelity.levels import LEVELS
 from orchestrator.study import study
 
@@ -76,8 +76,8 @@ def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
         if one.name in ("coarse", "standard", "pivot", "peeling", "2 layers, fast")
     }
     wrong |= {(part, name, f"{like}, limiting slope"): v for (part, name, like), v in wrong.items()}
-    monkeypatch.setattr(calibration, "measured", lambda: wrong)
-    for cached in (calibration.known_of_classes, decision._good_enough):
+    monkeypatch.setattr(levels, "measured", lambda: wrong)
+    for cached in (levels.known_of_classes, decision._good_enough):
         monkeypatch.setattr(cached.__module__ + "." + cached.__name__, cached.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     found = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])
