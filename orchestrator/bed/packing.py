@@ -217,10 +217,7 @@ def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
 
 
 def _disordered(columns: int, layers: int, lattice: Lattice) -> FloatArray:
-    """Rows, shape (n, 2), whose lowest has random gaps and offsets; the others rest in its pockets.
-
-    Places are along the rows and normal to them; the uppermost row's middle is at the origin.
-    """
+    """Rows over a straight one with random gaps: places along and normal to them, shape (n, 2)."""
     rng = np.random.default_rng(lattice.seed)
     size = lattice.disorder
     spacing = 2 * np.cos(lattice.beta) + rng.uniform(0, size, 2 * columns)
@@ -344,11 +341,7 @@ def _rows_along(top: BedLine, first: int, last: int, lattice: Lattice, counted: 
 def _on_a_curve(
     curve: BedLine, layers: int, lattice: Lattice, size: float, seed: int
 ) -> list[FloatArray]:
-    """Rows over a curve, on which the lowest lies, the uppermost first.
-
-    Its grains have random gaps of at most `size` and random offsets. Where two grains of a row
-    would overlap, on the inside of a bend, the row below them is opened.
-    """
+    """Rows over a curve, on which the lowest lies with random gaps, the uppermost first."""
     spacing = 2 * np.cos(lattice.beta)
     count = int(np.ceil(curve.lengths.sum() / spacing)) + 1
     rng = np.random.default_rng(seed)
@@ -366,6 +359,7 @@ def _on_a_curve(
         into = (along - arc[segment])[:, None] * curve.tangents[segment]
         lowest = curve.corners[segment] + into + aside[:, None] * curve.normals[segment]
         rows = _stacked(lowest, layers)
+        # where two grains of a row would overlap, in a bend, the row below them is opened
         wide = np.zeros(count)
         for above, row in enumerate(rows):
             more = np.maximum(_overlap(row), 0.0)

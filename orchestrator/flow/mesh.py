@@ -178,7 +178,7 @@ def made_by_gmsh(directory: Path) -> Any:
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
     Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`. Raises a
-    SolverError if gmsh fails, not all cells are hexahedra, some are inverted, or a group lacks.
+    SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is missing.
     """
     import meshio
 

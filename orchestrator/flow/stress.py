@@ -96,11 +96,7 @@ class WallStress:
         return np.asarray((integral(high) - integral(low)) / length)
 
     def _slopes(self, tau: FloatArray) -> FloatArray:
-        """Change of the stress along each face, 1/m: the mean of those to its two neighbours.
-
-        It is limited so that no face reaches beyond its neighbours' values, none where the stress
-        has an extreme; a bend of the bed parts neighbours.
-        """
+        """Change of the stress along each face, 1/m: the mean of those to its two neighbours."""
         apart = np.diff(self.s_m)
         steps = np.diff(tau) / apart
         chord = np.hypot(np.diff(self.x_m), np.diff(self.z_m))
@@ -112,6 +108,7 @@ class WallStress:
             np.where(np.isnan(behind), ahead, behind),
             np.where(np.isnan(ahead), behind, ahead),
         )
+        # limited so that no face reaches beyond its neighbours' values
         slope = np.where(behind * ahead > 0.0, (behind + ahead) / 2.0, 0.0)
         most = 2.0 * np.minimum(np.abs(behind), np.abs(ahead))
         return np.asarray(np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most)))

@@ -136,11 +136,7 @@ def seen_by_the_flow(line: BedLine) -> Seen:
 def _streamline(
     x: FloatArray, z: FloatArray, start: float, top: float, slope: float
 ) -> tuple[slice, FloatArray] | None:
-    """Places under a streamline that leaves the bed with a slope, and its heights there.
-
-    It lands at the first place that it can reach without falling more steeply than it does. None
-    where that is right behind its start.
-    """
+    """Places under a streamline that leaves the bed with a slope, and its heights, if any."""
     ratio = slope / STEEPEST / 4
     # length over drop, to second order; the exact one grows without bounds towards 37 degrees
     stretch = 1.5 / STEEPEST * (1 + ratio + 2 * ratio**2)

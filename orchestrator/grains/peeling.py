@@ -125,11 +125,9 @@ class Disc(NamedTuple):
 
 @dataclass(frozen=True)
 class _Roller:
-    """A grain that the flow pushes, and its neighbours by their numbers; lengths in d.
+    """A grain that the flow pushes towards +x, and its neighbours by their numbers; lengths in d.
 
-    The plane is mirrored where the flow pushes the grain upstream, so that it always goes towards
-    +x; `along` and `outward` are the unit vectors of that way and out of the bed, `ratio` the size
-    of the local friction velocity over the undisturbed one.
+    `along` and `outward` are the unit vectors of that way and out of the bed.
     """
 
     start: Disc
@@ -291,7 +289,7 @@ def _rollers(
     for i, near in _neighbours(places, sizes, chosen & (loading.ratio != 0)):
         ratio = float(loading.ratio[i])
         side, discs = math.copysign(1.0, ratio), ahead if ratio > 0 else behind
-        # mirrored, upstream along the bed leads towards +x
+        # where the flow runs back, the plane is mirrored: upstream leads towards +x
         along = [float(loading.along[i, 0]), side * float(loading.along[i, 1])]
         outward = [side * float(loading.outward[i, 0]), float(loading.outward[i, 1])]
         others = {k: discs[k] for k in near}
@@ -345,10 +343,7 @@ def _lean(place: Place, neighbour: Place) -> float:
 def _pyramids(
     places: Places, sizes: FloatArray, chosen: BoolArray
 ) -> Iterator[tuple[int, FloatArray]]:
-    """The chosen grains, each with the inward normals of the pyramid of its contacts, (k, 3).
-
-    With fewer than three contacts it contains no direction: its one side faces up.
-    """
+    """The chosen grains, each with the inward normals of the pyramid of its contacts, (k, 3)."""
     first, second, apart = places.contacts(sizes)
     directions = apart / np.linalg.norm(apart, axis=1)[:, None]
     for i, rows in _by_grain(first, second, chosen):
@@ -358,6 +353,7 @@ def _pyramids(
             others = touching @ normal
             if (others > -FLAT).all() or (others < FLAT).all():
                 sides.append(normal * (1 if others.sum() > 0 else -1))
+        # a pyramid of fewer than three contacts contains no direction: its one side faces up
         yield i, np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
 
 

@@ -68,8 +68,7 @@ def test_one_grain_moves_at_its_closed_form(tmp_path: Path, text: str, within: f
 
 
 def test_a_bed_has_no_scale(tmp_path: Path) -> None:
-    # two diameters, one Reynolds number, one ratio of lift to drag: the same motion to the load
-    # step
+    # two diameters, one Reynolds number, one ratio of lift to drag: the same load step
     text = """
     forces = { law = "high" }
     protocol = { load_increment = 0.002 }
