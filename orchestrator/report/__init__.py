@@ -36,14 +36,14 @@ def write(
     `timings` are the wall times of the finished cases, `failures` the cases that failed, with why.
     A figure that fails, for any cause such as too little memory, costs a line of the page.
     """
-    from orchestrator.report import bed, flows, grains, page, piles, shields, style, words
+    from orchestrator.report import bed, flows, page, piles, shields, style, words
 
     figures: list[style.Figure] = []
     faults: list[str] = []
     with style.settings():
         for draw in (
-            *(bed.draw, shields.draw, grains.draw, piles.extended, piles.fractions, piles.wear),
-            *(grains.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
+            *(bed.draw, shields.draw, shields.singles, shields.piles, piles.fractions, piles.wear),
+            *(shields.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
             *(flows.where, flows.hills),
         ):
             try:

@@ -16,7 +16,10 @@ WIDTH = 60
 """Letters of a line over a panel."""
 LISTS = ("obstacles",)
 """Columns of fields that are lists: an empty cell is an empty list."""
-OTHERS = {"fraction": Info("fraction", "n/N", "%"), "by": Info("by")}
+OTHERS = {
+    **{"fraction": Info("fraction", "n/N", "%"), "by": Info("by")},
+    "answered_method": fields.ANSWERS["answered_method"].info,
+}
 """Words of columns of tables that are no fields."""
 OF_METHODS = {"DEM", "DEM of piles", "DEM and peeling", "DEM and peeling of piles"}
 """Scopes of fields that have no effect by other methods."""

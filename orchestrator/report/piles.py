@@ -1,30 +1,30 @@
-"""Figures of piles: fractions that moved, extended Shields diagram, changing and poured beds."""
+"""Figures of piles: fractions that moved, beds that change, and poured beds with their sizes."""
 
 from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
 
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import measured
-from orchestrator.report import labels, shields, style, theory
-from orchestrator.report.grains import colour_entries
+from orchestrator.report import labels, style
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, case_names, drawable, split
-from orchestrator.report.shields import SHAPE, parted
-from orchestrator.report.style import Figure
+from orchestrator.report.shields import (
+    LABEL,
+    SHAPE,
+    SHOWN,
+    about,
+    colour_entries,
+    parted,
+    sheets,
+)
+from orchestrator.report.style import Figure, Look
 
-TAU = ("reynolds", "shields", "shields_low", "shields_high")
-SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
-"""Columns that figures, panels, axes, colours and markers tell apart."""
 SHOWN_UP_TO = 0.9
 """n/N up to which the axis of the stress holds every curve."""
 MARKERS = 30
@@ -37,24 +37,6 @@ HIDING = (
     ("Egiazaroff", measured.egiazaroff_hiding, "--"),
     ("one stress moves all sizes", lambda size: 1 / size, ":"),
 )
-Panels = list[tuple[Axes, pd.DataFrame]]
-
-
-def _figures(
-    rows: pd.DataFrame, keys: list[str], height: float
-) -> Iterator[tuple[str, str, Canvas, Panels, pd.DataFrame]]:
-    """Figures of panels by keys, those of the most piles first, in each figure by rising keys.
-
-    Yields the endings of the figure's name and title, the figure, axes with their rows, all rows.
-    """
-    panels = [part for _, part in split(rows, *keys)]
-    order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
-    for name, title, chosen in style.pages(order):
-        parts = [panels[i] for i in sorted(chosen)]
-        figure, axes = style.grid(len(parts), height)
-        for ax, part in zip(axes, parts, strict=True):
-            ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-        yield name, title, figure, list(zip(axes, parts, strict=True)), pd.concat(parts)
 
 
 def fractions(results: Results) -> Iterator[Figure]:
@@ -67,93 +49,32 @@ def fractions(results: Results) -> Iterator[Figure]:
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
     for (alpha,), rows in split(scenes, "alpha_deg"):
-        choices, rows, variants = parted(rows, *SHOWN)
-        keys = ["z0_over_d", *choices]
-        for name, title, figure, panels, shown in _figures(rows, keys, 2.3):
-            for ax, part in panels:
+        choices, rows = parted(rows, *SHOWN)
+        for sheet in sheets(rows, ["z0_over_d", *choices], 2.3, labels.TAU_AXIS, "$n/N$"):
+            for ax, part in zip(sheet.axes, sheet.parts, strict=True):
                 for _, pile in part.iterrows():
                     line, colour = curves[pile["scene_id"]], colours[float(pile["d_m"])]
-                    look: style.Look = {"marker": str(pile[SHAPE]), "ms": 3, "mew": 0.7, "lw": 0.8}
-                    look |= {"mfc": colour if pile["law_holds"] else "white", "color": colour}
+                    look: Look = {"marker": str(pile[SHAPE]), "ms": 3, "mew": 0.7, "lw": 0.8}
                     look |= {"markevery": -(-len(line) // MARKERS), "gid": str(pile["scene_id"])}
+                    look |= {"color": colour, "label": pile[LABEL]}
+                    if not pile["law_holds"]:
+                        look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
                     ax.plot(line["shields"], line["fraction_moved"], **look)
-            axes = [ax for ax, _ in panels]
-            for ax in axes[::2]:
-                ax.set_ylabel("$n/N$")
             # the last grains of a pile may wait for a hundred times the stress of the others
-            stress = pd.concat([curves[item] for item in shown["scene_id"]])
+            stress = pd.concat([curves[item] for item in sheet.rows["scene_id"]])
             early = stress[stress["fraction_moved"] <= SHOWN_UP_TO]["shields"]
             early = early if len(early) else stress["shields"]
-            axes[0].set(xscale="log", xlim=(early.min() / 1.2, 1.2 * early.max()), ylim=(0, 1))
-            for ax in axes:
+            reach = early.min() / 1.2, 1.2 * early.max()
+            sheet.axes[0].set(xscale="log", xlim=reach, ylim=(0, 1))  # the panels share them
+            for ax in sheet.axes:
                 style.plain_ticks(ax.xaxis)
-            shields.label_lowest(axes, labels.TAU_AXIS)
-            looks = [*shields.point_entries(shown, variants), *variants]
-            style.legends(figure, colour_entries("d_m", colours, shown), looks)
-            title = f"Fraction of moving grains, {labels.plain('alpha_deg', alpha)}{title}"
-            text = caption("fractions", about=shields.about(shown))
-            fold = bool(name) or alpha != scenes["alpha_deg"].min()
-            name = f"fractions-alpha{alpha:g}{name}"
-            yield Figure(name, title, text, case_names(shown), figure, fold=fold)
-
-
-def extended(results: Results) -> Iterator[Figure]:
-    """Figs. 15 and 16, the extended Shields diagram by slope, figures for each z0/d."""
-    every = results.joined("pile_threshold")
-    reached = every[drawable(every, "reynolds", "shields")] if len(every) else every
-    colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
-    for (ratio,), rows in split(reached, "z0_over_d"):
-        written = labels.ratio_of(float(str(ratio)), "d")
-        choices, rows, variants = parted(rows, *SHOWN, "fraction")
-        keys, height = ["alpha_deg", *choices], 2.6 if rows["alpha_deg"].nunique() > 1 else 3.4
-        for name, title, figure, panels, shown in _figures(rows, keys, height):
-            dashes = theory.dashes(shown["force_law"])
-            for ax, part in panels:
-                published = _thresholds(ax, results, part, colours, dashes)
-            axes, parts = [ax for ax, _ in panels], [part for _, part in panels]
-            # below the first grains lies the threshold of one, which they are compared with
-            reach = shown["reynolds"].min() / 5, shown["reynolds"].max() * 2
-            shields.prepare(axes, parts, reach)
-            shields.mark_drag_law(axes, parts)
-            looks = [
-                *shields.within(axes, shields.line_entries(shown, dashes)),
-                *shields.point_entries(shown, variants),
-                *variants,
-                *shields.within(axes, published),
-            ]
-            style.legends(figure, colour_entries("fraction", colours, reached), looks)
-            lines = shields.references(shown, sloped=True)
-            text = caption("extended", about=shields.about(shown), lines=lines)
-            title = f"Thresholds of piles by slope, z₀ = {written}{title}"
-            fold = bool(name) or ratio != reached["z0_over_d"].min()
-            name = f"extended-shields-{written.replace('/', '').replace(' ', '')}{name}"
-            yield Figure(name, title, text, case_names(shown), figure, fold=fold)
-
-
-def _thresholds(
-    ax: Axes,
-    results: Results,
-    rows: pd.DataFrame,
-    colours: dict[float, str],
-    dashes: dict[str, theory.Dash],
-) -> list[Artist]:
-    """Thresholds of one slope beside the closed form; returns the legend of the references."""
-    piles = results.scenes[results.scenes["scene_id"].isin(rows["scene_id"])]
-    for _, scenes in split(piles, "beta_deg"):
-        for branch in theory.branches(scenes):
-            shields.draw_branch(ax, branch, "0.2", dashes[branch.law])
-    columns = [*dict.fromkeys((*SHOWN, *TAU, "fraction", "regime", "usable", SHAPE))]
-    for (fraction,), points in split(rows[columns], "fraction"):
-        colour = colours[float(str(fraction))]
-        for _, series in split(points, "nu_m2_s", "force_law", "regime", SHAPE):
-            # piles that differ in more than d are a scatter, not a line
-            if series["d_m"].is_unique:
-                ordered = series.sort_values("reynolds")
-                ax.plot(ordered["reynolds"], ordered["shields"], color=colour, lw=0.6, zorder=2)
-        shields.draw_points(ax, points, colour, TAU)
-    in_air = shields.draw_sloped_air(ax, piles, style.AIR)
-    wet = not in_air or not theory.in_gas(piles).all()
-    return [*in_air, *(shields.draw_water(ax) if wet else [])]
+            shown = colour_entries("d_m", colours, sheet.rows)
+            style.legends(sheet.canvas, shown, style.samples(sheet.axes))
+            name, where = f"fractions-alpha{alpha:g}{sheet.name}", labels.plain("alpha_deg", alpha)
+            title = f"Fraction of moving grains, {where}{sheet.title}"
+            text, cases = caption("fractions", about=about(sheet.rows)), case_names(sheet.rows)
+            fold = bool(sheet.name) or alpha != scenes["alpha_deg"].min()
+            yield Figure(name, title, text, cases, sheet.canvas, fold=fold)
 
 
 def wear(results: Results) -> Iterator[Figure]:
@@ -162,30 +83,24 @@ def wear(results: Results) -> Iterator[Figure]:
     if rows.empty:
         return
     colours = style.palette("d_m", sorted(set(rows["d_m"])))
-    grey: style.Look = {"color": "0.2"}
-    looks = [
-        Line2D([], [], ls="--", lw=0.9, label="flow of the whole pile", **grey),
-        Line2D([], [], lw=1.3, label="flow of the bed as it is", **grey),
-        Line2D([], [], ls="", marker="o", ms=4, label="first 5 % apart", **grey),
-    ]
-    keys = ["alpha_deg", "packing", "method"]
-    for name, title, figure, panels, shown in _figures(rows, keys, 2.1):
-        for ax, part in panels:
+    frozen: Look = {"ls": "--", "lw": 0.9, "label": "flow of the whole pile"}
+    worn: Look = {"lw": 1.3, "label": "flow of the bed as it is"}
+    apart: Look = {"ls": "", "marker": "o", "ms": 4, "label": "first 5 % apart"}
+    keys, axes = ["alpha_deg", "packing", "method"], ("$n/N$", "Shields number $θ$")
+    for sheet in sheets(rows, keys, 2.1, *axes):
+        for ax, part in zip(sheet.axes, sheet.parts, strict=True):
             for (d, _), group in split(part, "d_m", "scene_id"):
                 x, colour = group["fraction_moved"], colours[float(str(d))]
-                ax.plot(x, group["shields_frozen"], color=colour, ls="--", lw=0.9)
-                ax.plot(x, group["shields"], color=colour, lw=1.3)
+                ax.plot(x, group["shields_frozen"], color=colour, **frozen)
+                ax.plot(x, group["shields"], color=colour, **worn)
                 end = group[x == group["holds_until"]]
-                ax.plot(end["fraction_moved"], end["shields"], "o", color=colour, ms=4)
-        axes = [ax for ax, _ in panels]
-        axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
-        shields.label_lowest(axes, "$n/N$")
-        for ax in axes[::2]:
-            ax.set_ylabel("Shields number $θ$")
-        style.legends(figure, colour_entries("d_m", colours, rows), looks)
-        cases = tuple(results.plan.piles[i].runs[-1].name for i in shown["scene_id"].unique())
-        heading = f"Frozen bed and bed that changes{title}"
-        yield Figure(f"wear{name}", heading, caption("wear"), cases, figure)
+                ax.plot(end["fraction_moved"], end["shields"], color=colour, **apart)
+        sheet.axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
+        top = colour_entries("d_m", colours, rows)
+        style.legends(sheet.canvas, top, style.samples(sheet.axes))
+        cases = tuple(results.plan.piles[i].runs[-1].name for i in sheet.rows["scene_id"].unique())
+        title = f"Frozen bed and bed that changes{sheet.title}"
+        yield Figure(f"wear{sheet.name}", title, caption("wear"), cases, sheet.canvas)
 
 
 def poured(results: Results) -> Iterator[Figure]:
@@ -195,13 +110,12 @@ def poured(results: Results) -> Iterator[Figure]:
         return
     rows = rows[rows["size_over_d"].notna()]
     firsts = rows.drop_duplicates("answered_method").sort_values("answered_method")["scene_id"]
-    shown = rows[rows["scene_id"].isin(firsts)]
     # a grain that lies loose goes at no flow at all
-    reached = shown["ustar0_m_s"][drawable(shown, "ustar0_m_s")]
+    reached = rows["ustar0_m_s"][rows["scene_id"].isin(firsts) & drawable(rows, "ustar0_m_s")]
     if len(reached):
         norm = LogNorm(reached.min(), reached.max() * 1.001)
         for scene_id in firsts:
-            group = shown[shown["scene_id"] == scene_id]
+            group = rows[rows["scene_id"] == scene_id]
             yield _poured_bed(results.plan.piles[str(scene_id)], group, norm)
     yield _pivots(results, rows[rows["pivot_deg"].notna()])
     classes = results.joined("size_class")
@@ -216,8 +130,8 @@ def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     middle = (x[packed.windward].min() + x[packed.windward].max()) / 2
     left = max(x.min() - 1, middle - LONGEST / 2)
     right = min(x.max() + 1, left + LONGEST)
-    there = (x > left) & (x < right)
-    low, high = (0.0, packed.width) if packed.width else (z[there].min() - 1, z[there].max() + 1.5)
+    inside = z[(x > left) & (x < right)]
+    low, high = (0.0, packed.width) if packed.width else (inside.min() - 1, inside.max() + 1.5)
     figure = style.canvas(max(style.WIDTH * (high - low) / (right - left), 1.2) + 1.2)
     ax = figure.subplots()
     flows = grains["ustar0_m_s"].to_numpy(float)
@@ -228,12 +142,10 @@ def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     # seen from above the upper grains cover the others
     order = np.argsort(z) if packed.width else np.arange(len(x))
     places = packed.places.xyz[:, :2] if packed.width else packed.centres
-    sizes, look = packed.sizes[order], {"facecolors": list(colours[order]), "edgecolors": EDGE}
-    discs = EllipseCollection(
-        sizes, sizes, np.zeros_like(x), units="xy", offsets=places[order],
-        offset_transform=ax.transData, lw=0.3, **look,
-    )  # fmt: skip
-    ax.add_collection(discs)
+    sizes = packed.sizes[order]
+    look: Look = {"facecolors": list(colours[order]), "edgecolors": EDGE, "lw": 0.3}
+    look |= {"offsets": places[order], "offset_transform": ax.transData}
+    ax.add_collection(EllipseCollection(sizes, sizes, np.zeros_like(x), units="xy", **look))
     up = "$y/d$" if packed.width else "$z/d$"
     ax.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel=up)
     bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
@@ -268,12 +180,10 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
 
 def _hiding(rows: pd.DataFrame) -> Figure:
     """Thresholds of size classes over that of the median size, a panel for each method."""
-    methods = [part for _, part in split(rows, "answered_method")]
-    figure = style.canvas(3.6)
-    axes = list(figure.subplots(1, len(methods), sharex=True, sharey=True, squeeze=False)[0])
+    axes = "$d_i/d_{50}$", r"$\theta_i/\theta_{50}$"
+    (sheet,) = sheets(rows, ["answered_method"], 2.7, *axes, columns=3)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
-    for ax, part in zip(axes, methods, strict=True):
-        ax.set_title(labels.value("method", part["answered_method"].iloc[0]), loc="left")
+    for ax, part in zip(sheet.axes, sheet.parts, strict=True):
         part = part[part["hiding"] > 0]
         sizes = part["size_over_d"]
         number = np.rint(np.log(sizes) / np.log(np.sqrt(2)))
@@ -281,16 +191,16 @@ def _hiding(rows: pd.DataFrame) -> Figure:
             logs = group[["size_over_d", "hiding"]].map(np.log).groupby(number[group.index])
             mean, low, high = (np.exp(item) for item in (logs.mean(), logs.min(), logs.max()))
             reach = [mean["hiding"] - low["hiding"], high["hiding"] - mean["hiding"]]
-            look: style.Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
+            look: Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
             colour = colours[float(str(fraction))]
             ax.errorbar(mean["size_over_d"], mean["hiding"], yerr=reach, color=colour, **look)
         ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
-        for _, formula, dash in HIDING:
-            ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1)
-        ax.set(xscale="log", yscale="log", xlabel="$d_i/d_{50}$")
+        for label, formula, dash in HIDING:
+            ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1, label=label)
+        ax.set(xscale="log", yscale="log")
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-    axes[0].set_ylabel(r"$\theta_i/\theta_{50}$")
-    looks = [Line2D([], [], color="0.3", ls=dash, label=name) for name, _, dash in HIDING]
-    style.legends(figure, colour_entries("fraction", colours, rows), looks)
-    return Figure("hiding", "Hiding and exposure of sizes", caption("hiding"), (), figure)
+    top = colour_entries("fraction", colours, rows)
+    style.legends(sheet.canvas, top, style.samples(sheet.axes))
+    title = "Hiding and exposure of sizes"
+    return Figure("hiding", title, caption("hiding"), case_names(rows), sheet.canvas)

@@ -3,11 +3,13 @@
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
+from copy import copy
 from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import Any, Literal, TypeVar
 
 import matplotlib
+import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -16,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
-from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -60,8 +61,6 @@ BED = "#d9c9a3"
 Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
-Sample = Artist | tuple[Artist, ...]
-"""A sample of a legend: one mark, or several beside each other."""
 NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 
 
@@ -111,14 +110,24 @@ def canvas(height: float) -> Canvas:
     return Canvas(figsize=(WIDTH, height), layout="compressed")
 
 
-def grid(count: int, height: float) -> tuple[Canvas, list[Axes]]:
-    """A figure of panels of a height (inches), in two columns where there are several."""
-    columns = min(count, 2)
+def grid(
+    count: int, height: float, x: str, y: str, columns: int = 2, *, sharey: bool = True
+) -> tuple[Canvas, list[Axes]]:
+    """A figure of panels of a height (inches), in columns where there are several.
+
+    The panels share x, whose label is below the lowest of each column; that of y is on the left.
+    """
+    columns = min(count, columns)
     lines = -(-count // columns)
     figure = canvas(height * lines + 0.9)
-    axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    axes = figure.subplots(lines, columns, sharex=True, sharey=sharey, squeeze=False).ravel()
     for unused in axes[count:]:
         unused.remove()
+    for lowest in axes[count - columns : count]:
+        lowest.tick_params(axis="x", which="both", labelbottom=True)
+        lowest.set_xlabel(x)
+    for left in axes[:count:columns]:
+        left.set_ylabel(y)
     return figure, list(axes[:count])
 
 
@@ -129,16 +138,33 @@ def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]
         yield name, title, panels[start : start + PANELS]
 
 
-def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Sample]) -> None:
+def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
     """Place the legend of colours above the panels and all other samples below them."""
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
-        handles: list[Any] = list(looks)  # the stubs know no samples of two marks
-        names = [str((item[0] if isinstance(item, tuple) else item).get_label()) for item in looks]
-        beside = {tuple: HandlerTuple(ndivide=None)}
-        columns = 3 if max(map(len, names)) < LONG else 2
-        figure.legend(handles, names, loc="outside lower center", ncols=columns, handler_map=beside)
+        columns = 3 if max(len(str(item.get_label())) for item in looks) < LONG else 2
+        figure.legend(handles=looks, loc="outside lower center", ncols=columns)
+
+
+def samples(axes: Sequence[Axes]) -> list[Artist]:
+    """Entries of a legend: all with a label of which a part is in a frame.
+
+    What has one label in several colours is dark; a line without points counts.
+    """
+    entries: dict[str, Any] = {}
+    for ax in axes:
+        for item in (*ax.collections, *ax.lines):
+            label, sample = str(item.get_label()), copy(item)
+            points = np.asarray(item.get_xydata(), float) if isinstance(item, Line2D) else ()
+            if label.startswith("_") or (len(points) and not ax.viewLim.count_contains(points)):
+                continue
+            before = entries.setdefault(label, sample)
+            if isinstance(item, Line2D) and before.get_color() != item.get_color():
+                before.set(color="0.2", markeredgecolor="0.2")
+                if before.get_markerfacecolor() != "white":
+                    before.set_markerfacecolor("0.2")
+    return list(entries.values())
 
 
 def entry(label: str, colour: str) -> Line2D:

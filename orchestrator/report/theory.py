@@ -1,12 +1,13 @@
-"""Lines to compare thresholds with: the closed form of one grain, and published curves.
+"""Lines to compare thresholds with: closed form, published curves, and measurements.
 
-Density, viscosity and gravity say which part of a law's curve in (Re*, tau) the grains are on.
+A law's line in (Re*, tau) depends on the bed alone; density, viscosity and gravity say which part
+of it a grain is on. Measurements judge each line over the Re* that a study has grains of.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,8 +16,11 @@ from orchestrator.physics import curves
 from orchestrator.physics.curves import Air
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
+from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
 from orchestrator.physics.threshold import LAWS_OF, Threshold, shields_at
-from orchestrator.report.results import split
+from orchestrator.report import labels
+from orchestrator.report.page import caption
+from orchestrator.report.results import Results, split
 from orchestrator.study import closed_form
 from orchestrator.types import BoolArray, FloatArray
 
@@ -36,28 +40,41 @@ DASHES: tuple[Dash, ...] = (
     *((0, (6, 1, 1, 1, 1, 1)), (0, (9, 1.5)), (0, (4, 1, 4, 1, 1, 1))),
 )
 """Dashes where colours mean something else. Dotted is where a law does not hold."""
-FEW_LAWS = 3
+MANY = 3
 """Laws that dashes tell apart; more have colours of their own."""
 SWEEP_M = (5e-5, 1e-3)
-"""Diameters of the paper; a study with others widens the sweep."""
+"""Diameters (m) of the curves for air; a study with others widens the range."""
 POINTS = 240
-WIDER = 10.0
-"""Factor on Re* by which lines go on beyond a study's grains: axes cut them."""
 GRAIN = [
     *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
     *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2"),
 ]
 """Columns of all that the closed form depends on, in the order of `closed_form.SingleGrain`."""
-WHOLE = np.geomspace(1e-4, 1e6, 2001)
-"""Re* of any grain."""
 LEAST_CURVES = 2
 """The band for water is drawn only where at least this many curves were published for."""
 BAGNOLD_FROM = 3.5
 """Bagnold's A is 0.1 above this Re* only; it rises below."""
-SLOPED = "Shao & Lu 2000"
-"""The curve for air that is drawn for sloping beds."""
 GAS_RATIO = 100.0
 """Least rho_sol/rho_f of a fluid that curves for air may be compared with."""
+
+BINS = BUFFINGTON_MONTGOMERY
+MIDDLES = np.array([item.middle for item in BINS])
+MEDIANS = np.array([item.median for item in BINS])
+FACTORS_FROM = 0.3
+"""Re* from which factors are taken: below it are a dozen measurements."""
+EDGES = np.geomspace(BINS[0].low, BINS[-1].high, 2001)
+GRID = np.sqrt(EDGES[1:] * EDGES[:-1])
+"""Re* at which lines are compared with the measured ranges."""
+_AT = np.searchsorted([item.high for item in BINS], GRID, side="right")
+TENTHS = np.array([item.tenth for item in BINS])[_AT]
+NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
+DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
+"""Decades of Re* in which there are measurements."""
+HEAD = (
+    *("force law", "entrainment angle", "roughness"),
+    *("Re* where it is within the measured 10 to 90 %", f"decades, of {DECADES:.1f}"),
+    *("factor from the medians: median", "worst"),
+)
 
 
 def look(name: str) -> tuple[str, Dash]:
@@ -68,13 +85,7 @@ def look(name: str) -> tuple[str, Dash]:
 def drawn(names: Iterable[str]) -> list[str]:
     """The laws that are drawn for some scenes: of the paper's pair both if either is used."""
     used = set(names)
-    pair = set(PAIR) if used & set(PAIR) else set()
-    return [name for name in LAWS if name in used | pair]
-
-
-def many(names: Iterable[str]) -> bool:
-    """Whether there are so many laws that colours must tell them apart."""
-    return len(set(dashes(names).values())) > FEW_LAWS
+    return [name for name in LAWS if name in used or (name in PAIR and used & set(PAIR))]
 
 
 def dashes(names: Iterable[str]) -> dict[str, Dash]:
@@ -84,9 +95,8 @@ def dashes(names: Iterable[str]) -> dict[str, Dash]:
     return {name: dash for family, dash in zip(families, DASHES, strict=False) for name in family}
 
 
-@dataclass(frozen=True)
-class Bed:
-    """All that the closed form depends on beside Re* and the law; angles in degrees."""
+class Bed(NamedTuple):
+    """All that a line depends on beside its law; angles in degrees."""
 
     slope_deg: float
     entrainment_angle_deg: float
@@ -95,34 +105,84 @@ class Bed:
 
 
 @dataclass(frozen=True)
-class Branch:
-    """One law's line in the Shields diagram: Re* (rising) and tau at the threshold.
+class Line:
+    """The closed form of one grain by a law on a bed.
 
-    ``valid`` is where the law holds, ``continued`` where it does not but the study has grains.
+    `first` and `last` are the Re* between which a study has grains of that law, infinite and 0 if
+    it has none.
     """
 
     law: str
-    reynolds: FloatArray
-    shields: FloatArray
-    valid: BoolArray
-    continued: BoolArray
+    bed: Bed
+    first: float
+    last: float
+
+    @property
+    def words(self) -> tuple[str, str, str]:
+        """Law and bed in words."""
+        beta, ratio = self.bed.entrainment_angle_deg, labels.ratio_of(self.bed.roughness_ratio, "d")
+        return labels.value("force_law", self.law), f"β = {beta:g}°", f"z₀ = {ratio}"
+
+    @property
+    def name(self) -> str:
+        """Law and bed for a legend."""
+        return ", ".join(self.words)
+
+    def tau(self, reynolds: FloatArray) -> FloatArray:
+        """Tau of the grain whose threshold is at some Re*, whether or not the law holds."""
+        return shields_at(LAWS[self.law], reynolds, **self.bed._asdict())
+
+    def holds(self, reynolds: FloatArray) -> BoolArray:
+        """Whether the law holds at some Re*; in units of d, nu and rho_f they are u*."""
+        unit = Exposure(1.0, self.bed.roughness_ratio, 1.0, 1.0, self.bed.lift_coefficient)
+        return LAWS[self.law].valid(reynolds, unit)
+
+    def near(self, reynolds: FloatArray) -> BoolArray:
+        """Whether the study has grains on both sides of some Re*."""
+        return np.asarray((reynolds >= self.first) & (reynolds <= self.last))
+
+    def answers(self, reynolds: FloatArray) -> FloatArray:
+        """Tau where the study has grains and the law holds, else NaN."""
+        return np.where(self.holds(reynolds) & self.near(reynolds), self.tau(reynolds), np.nan)
+
+    @cached_property
+    def met(self) -> BoolArray:
+        """Where on `GRID` it is from the tenth to the ninetieth measured percentile."""
+        tau = self.answers(GRID)
+        return (tau >= TENTHS) & (tau <= NINETIETHS)
+
+    @property
+    def decades(self) -> float:
+        """Decades of Re* over which it is within the measured range."""
+        return DECADES * float(self.met.mean())
+
+    @cached_property
+    def factors(self) -> FloatArray:
+        """Factor from the median of each range of Re*, above or below; NaN without an answer."""
+        ratio = self.answers(MIDDLES) / MEDIANS
+        return np.where(MIDDLES >= FACTORS_FROM, np.maximum(ratio, 1 / ratio), np.nan)
+
+    @property
+    def median_factor(self) -> float:
+        """Median of the factors; infinite if there are none."""
+        return float(pd.Series(self.factors).median()) if self.worst[1] else np.inf
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """The largest factor and its Re*; infinite and 0 if there are none."""
+        at = int(np.argmax(np.nan_to_num(self.factors)))
+        factor = float(self.factors[at])
+        return (factor, float(MIDDLES[at])) if np.isfinite(factor) else (np.inf, 0.0)
 
 
-def branches(scenes: pd.DataFrame) -> list[Branch]:
+def lines(scenes: pd.DataFrame) -> list[Line]:
     """The lines through scenes of one slope, one entrainment angle and one z0/d."""
-    scenes = scenes[[*GRAIN, "z0_over_d", "force_law"]]  # to part sixty columns takes long
-    low, high = span(scenes)
-    reynolds = np.geomspace(low / WIDER, high * WIDER, POINTS)
-    lines = []
-    for _, group in split(scenes, "alpha_s"):
-        bed = bed_of(group)
+    listed = []
+    for lift in scenes["alpha_s"].unique():
+        group = scenes[scenes["alpha_s"] == lift]
         for law in drawn(group["force_law"]):
-            here = group[group["force_law"] == law]
-            first, last = span(here) if len(here) else (np.inf, 0.0)
-            valid = law_holds(law, reynolds, bed)
-            near = (reynolds >= first / 1.01) & (reynolds <= last * 1.01) & ~valid
-            lines.append(Branch(law, reynolds, shields(law, reynolds, bed), valid, near))
-    return lines
+            listed.append(Line(law, bed_of(group), *span(group[group["force_law"] == law])))
+    return listed
 
 
 def bed_of(scenes: pd.DataFrame) -> Bed:
@@ -131,30 +191,13 @@ def bed_of(scenes: pd.DataFrame) -> Bed:
     return Bed(*(float(item[c]) for c in ("alpha_deg", "beta_deg", "z0_over_d", "alpha_s")))
 
 
-def shields(law: str, reynolds: FloatArray, bed: Bed) -> FloatArray:
-    """Tau of one grain on a bed whose threshold is at some Re*."""
-    return shields_at(LAWS[law], reynolds, **vars(bed))
-
-
-def law_holds(law: str, reynolds: FloatArray, bed: Bed) -> BoolArray:
-    """Whether a law holds at some Re*."""
-    return LAWS[law].valid(reynolds, _unit(bed.roughness_ratio, bed.lift_coefficient))
-
-
-def _unit(ratio: float, lift_coefficient: float = 1.0) -> Exposure:
-    """A grain in units of d, nu and rho_f, in which the friction velocity is Re*."""
-    return Exposure(1.0, ratio, 1.0, 1.0, lift_coefficient)
-
-
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
-    grains: dict[str, list[tuple[float, ...]]] = {}  # without groupby: it is asked for each line
-    for law, *grain in set(scenes[["force_law", *GRAIN]].itertuples(index=False, name=None)):
-        grains.setdefault(law, []).append(tuple(grain))
-    every = (item for law, alike in grains.items() for item in closed_form.thresholds(law, alike))
+    laws = scenes["force_law"].unique()
+    every = [item for law in laws for item in thresholds(scenes[scenes["force_law"] == law], law)]
     reynolds = np.array([item.reynolds for item in every], float)
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
-    return float(reynolds.min()), float(reynolds.max())
+    return float(reynolds.min(initial=np.inf)), float(reynolds.max(initial=0.0))
 
 
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
@@ -162,17 +205,11 @@ def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     return closed_form.thresholds(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
 
 
-def drag_law_limit(z0_over_d: float, law: str = "high") -> float:
-    """Re* at which the particle Reynolds number V d/nu reaches the end of a law's drag."""
-    particle = LAWS[law].particle_reynolds(WHOLE, _unit(z0_over_d))
-    return float(np.exp(np.interp(np.log(LAWS[law].drag_end), np.log(particle), np.log(WHOLE))))
-
-
 def water_band(reynolds: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest of the published curves for water at some Re*, NaN below two curves."""
-    lines = (np.log(curve.points(2000)) for curve in curves.WATER)
+    logs = (np.log(curve.points(2000)) for curve in curves.WATER)
     at, outside = np.log(reynolds), {"left": np.nan, "right": np.nan}
-    table = np.exp([np.interp(at, x, y, **outside) for x, y in lines])
+    table = np.exp([np.interp(at, x, y, **outside) for x, y in logs])
     table[:, np.isfinite(table).sum(axis=0) < LEAST_CURVES] = np.nan
     return np.fmin.reduce(table), np.fmax.reduce(table)
 
@@ -196,13 +233,109 @@ def air_lines(scenes: pd.DataFrame, slope: float = 0.0) -> dict[str, tuple[Float
     ends = min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max())
     d = np.geomspace(*ends, POINTS)
     factor = curves.slope_factor_on_ustar(np.asarray(slope), item["phi_deg"])
-    lines = {name: air.shields_diagram(d, factor * _ustar(name, air, *ends)) for name in curves.AIR}
-    x, y = lines["Bagnold 1941"]
-    lines["Bagnold 1941"] = x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM]
-    return lines
+    each = {name: factor * _ustar(name, air, *ends) for name in curves.AIR}
+    listed = {name: air.shields_diagram(d, ustar) for name, ustar in each.items()}
+    x, y = listed["Bagnold 1941"]
+    return {**listed, "Bagnold 1941": (x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM])}
 
 
 @cache  # one of the curves is found by iteration, for each panel and slope of a figure anew
 def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
     """Threshold friction velocity of a curve for air over diameters (m), m/s."""
     return curves.AIR[name](np.geomspace(first, last, POINTS), air)
+
+
+def ranked(results: Results) -> list[Line]:
+    """The lines of a study's single grains on a flat bed: the widest within measurements first.
+
+    Equally wide ones go by their factor from the medians. Unverified force laws take no part.
+    """
+    grains = results.beds("grain")
+    verified = grains["force_law"].map({name: not law.unverified for name, law in LAWS.items()})
+    flat = grains[(grains["alpha_deg"] == 0) & verified.astype(bool)]
+    listed = [
+        Line(str(law), bed_of(group), *span(group))
+        for (law, *_), group in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
+    ]
+    return sorted(listed, key=lambda line: (-round(line.decades, 2), line.median_factor))
+
+
+def best(listed: Sequence[Line]) -> list[Line]:
+    """The first of each law."""
+    return [line for n, line in enumerate(listed) if line.law not in {x.law for x in listed[:n]}]
+
+
+def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
+    """The ranges of Re* of the chosen points of `GRID`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
+    return [(float(EDGES[a]), float(EDGES[b])) for a, b in edges.reshape(-1, 2)]
+
+
+def _number(reynolds: float) -> str:
+    return f"{reynolds:.0f}" if reynolds >= 9.95 else f"{reynolds:.2g}"
+
+
+def _between(*ends: float) -> str:
+    return " … ".join(map(_number, ends))
+
+
+def _ranges(chosen: BoolArray) -> str:
+    return ", ".join(_between(*ends) for ends in ranges(chosen))
+
+
+def section(results: Results) -> dict[str, Any] | None:
+    """The words of the page's section on measurements; None without single grains on a flat bed."""
+    listed = ranked(results)
+    if not listed:
+        return None
+    return {
+        "source": MEASURED_SOURCE,
+        "start": FACTORS_FROM,
+        "sentences": list(_sentences(results.beds("grain"), listed)),
+        "best": sheet(best(listed)),
+        "every": sheet(listed),
+    }
+
+
+def sheet(listed: Iterable[Line]) -> pd.DataFrame:
+    """A row for each line: law, entrainment angle, z0/d, and how it compares with measurements."""
+    rows = []
+    for line in listed:
+        worst, at = line.worst
+        factors = (f"{line.median_factor:.2f}", f"{worst:.2f} at Re* = {_number(at)}")
+        where, decades = _ranges(line.met) or "nowhere", f"{line.decades:.1f}"
+        rows.append((*line.words, where, decades, *(factors if at else ("—", "—"))))
+    return pd.DataFrame(rows, columns=list(HEAD))
+
+
+def _sentences(grains: pd.DataFrame, listed: Sequence[Line]) -> Iterator[str]:
+    """Conclusions from the numbers: the best law, ranges that none meets, small Re*, air."""
+    first, (_, at) = listed[0], listed[0].worst
+    if at and first.decades:
+        facts = {"count": len(listed), "decades": DECADES, "start": FACTORS_FROM}
+        yield caption("best_law", fit=first, at=_number(at), **facts)
+    unmet = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
+    unmet &= ~np.any([line.met for line in listed], axis=0)
+    if unmet.any():
+        yield caption("unmet", ranges=_ranges(unmet))
+    # up to which Re* the published curves for water lie above every law
+    grid = np.geomspace(min(line.first for line in listed), BINS[-1].high, 1000)
+    low, _ = water_band(grid)
+    highest = np.max([np.where(x.holds(grid), x.tau(grid), -np.inf) for x in listed], axis=0)
+    above = np.isfinite(highest) & (low > highest)
+    if above[grid < 1].any():
+        start = int(above.argmax())
+        ends = [start, start + int((~np.append(above[start:], False)).argmax()) - 1]
+        numbers, begin = [_number(end) for end in grid[ends]], BINS[0].low
+        yield caption(
+            "small_reynolds", ends=numbers, curve=low[ends], law=highest[ends], begin=begin
+        )
+    # published curves for air over the medians for water at the same Re*
+    outside, logs = {"left": np.nan, "right": np.nan}, np.log(MIDDLES)
+    air = [np.interp(logs, *np.log(line), **outside) for line in air_lines(grains).values()]
+    read = np.array(air).reshape(-1, len(logs))
+    covered = np.isfinite(read).any(axis=0)
+    if covered.any():
+        ratio = np.exp(np.nanmean(read[:, covered], axis=0)) / MEDIANS[covered]
+        where = _between(*MIDDLES[covered][[0, -1]])
+        yield caption("air", ratio=(ratio.min(), np.median(ratio), ratio.max()), span=where)

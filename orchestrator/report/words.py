@@ -327,7 +327,7 @@ def contents(
     results: Results, timings: pd.DataFrame, failures: Mapping[str, str]
 ) -> dict[str, Any]:
     """The words and numbers of the page beside its figures, by the names of its template."""
-    from orchestrator.report import flows, measured  # both import what draws
+    from orchestrator.report import flows  # imports what draws
 
     root, piles = results.cases, results.plan.piles.values()
     names = [name for name in results.plan.cases if (root / name).is_dir()]
@@ -336,7 +336,7 @@ def contents(
         "results": results,
         "title": results.study.title,
         "answer": sentences(results),
-        "measured": measured.section(results),
+        "measured": theory.section(results),
         "programs": versions(case.programs(root, results.plan.cases)),
         "times": times(timings),
         "failures": failures,

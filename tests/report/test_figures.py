@@ -11,7 +11,6 @@ from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
 from orchestrator.report import bed, flows, piles, shields, style
-from orchestrator.report import grains as singles
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
 from tests.report.conftest import axes_of, changed, copies, legend_of, only
@@ -22,12 +21,12 @@ Points = set[tuple[float, float]]
 
 def pile_figures(results: Results) -> Iterator[Figure]:
     yield from piles.fractions(results)
-    yield from piles.extended(results)
+    yield from shields.piles(results)
 
 
 def single_figures(results: Results) -> Iterator[Figure]:
-    yield from singles.draw(results)
-    yield from singles.accuracy(results)
+    yield from shields.singles(results)
+    yield from shields.accuracy(results)
 
 
 def drawn(figures: Iterable[Figure]) -> dict[str, list[Axes]]:
@@ -74,7 +73,7 @@ def test_points_of_single_grains_are_those_of_the_table(
 ) -> None:
     table = results.tables["single_grain"]
     flat = table[table["alpha_deg"] == 0]
-    panels = dict(zip((0.1, 0.033333333), grains["dem-horizontal"], strict=True))
+    panels = dict(zip((0.033333333, 0.1), grains["dem-horizontal"], strict=True))
     for ratio, ax in panels.items():
         own = flat[flat["z0_over_d"] == ratio]
         assert len(own) > 10
@@ -89,7 +88,7 @@ def test_markers_are_hollow_exactly_where_the_closure_does_not_hold(
     table = table[(table["alpha_deg"] == 0) & (table["z0_over_d"] == 0.1)]
     transition = table[table["regime"] == "transition"]
     assert 0 < len(transition) < len(table)
-    ax = grains["dem-horizontal"][0]
+    ax = grains["dem-horizontal"][1]
     assert points(marked(ax, HOLLOW)) == rows(transition, "reynolds", "shields_dem")
     for line in marked(ax, SOLID, HOLLOW):
         is_white = to_hex(line.get_markerfacecolor()) == "#ffffff"
@@ -106,15 +105,13 @@ def test_closed_form_lines_stop_where_they_do_not_hold(grains: dict[str, list[Ax
     assert {line.get_linestyle() for line in lines} == {"-", ":"}
 
 
-def test_diagram_shows_transition_and_end_of_the_drag_law(grains: dict[str, list[Axes]]) -> None:
-    for ax, limit in zip(grains["dem-horizontal"], (245, 155), strict=True):
+def test_diagram_shows_the_transition(grains: dict[str, list[Axes]]) -> None:
+    for ax in grains["dem-horizontal"]:
         (span,) = [patch for patch in ax.patches if patch.get_gid() == "transition"]
         assert span.get_extents().transformed(ax.transData.inverted()).intervalx.tolist() == (
             pytest.approx([3, 30])
         )
         assert "transition" in [text.get_text() for text in ax.texts]
-        (end,) = marked(ax, "drag law limit")
-        assert end.get_xdata()[0] == pytest.approx(limit, rel=0.02)  # type: ignore[index]
         assert ax.get_xscale() == ax.get_yscale() == "log"
 
 
@@ -166,7 +163,7 @@ def test_closed_form_is_drawn_before_there_are_results(results: Results) -> None
 
 def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: Results) -> None:
     several = copies(results, *({"averaging_length": i + 1.0} for i in range(7)))
-    figures = [*piles.fractions(several), *piles.extended(several)]
+    figures = [*piles.fractions(several), *shields.piles(several)]
     assert [figure.fold for figure in figures] == [False, True, False, True]
     for figure in figures:
         axes = axes_of(figure)
@@ -186,7 +183,8 @@ def test_curves_and_points_of_two_layers_are_told_apart(results: Results) -> Non
         (ax,) = axes_of(figure)
         lines = marked(ax, *two.scenes["scene_id"], SOLID, HOLLOW)
         assert {line.get_marker() for line in lines} == {"s", "D"}
-        assert {"mobile layers = 1", "mobile layers = 2"} <= set(legend_of(figure))
+        for layers in ("mobile layers = 1", "mobile layers = 2"):
+            assert any(text.endswith(layers) for text in legend_of(figure))
 
 
 @pytest.mark.parametrize("value", [0.0, -0.01, np.nan, np.inf])

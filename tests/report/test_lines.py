@@ -10,18 +10,16 @@ from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
-from orchestrator.report import grains as singles
-from orchestrator.report import measured, shields, style, theory
-from orchestrator.report.measured import Fit
+from orchestrator.report import shields, style, theory
 from orchestrator.report.results import Results
-from orchestrator.report.theory import Bed
+from orchestrator.report.theory import Bed, Line
 
 BED = Bed(0.0, 50.0, 1 / 30, 1.615)
 MIDDLES = np.array([one.middle for one in BUFFINGTON_MONTGOMERY])
 
 
-def bridged(first: float = 0.01, last: float = 1e3) -> Fit:
-    return Fit("bridged", BED, first, last)
+def bridged(first: float = 0.01, last: float = 1e3) -> Line:
+    return Line("bridged", BED, first, last)
 
 
 @pytest.fixture(scope="module")
@@ -60,28 +58,26 @@ def test_factors_are_those_of_the_law_from_the_medians() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_ranges_are_where_a_law_is_between_the_percentiles(law: str) -> None:
-    fit = Fit(law, BED, 0.01, 1e3)
-    inside = np.zeros(len(measured.GRID), bool)
-    for low, high in measured.ranges(fit.met):
-        inside |= (low < measured.GRID) & (high > measured.GRID)
-    tau = theory.shields(law, measured.GRID, BED)
-    holds = theory.law_holds(law, measured.GRID, BED)
-    for x, y, valid, found in zip(measured.GRID, tau, holds, inside, strict=True):
+    line = Line(law, BED, 0.01, 1e3)
+    inside = np.zeros(len(theory.GRID), bool)
+    for low, high in theory.ranges(line.met):
+        inside |= (low < theory.GRID) & (high > theory.GRID)
+    tau, holds = line.tau(theory.GRID), line.holds(theory.GRID)
+    for x, y, valid, found in zip(theory.GRID, tau, holds, inside, strict=True):
         (one,) = [b for b in BUFFINGTON_MONTGOMERY if b.low <= x < b.high]
         assert found == (valid and one.tenth <= y <= one.ninetieth)
-    assert fit.decades == pytest.approx(
-        sum(np.log10(high / low) for low, high in measured.ranges(fit.met))
-    )
+    decades = sum(np.log10(high / low) for low, high in theory.ranges(line.met))
+    assert line.decades == pytest.approx(decades)
 
 
 def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     narrow = bridged(5.0, 8.0)
-    ((low, high),) = measured.ranges(narrow.met)
+    ((low, high),) = theory.ranges(narrow.met)
     assert (low, high) == pytest.approx((5.0, 8.0), rel=0.01)
     assert np.isfinite(narrow.factors).sum() == 1
     nowhere = bridged(400.0, 500.0)
-    assert measured.ranges(nowhere.met) == []
-    assert measured.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
+    assert theory.ranges(nowhere.met) == []
+    assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
 
 
 def test_many_laws_have_colours_of_their_own(several: Results) -> None:
@@ -90,11 +86,11 @@ def test_many_laws_have_colours_of_their_own(several: Results) -> None:
     (ax,) = figure.canvas.axes
     lines = [line for line in ax.lines if line.get_gid() == shields.RESULT[0]]
     colours = {line.get_color() for line in lines}
-    met = {fit.law for fit in measured.best(measured.fits(several)) if fit.decades > 0}
+    met = {fit.law for fit in theory.best(theory.ranked(several)) if fit.decades > 0}
     assert colours == {theory.look(name)[0] for name in met}
-    (medians,) = [line for line in ax.lines if line.get_gid() == shields.MEASURED]
-    assert np.asarray(medians.get_ydata()).tolist() == measured.MEDIANS.tolist()
-    figures = {figure.name: figure for figure in singles.draw(several)}
+    (medians,) = [line for line in ax.lines if str(line.get_label()).startswith("measured")]
+    assert np.asarray(medians.get_ydata()).tolist() == theory.MEDIANS.tolist()
+    figures = {figure.name: figure for figure in shields.singles(several)}
     assert list(figures) == ["shields-d30", "shields-d10"]
     for figure in figures.values():
         assert figure.canvas is not None
@@ -137,37 +133,30 @@ def bed(results: Results) -> pd.DataFrame:
 
 
 def test_closed_form_lines_are_solid_where_their_equation_holds(bed: pd.DataFrame) -> None:
-    low, high = theory.branches(bed)
+    reynolds = np.geomspace(1e-3, 1e4, 800)
+    low, high = theory.lines(bed)
     assert (low.law, high.law) == ("low", "high")
-    assert (low.valid == (low.reynolds < LAWS["low"].reynolds[1])).all()
-    inside = high.reynolds < theory.drag_law_limit(0.1)
-    assert (high.valid == ((high.reynolds >= LAWS["high"].reynolds[0]) & inside)).all()
-    assert not (low.valid & low.continued).any()
-    assert low.valid.any()
-    assert low.continued.any()
+    assert (low.holds(reynolds) == (reynolds < LAWS["low"].reynolds[1])).all()
+    ends = reynolds[high.holds(reynolds)]
+    # the drag law of Eq. 4 ends at a particle Reynolds number of 1000
+    assert ends[[0, -1]] == pytest.approx([30, 245], rel=0.03)
+    dotted = low.near(reynolds) & ~low.holds(reynolds)
+    assert 3 <= reynolds[dotted].min() < reynolds[dotted].max() < 30
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> None:
     scenes = bed.assign(force_law=law)
-    (line,) = [one for one in theory.branches(scenes) if one.law == law]
-    exact = theory.thresholds(scenes, law)
-    reynolds = np.array([one.reynolds for one in exact])
-    read = np.interp(np.log(reynolds), np.log(line.reynolds), np.log(line.shields))
-    assert np.exp(read) == pytest.approx([one.shields for one in exact], rel=1e-3)
-    held = np.interp(reynolds, line.reynolds, line.valid)
-    assert (held == [one.valid for one in exact])[(held == 0) | (held == 1)].all()
+    (line,) = [one for one in theory.lines(scenes) if one.law == law]
+    for exact in theory.thresholds(scenes, law):
+        assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
+        assert line.holds(exact.reynolds) == exact.valid
+        assert line.first <= exact.reynolds <= line.last
 
 
 def test_the_fluid_does_not_move_a_line(bed: pd.DataFrame) -> None:
-    air = theory.branches(bed)[0]
-    water = theory.branches(bed.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6))[0]
-    read = np.interp(air.reynolds, water.reynolds, water.shields, left=np.nan, right=np.nan)
-    both = np.isfinite(read)
-    assert both.sum() > 100
-    assert air.shields[both] == pytest.approx(read[both], rel=1e-3)
-
-
-@pytest.mark.parametrize(("ratio", "limit"), [(1 / 30, 155.0), (1 / 10, 245.0)])
-def test_drag_law_ends(ratio: float, limit: float) -> None:
-    assert theory.drag_law_limit(ratio) == pytest.approx(limit, rel=0.02)
+    reynolds = np.geomspace(0.1, 100, 50)
+    air = theory.lines(bed)[0]
+    water = theory.lines(bed.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6))[0]
+    assert (air.first, air.last) != (water.first, water.last)
+    assert air.tau(reynolds) == pytest.approx(water.tau(reynolds))

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.report import bed, labels, shields, words
 from orchestrator.report.results import Results
-from orchestrator.report.shields import SHAPE
+from orchestrator.report.shields import LABEL, SHAPE
 from orchestrator.study import fields
 from tests.report.conftest import changed, copies, legend_of, only
 
@@ -49,11 +49,11 @@ def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
 
 def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataFrame) -> None:
     asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
-    panels, rows, entries = shields.parted(asked, *SHOWN)
+    panels, rows = shields.parted(asked.assign(answered_method="dem"), *SHOWN)
     assert panels == ["packing"]
     assert rows[SHAPE].tolist() == ["s", "D", "s", "s"]
-    names = [one[0].get_label() for one in entries if isinstance(one, tuple)]
-    assert names == ["mobile layers = 1", "mobile layers = 2"]
+    names = [text.rpartition(", ")[2] for text in rows[LABEL]]
+    assert names == ["mobile layers = 1", "mobile layers = 2", *["mobile layers = 1"] * 2]
 
 
 def test_rows_of_two_layers_are_told_apart(results: Results) -> None:
