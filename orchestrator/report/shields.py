@@ -338,11 +338,7 @@ def _lines(results: Results) -> list[Line]:
     best. The two laws of the paper are one model: both have the same bed.
     """
     beds = [group for _, group in split(results.beds("pile").assign(alpha_deg=0.0), *BED)]
-    lines = [
-        Line(name, theory.bed_of(group), *theory.span(group))
-        for group in (*beds[:1], *beds[1:][-1:])
-        for name in theory.drawn(group["force_law"])
-    ]
+    lines = [line for group in (*beds[:1], *beds[1:][-1:]) for line in theory.lines(group)]
     drawn = {line.law for line in lines}
     others = [line for line in theory.best(theory.ranked(results)) if line.law not in drawn]
     near = [line for line in others if line.decades > 0] if len(others) > LINES else []
