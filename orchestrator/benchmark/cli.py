@@ -1,7 +1,6 @@
 """The commands of the benchmark."""
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -28,17 +27,17 @@ def add(commands: Any) -> None:
     text = "a finished study; without one only levels 1 and 2, which are formulas"
     command.add_argument("--from", dest="study", type=Path, metavar="DIR", help=text)
 
-    command = part("run", _run, "run a solver on each scene, ours in turn, and compare")
+    command = part("run", _judge, "run a solver on each scene, ours in turn, and compare")
     text = "such as 'my-solver {case} {out}': a scene's directory, and the CSV file to write"
     command.add_argument("--solver", required=True, metavar="COMMAND", help=text)
     text = "default: results/benchmark-NAME of the pack"
     command.add_argument("--out", type=Path, metavar="RESULTS", help=text)
     text = "wall time for a scene; default %(default)g"
-    command.add_argument("--limit", type=_positive, default=600.0, metavar="S", help=text)
+    command.add_argument("--limit", type=float, default=600.0, metavar="S", help=text)
     text = "memory of each process of the solver; default %(default)g"
-    command.add_argument("--memory", type=_positive, default=4.0, metavar="GIB", help=text)
+    command.add_argument("--memory", type=float, default=4.0, metavar="GIB", help=text)
 
-    command = part("compare", _compare, "the same for answers that are there already")
+    command = part("compare", _judge, "the same for answers that are there already")
     text = "holds SCENE/answer.csv; its name is the solver's"
     command.add_argument("results", type=Path, nargs="+", metavar="RESULTS", help=text)
     text = "directory of the page; default: the only RESULTS, if run wrote them, or"
@@ -46,40 +45,24 @@ def add(commands: Any) -> None:
     command.add_argument("--out", type=Path, metavar="DIR", help=text)
 
 
-def _positive(text: str) -> float:
-    number = float(text)
-    if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError("more than 0, and finite")
-    return number
-
-
 def _export(options: argparse.Namespace) -> int:
     from orchestrator.benchmark.export import export
 
-    count = export(options.pack, options.study, options.level)
-    print(f"{options.pack}: {count} scenes")
+    print(f"{options.pack}: {export(options.pack, options.study, options.level)} scenes")
     return 0
 
 
-def _run(options: argparse.Namespace) -> int:
+def _judge(options: argparse.Namespace) -> int:
+    """Run a solver, or read answers; print failures, summary and page, and give the exit code."""
     from orchestrator.benchmark import compare
 
-    choice = compare.Choice(options.level, options.scene)
-    limits = compare.Limits(seconds=options.limit, memory=int(options.memory * 2**30))
-    return _end(compare.run(options.pack, options.solver, options.out, choice, limits))
-
-
-def _compare(options: argparse.Namespace) -> int:
-    from orchestrator.benchmark import compare
-
-    choice = compare.Choice(options.level, options.scene)
-    return _end(compare.compare(options.pack, options.results, options.out, choice))
-
-
-def _end(outcome: Any) -> int:
-    """Print the failures, the summary and the place of the page, and give the exit code."""
+    choice = compare.Options(options.level, options.scene)
+    if "results" in options:
+        outcome = compare.compare(options.pack, options.results, options.out, choice)
+    else:
+        choice = choice._replace(seconds=options.limit, memory=int(options.memory * 2**30))
+        outcome = compare.run(options.pack, options.solver, options.out, choice)
     for line in outcome.failures:
         print(f"orchestrator: {line}", file=sys.stderr)
-    print(outcome.summary)
-    print(outcome.page)
+    print(outcome.summary, outcome.page, sep="\n")
     return 1 if outcome.failures else 0

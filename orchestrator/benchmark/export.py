@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,8 @@ from orchestrator.study import fields, study
 from orchestrator.study.study import Group, Study
 from orchestrator.tables import Tables
 
+Times = dict[str, float]
+"""Wall time and processor time of runs, s, ``seconds`` and ``cpu_s``; empty for formulas."""
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
 DEFAULT = "first-look"
@@ -62,95 +64,78 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     1 and 2 alone. Raises InputError if a level needs a study, or the study is not finished, not
     answered as it asks, or asks for beds that change or lie in space.
     """
-    levels = levels or (FORMULAS if source is None else {kind.level for kind in KINDS.values()})
-    kinds = [name for name, kind in KINDS.items() if kind.level in levels]
+    levels = levels or (FORMULAS if source is None else {*KINDS.values()})
+    kinds = [name for name, level in KINDS.items() if level in levels]
     if source is None:
         if lacking := sorted({*levels} - {*FORMULAS}):
             what = f"level {lacking[0]} needs the answers of a finished study"
             raise InputError(what, where="--level", remedy="name its directory with --from")
         asked = study.load(DEFAULT)
         programs = {"liggghts": liggghts.version()} if 2 in levels and _has_decks() else {}
-        listed = (problem for problem, _ in problems(asked, plan.make(asked), {}, Path(), kinds))
+        listed = problems(asked, plan.make(asked), {}, Path(), kinds)
         return pack.write(root, listed, (asked.name, asked.text), programs)
     space = Workspace(source.absolute())
     asked, planned = pipeline.reopen(space)
-    _check(asked, planned, source)
-    if not space.drawn.is_file():
-        raise InputError("the study is not finished", where=str(source), remedy="run it to its end")
-    times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
-    if set(times.index) != set(planned.cases):
-        what = "the study was run by another version of the program: its cases are others"
-        raise InputError(what, where=str(source), remedy="run it again")
-    results = tables.read(space, "tables")
-    sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
-
-    def timed() -> Iterator[Problem]:
-        for problem, runs in problems(asked, planned, results, space.cases, kinds):
-            seconds = sum(times[run] / sharing.get(run, 1) for run in runs)
-            yield replace(problem, seconds=seconds) if runs else problem
-
-    programs = case.programs(space.cases, planned.cases)
-    return pack.write(root, timed(), (asked.name, asked.text), programs)
-
-
-def _check(asked: Study, planned: Plan, source: Path) -> None:
-    """See that a study is one whose scenes a pack can hold."""
-    what = ""
+    what, remedy = "", "run the study without it into another directory"
     if not all(answer.is_as_asked for answer in planned.decisions.values()):
         what = f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"
-    elif any(scene.protocol.update for scene in asked.scenes):
-        what = "protocol.update: a pack holds one flow over each bed"
-    elif any(pile.bed.width for pile in planned.piles.values()):
-        what = "bed.width: a pack holds grains in the plane of the flow"
+    elif any(pile.scene.protocol.update or pile.bed.width for pile in planned.piles.values()):
+        what = "protocol.update or bed.width: a pack holds one flow over each bed, in its plane"
+    elif not space.drawn.is_file():
+        what, remedy = "the study is not finished", "run it to its end"
+    else:
+        times = tables.read(space, "timings")["timings"].set_index("case")["solver_s"]
+        if {*times.index} != {*planned.cases}:
+            what = "the study was run by another version of the program: its cases are others"
+            remedy = "run it again"
     if what:
-        remedy = "run the study without it into another directory"
         raise InputError(what, where=str(source), remedy=remedy)
+    sharing = {cell.name: len(cell.scenes) for cell in planned.cells}
+    listed = (
+        replace(one, seconds=sum(times[run] / sharing.get(run, 1) for run in one.runs))
+        if one.runs
+        else one
+        for one in problems(asked, planned, tables.read(space, "tables"), space.cases, kinds)
+    )
+    programs = case.programs(space.cases, planned.cases)
+    return pack.write(root, listed, (asked.name, asked.text), programs)
 
 
 def problems(
     asked: Study, planned: Plan, results: Tables, cases: Path, kinds: Collection[str]
-) -> Iterator[tuple[Problem, tuple[str, ...]]]:
-    """The scenes of a study as problems of some kinds, each with the runs that answer it.
+) -> Iterator[Problem]:
+    """The scenes of a study as problems of some kinds, names of `KINDS`.
 
-    The study's tables are `results`, empty for formulas alone, and its runs lie in `cases`; `kinds`
-    are names of `KINDS`.
+    The study's tables are `results`, empty for formulas alone, and its runs lie in `cases`.
     """
     if "collision" in kinds:
-        for check in scenes.checks():
-            yield _with_ours(check), ()
+        yield from map(_with_ours, scenes.checks())
+    names, piles = scene_names(planned, asked), planned.piles
     cell_of = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
     thresholds = results.get("single_grain")
     ours = {} if thresholds is None else dict(thresholds.set_index("scene_id")["ustar_m_s"])
-    piles = planned.piles
+    for scene in (scene for scene in asked.scenes if scene.id not in piles):
+        name = names[scene.id]
+        if "closed-form" in kinds:
+            yield scenes.closed_form(name, scene)
+        if "pivot" in kinds and scenes.has_pivot(scene):
+            problem = scenes.pivot(name, scene, ours.get(scene.id, np.nan))
+            yield replace(problem, runs=(cell_of[scene.id],) if scene.id in ours else ())
     # neither a theory's stress nor a channel's is a question at levels 3 and 5
     solved = {i: p for i, p in piles.items() if p.model.cases and not p.scene.flow.depth}
-
-    def unnamed() -> Iterator[tuple[Problem, tuple[str, ...]]]:
-        for scene in asked.scenes:
-            if scene.id in piles:
-                continue
-            if "closed-form" in kinds:
-                yield scenes.closed_form(scene), ()
-            if "pivot" in kinds and scenes.has_pivot(scene):
-                runs = (cell_of[scene.id],) if scene.id in ours else ()
-                yield scenes.pivot(scene, ours.get(scene.id, np.nan)), runs
-        if "flow" in kinds:
-            for name, solve in {n: s for p in solved.values() for n, s in p.solves.items()}.items():
-                yield scenes.flow(solve, results), (name,)
-        for asked_id, pile in piles.items():
-            # replicas of lattices are in the intervals of the others
-            if pile.bed.is_replica or pile.scene.protocol.method != "dem":
-                continue
-            if "pile" in kinds:
-                yield scenes.bed("pile", pile, results, cases), (pile.case.name,)
-            # grains on other beds are given at level 4 alone, one by one
-            if "line" in kinds and asked_id in solved and pile.bed.is_triangle:
-                both = *pile.solves, pile.case.name
-                yield scenes.bed("line", pile, results, cases), both
-
-    names = scene_names(planned, asked)
-    for problem, runs in unnamed():
-        yield replace(problem, name=names[problem.name]), runs
+    flows = {run: solve for pile in solved.values() for run, solve in pile.solves.items()}
+    for run, solve in flows.items() if "flow" in kinds else ():
+        yield replace(scenes.flow(names[solve.flow.id[:12]], solve, results), runs=(run,))
+    for id_, pile in piles.items():
+        # replicas of lattices are in the intervals of the others
+        if pile.bed.is_replica or pile.scene.protocol.method != "dem":
+            continue
+        # grains on other beds are given at level 4 alone, one by one
+        has_line = id_ in solved and pile.bed.is_triangle
+        for kind in ("pile", "line") if has_line else ("pile",):
+            if kind in kinds:
+                runs = (*(pile.solves if kind == "line" else ()), pile.case.name)
+                yield replace(scenes.bed(names[id_], kind, pile, results, cases), runs=runs)
 
 
 def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
@@ -183,17 +168,10 @@ def _with_ours(check: Problem) -> Problem:
     if not _has_decks():
         return check
     with tempfile.TemporaryDirectory() as folder:
-        answer, took = run_check(check.kind, check.parameters, Path(folder) / "deck")
-    keys = ["quantity", "at"]
-    ours = check.expected[keys].merge(answer, on=keys, how="left")["value"]
-    return replace(check, expected=check.expected.assign(ours=ours), seconds=took.seconds)
-
-
-class Took(NamedTuple):
-    """Wall time and processor time of runs, s; NaN for formulas."""
-
-    seconds: float = np.nan
-    cpu_s: float = np.nan
+        answer, times = run_check(check.kind, check.parameters, Path(folder) / "deck")
+    ours = answer.set_index(["quantity", "at"])["value"]
+    rows = [{**row, "ours": ours[row["quantity"], row["at"]]} for row in check.rows]
+    return replace(check, rows=rows, seconds=times["seconds"])
 
 
 class Ours:
@@ -223,8 +201,8 @@ class Ours:
                 what = f"no scene of its study is {name}: it is of another version of the program"
                 raise InputError(what, where=str(chosen.root), remedy="export it again")
 
-    def answer(self, name: str) -> tuple[pd.DataFrame, Took]:
-        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its time."""
+    def answer(self, name: str) -> tuple[pd.DataFrame, Times]:
+        """Answer a scene: columns ``quantity``, ``at`` and ``value``, and its times."""
         given = self.pack.scenes[name]
         if given["kind"] in CHECKS:
             return run_check(given["kind"], given, self.root / "checks")
@@ -239,17 +217,19 @@ class Ours:
                 engine.execute(run, self.root, LIMIT_S)
         states = planned.done(self.root)
         results = tables.make(asked, planned, self.root, states) if states else {}
-        ((problem, names),) = problems(asked, planned, results, self.root, [given["kind"]])
+        (problem,) = problems(asked, planned, results, self.root, [given["kind"]])
         answer = problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
         if given["kind"] == "pile":
-            steps = pd.read_csv(self.root / names[0] / "samples.csv")["step"].iloc[-1]
+            steps = pd.read_csv(self.root / problem.runs[0] / "samples.csv")["step"].iloc[-1]
             row = pd.DataFrame({"quantity": ["steps"], "at": [""], "value": [float(steps)]})
             answer = pd.concat([answer, row])
-        times = [Took(states[name]["solver_s"], states[name]["cpu_s"]) for name in names]
-        return answer, Took(*map(sum, zip(*(times or [Took()]), strict=True)))
+        sums = {"seconds": "solver_s", "cpu_s": "cpu_s"} if problem.runs else {}
+        return answer, {
+            name: sum(states[run][key] for run in problem.runs) for name, key in sums.items()
+        }
 
 
-def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Took]:
+def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Times]:
     """Run one of the decks for the contact law, a kind of `CHECKS`, with the entries of its scene.
 
     It runs in a folder, whose content is removed. Raises SolverError if it does not come to its
@@ -278,4 +258,4 @@ def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.Dat
     numbers = re.findall(r"^([a-z][a-z ]+): (\S+)$", printed, re.MULTILINE)
     rows = [(*PRINTED[label], float(text)) for label, text in numbers if label in PRINTED]
     answer = pd.DataFrame(rows, columns=["quantity", "at", "value"])
-    return answer, Took(ended.seconds, ended.cpu_s)
+    return answer, {"seconds": ended.seconds, "cpu_s": ended.cpu_s}

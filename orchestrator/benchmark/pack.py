@@ -1,18 +1,18 @@
 """A benchmark pack on disk: its scenes, questions and expected answers, written and read.
 
-docs/benchmark.md is the contract for solvers. A pack may come from anywhere: `read` refuses one
-whose files are not those of its manifest, or whose names, links or numbers no export makes.
+docs/benchmark.md is the contract for solvers. `read` refuses a pack whose files are not those of
+its manifest, or whose names or links lead out of it: a pack may come from anywhere.
 """
 
 import json
 import os
 import platform
 import re
-import stat
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import numpy as np
 import pandas as pd
@@ -35,37 +35,13 @@ COUNTS = ("moved", "not_moved", "carried_off")
 """Quantities that count grains."""
 NUMBER = "%.9g"
 """Format of the numbers in all tables of a pack."""
-MAX_BYTES, LARGEST = 64 * 2**20, 1e30
-"""Largest file, bytes; largest number."""
-MAX_TOLERANCE, MAX_WIDTH, MAX_COUNT = 0.5, 10.0, 1e6
-"""Bounds of what is judged: the tolerance, the width of an interval over its value, and the largest
-count. A pack with wider ones would pass any answer."""
+KINDS = {
+    **{"closed-form": 1, "collision": 2, "incline": 2, "sliding": 2, "passing": 2, "pivot": 2},
+    **{"flow": 3, "pile": 4, "line": 5},
+}
+"""Kinds of scenes, and the level of each."""
 _NAME, _MEMBER = r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*", r"[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
 _IN_SCENES = re.compile(f"{_NAME}/{_MEMBER}")
-
-
-class Kind(NamedTuple):
-    """A kind of scene: its level, and what it asks.
-
-    `single` are quantities that are one number each, `functions` depend on the column ``at``.
-    """
-
-    level: int
-    single: tuple[str, ...] = ()
-    functions: tuple[str, ...] = ()
-
-
-KINDS: dict[str, Kind] = {
-    "closed-form": Kind(1, ("ustar_m_s", "reynolds", "shields"), ("drag_n", "lift_n")),
-    "collision": Kind(2, ("restitution",)),
-    "incline": Kind(2, ("acceleration_over_g",)),
-    "sliding": Kind(2, (), ("speed_over_start", "spin_over_start")),
-    "passing": Kind(2, ("passing_time_over_t",)),
-    "pivot": Kind(2, ("ustar_m_s",)),
-    "flow": Kind(3, ("windward_mean",), ("ustar_over_ustar0",)),
-    "pile": Kind(4, (), (*COUNTS, "ustar0_m_s", "shields")),
-    "line": Kind(5, ("count",), (*COUNTS, "ustar0_m_s", "shields")),
-}
 
 
 class Manifest(BaseModel):
@@ -81,9 +57,7 @@ class Manifest(BaseModel):
     machine: dict[str, str | int | None]
 
 
-_PARAMETERS = TypeAdapter(
-    dict[str, float | str], config=ConfigDict(strict=True, allow_inf_nan=False)
-)
+_ENTRIES = TypeAdapter(dict[str, float | str], config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
 @dataclass(frozen=True)
@@ -91,27 +65,34 @@ class Problem:
     """A scene with its questions and their answers.
 
     `name` is unique among the scenes of its level. The entries of ``scene.json`` are `parameters`;
-    `tables` lie beside it, by the stems of their files. `expected` has the columns `COLUMNS` and a
-    row for each number that is asked; `at` is a text. `seconds` is the time of our answer, s.
+    `tables` lie beside it, by the stems of their files. `rows` are made by `expectation`, one for
+    each number that is asked. `runs` are the names of the cases of our answer, `seconds` is its
+    time, s.
     """
 
     name: str
     kind: str
     parameters: Mapping[str, Any]
     tables: Mapping[str, pd.DataFrame]
-    expected: pd.DataFrame
+    rows: Sequence[Row]
+    runs: tuple[str, ...] = ()
     seconds: float = np.nan
 
     @property
     def scene(self) -> str:
         """Name of its directory."""
-        return f"{KINDS[self.kind].level}-{self.name}"
+        return f"{KINDS[self.kind]}-{self.name}"
+
+    @property
+    def expected(self) -> pd.DataFrame:
+        """The expected answers: columns `COLUMNS`; ``at`` is a text."""
+        return pd.DataFrame(self.rows, columns=COLUMNS)
 
     @property
     def entries(self) -> Row:
         """Its entries in ``scene.json`` and ``scenes.csv``."""
-        level = KINDS[self.kind].level
-        return {"scene": self.scene, "level": level, "kind": self.kind, **self.parameters}
+        head = {"scene": self.scene, "level": KINDS[self.kind], "kind": self.kind}
+        return {**head, **self.parameters}
 
     def write(self, folder: Path) -> None:
         """Write the directory that a solver is given."""
@@ -128,20 +109,15 @@ def csv(table: pd.DataFrame) -> str:
 
 
 def expectation(
-    quantity: str,
-    value: float,
-    tolerance: float,
-    at: float | None = None,
-    interval: tuple[float, float] | None = None,
-    ours: float = np.nan,
+    quantity: str, value: float, tolerance: float, at: float | None = None, *interval: float
 ) -> Row:
-    """A row of the expected answers.
+    """A row of the expected answers; the value is also our answer.
 
-    `at` is the argument of a quantity that is a function; the interval is by default the value
-    itself. A relative tolerance of NaN is not judged. `ours` is our own answer.
+    `at` is the argument of a quantity that is a function; the interval, low and high, is by default
+    the value itself. A relative tolerance of NaN is not judged.
     """
     place = "" if at is None else NUMBER % at
-    values = (quantity, place, value, *(interval or (value, value)), tolerance, ours)
+    values = (quantity, place, value, *(interval or (value, value)), tolerance, value)
     return dict(zip(COLUMNS, values, strict=True))
 
 
@@ -154,24 +130,41 @@ class Pack:
     scenes: dict[str, Row]
     expected: pd.DataFrame
 
+    def chosen(self, levels: Collection[int] = (), patterns: Collection[str] = ()) -> list[str]:
+        """Names of the scenes of levels and patterns, empty for all; InputError if none is left."""
+        names = [
+            name
+            for name, given in self.scenes.items()
+            if (not levels or given["level"] in levels)
+            and (not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
+        ]
+        if not names:
+            remedy = "see its scenes.csv, and --level and --scene"
+            raise InputError("no scene of the pack is chosen", str(self.root), remedy)
+        return names
+
 
 def read(root: Path) -> Pack:
-    """Read a pack, and see that it is as it was exported.
-
-    Raises InputError if there is none, or it is of another schema, changed, or holds what no export
-    writes.
-    """
+    """Read a pack; raises InputError if there is none, or it is of another schema or changed."""
     if not os.path.lexists(root / MANIFEST):
-        raise InputError(
-            f"there is no pack here: {MANIFEST} is missing",
-            where=str(root),
-            remedy="write one with: python -m orchestrator benchmark export",
-        )
-    manifest: Manifest = _validated(Manifest.model_validate_json, root / MANIFEST)
-    verify(root, manifest)
-    if {name.split("/")[1] for name in manifest.sha256 if "/" in name} != {*manifest.scenes}:
-        _refuse(f"its manifest does not list the scenes of {SCENES}", root)
-    scenes = {name: _scene(root / SCENES / name / SCENE, name) for name in manifest.scenes}
+        what = f"there is no pack here: {MANIFEST} is missing"
+        remedy = "write one with: python -m orchestrator benchmark export"
+        raise InputError(what, where=str(root), remedy=remedy)
+    path = root / MANIFEST
+    try:
+        manifest = Manifest.model_validate_json(path.read_bytes())
+        verify(root, manifest)
+        scenes: dict[str, Row] = {}
+        for name in manifest.scenes:
+            path = root / SCENES / name / SCENE
+            entries = scenes[name] = _ENTRIES.validate_json(path.read_bytes())
+            head = [entries.get(key) for key in ("schema", "scene", "level")]
+            if head != [SCHEMA, name, KINDS.get(str(entries.get("kind")), 0)]:
+                _refuse(f"schema, scene, level and kind are not those of {name}", path)
+            entries["level"] = int(entries["level"])
+    except ValidationError as error:
+        fault = error.errors()[0]
+        _refuse(f"{'.'.join(map(str, fault['loc'][:2]))}: {fault['msg']}", path)
     return Pack(root, manifest, scenes, _expected(root / EXPECTED, scenes))
 
 
@@ -184,80 +177,34 @@ def verify(root: Path, manifest: Manifest) -> None:
                 _refuse("no pack holds such a file", path)
             paths.append(path)
     for path in paths:
-        _check_file(path)
+        if path.is_symlink() or not path.is_file():
+            _refuse("it is missing, or it is a link or no file", path)
     digests = digest_files(paths, root=root)
     for name in sorted({*manifest.sha256, *digests}):
         if manifest.sha256.get(name) != digests.get(name):
             how = "is missing" if name not in digests else "is not what was exported"
             _refuse(f"the file {name} {how}", root)
+    if {name.split("/")[1] for name in manifest.sha256 if "/" in name} != {*manifest.scenes}:
+        _refuse(f"its manifest does not list the scenes of {SCENES}", root)
 
 
 def _refuse(what: str, where: Path) -> NoReturn:
     raise InputError(what, where=str(where), remedy="the pack is not used: export it again")
 
 
-def _check_file(path: Path) -> None:
-    if not os.path.lexists(path):
-        _refuse("it is missing", path)
-    state = path.lstat()
-    if not stat.S_ISREG(state.st_mode):
-        _refuse("this is a link or no file", path)
-    if state.st_size > MAX_BYTES:
-        _refuse(f"it is larger than {MAX_BYTES // 2**20} MiB", path)
-
-
-def _validated(validate: Callable[[bytes], Any], path: Path) -> Any:
-    """The content of a JSON file; a fault is named without the value that is refused."""
-    _check_file(path)
-    try:
-        return validate(path.read_bytes())
-    except ValidationError as error:
-        fault = error.errors()[0]
-        _refuse(f"{'.'.join(map(str, fault['loc'][:2]))}: {fault['msg']}", path)
-
-
-def _scene(path: Path, name: str) -> Row:
-    parameters: Row = _validated(_PARAMETERS.validate_json, path)
-    kind = KINDS.get(str(parameters.get("kind")))
-    head = [parameters.get(key) for key in ("schema", "scene", "level")]
-    if kind is None or head != [SCHEMA, name, kind.level] or name[0] != str(kind.level):
-        _refuse(f"schema, scene, level and kind are not those of {name}", path)
-    return {**parameters, "level": kind.level}
-
-
 def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
+    texts, numbers = ["scene", *COLUMNS[:2]], COLUMNS[2:]
+    kinds = {**dict.fromkeys(texts, object), **dict.fromkeys(numbers, float)}
+    absent: Any = {"keep_default_na": False, "na_values": {key: [""] for key in numbers}}
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
-        if list(table) != ["scene", *COLUMNS]:
-            _refuse(f"its columns are not scene,{','.join(COLUMNS)}", path)
-        table = table.astype({"scene": object, "quantity": object, "at": object})
-        numbers = table[COLUMNS[2:]].where(lambda part: part != "").astype(float)
-        at = table["at"].where(table["at"] != "").astype(float)
-    except (ValueError, OverflowError) as error:
+        table: pd.DataFrame = pd.read_csv(path, dtype=kinds, **absent)
+        if [*table] != [*texts, *numbers] or {*table["scene"]} != {*scenes}:
+            raise ValueError("its columns or its scenes are others")
+        at = table["at"].replace("", "0").astype(float)
+        if not np.isfinite(table[["value", "low", "high"]].assign(at=at)).all(axis=None):
+            raise ValueError("a number is missing or infinite")
+    except ValueError as error:
         _refuse(f"it cannot be read: {error}", path)
-    table[COLUMNS[2:]] = numbers
-    if set(table["scene"]) != set(scenes):
-        _refuse("its scenes are not those of the manifest", path)
-    value, low, high, tolerance = (table[name] for name in COLUMNS[2:6])
-    kinds = table["scene"].map(lambda name: KINDS[scenes[name]["kind"]])
-    rows = zip(kinds, table["quantity"], table["at"], strict=True)
-    asked = [quantity in (kind.functions if at else kind.single) for kind, quantity, at in rows]
-    judged, counts = tolerance.notna(), table["quantity"].isin(COUNTS)
-    wide = (high - low > MAX_WIDTH * value.abs()) & ~(counts & (high <= MAX_COUNT))
-    faults: dict[str, Any] = {
-        "asks what its kind does not": ~np.array(asked),
-        "has too large a number": numbers.assign(at=at).abs().gt(LARGEST).any(axis=1),
-        "has no interval that holds its value": ~((low <= value) & (value <= high)),
-        "has a tolerance beyond 0 ... 0.5": judged & ~tolerance.between(0, MAX_TOLERANCE),
-        "accepts any answer": judged & wide,
-        "is negative": (low < 0) & (counts | (table["quantity"] == "shields")),
-        "asks the same again": table.duplicated(["scene", "quantity", "at"]),
-    }
-    for what, where in faults.items():
-        if where.any():
-            _refuse(f"line {int(np.argmax(where)) + 2} {what}", path)
-    if unjudged := set(scenes) - set(table["scene"][judged]):
-        _refuse(f"no number of {min(unjudged)} is judged", path)
     return table
 
 

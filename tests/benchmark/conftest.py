@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator import pipeline
 from orchestrator.benchmark import compare
-from orchestrator.benchmark.compare import Choice, Limits, Outcome
+from orchestrator.benchmark.compare import Options, Outcome
 from orchestrator.benchmark.export import export
 from orchestrator.study import study
 from tests.conftest import Shared
@@ -110,8 +110,7 @@ def level_rows(shared: Shared) -> Path:
     return _pack(shared, "level-rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
 
 
-LIMITS = Limits(seconds=60.0, memory=2**29)
-SCENE = Choice(patterns=("2-incline-5",))
+SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=2**29)
 RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
 """Command of the example."""
 HEAD = """
@@ -133,11 +132,9 @@ def program(folder: Path, body: str) -> str:
     return f"{shlex.join([sys.executable, str(path)])} {{case}} {{out}}"
 
 
-def run(
-    pack: Path, folder: Path, body: str, choice: Choice = SCENE, limits: Limits = LIMITS
-) -> Outcome:
+def run(pack: Path, folder: Path, body: str, options: Options = SCENE) -> Outcome:
     """Run a solver of such a body on a pack, into `results` of a folder."""
-    return compare.run(pack, program(folder, body), folder / "results", choice, limits)
+    return compare.run(pack, program(folder, body), folder / "results", options)
 
 
 def verdicts_in(folder: Path) -> pd.DataFrame:

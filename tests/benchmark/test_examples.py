@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import pipeline
 from orchestrator.benchmark import compare
-from orchestrator.benchmark.compare import Choice, Limits, Outcome
+from orchestrator.benchmark.compare import Options, Outcome
 from orchestrator.runs.workspace import Workspace
 from tests.benchmark.conftest import NATIVE, RIGHT, ROOT
 
@@ -25,8 +25,7 @@ CHECKS = ("2-collision-0.1", "2-incline-20", "2-incline-70", "2-sliding-2", "2-p
 
 
 def _run(pack: Path, folder: Path, command: str, *scenes: str) -> Outcome:
-    choice, limits = Choice(patterns=scenes), Limits(seconds=600.0)
-    return compare.run(pack, command, folder / "results", choice, limits)
+    return compare.run(pack, command, folder / "results", Options(patterns=scenes))
 
 
 @pytest.fixture(params=["python", "c++"])
@@ -130,9 +129,7 @@ def test_the_flow_keeps_the_stress_on_a_flat_bed(
 
 
 def test_the_flow_on_a_pile_is_that_of_openfoam(all_levels: Path, tmp_path: Path) -> None:
-    command = (
-        f"{shlex.join([sys.executable, str(EXAMPLES / 'flow' / 'answer.py')])} {{case}} {{out}} 0.5"
-    )
+    command = f"{shlex.join([sys.executable, f'{EXAMPLES}/flow/answer.py'])} {{case}} {{out}} 0.5"
     assert _run(all_levels, tmp_path, command, "[35]-*").failures == []
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv").set_index("quantity")
     mean = numbers.loc[["windward_mean"]].iloc[0]

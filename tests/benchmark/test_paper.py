@@ -61,13 +61,17 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
     names = scene_names(plan.make(paper), paper)
     assert len(planned.piles) >= 2
     for pile in planned.piles.values():
-        for problem in (scenes.flow(pile, results), scenes.bed("pile", pile, results, tmp_path)):
-            scene = f"{problem.scene[0]}-{names[problem.name]}"
+        flow, bed = (names[name] for name in (pile.flow.id[:12], pile.scene.id))
+        problems = (
+            scenes.flow(flow, pile, results),
+            scenes.bed(bed, "pile", pile, results, tmp_path),
+        )
+        for problem in problems:
             fresh = problem.expected
-            stated = expected[expected["scene"] == scene].set_index(fresh.index)
+            stated = expected[expected["scene"] == problem.scene].set_index(fresh.index)
             assert (fresh["quantity"] == stated["quantity"]).all()
             at, stated_at = (pd.to_numeric(table["at"]) for table in (fresh, stated))
             assert at.to_numpy() == pytest.approx(stated_at.to_numpy(), rel=1e-6, nan_ok=True)
             margin = 1e-4 * stated["value"].abs()
             is_held = fresh["ours"].between(stated["low"] - margin, stated["high"] + margin)
-            assert is_held[stated["tolerance"].notna()].all(), scene
+            assert is_held[stated["tolerance"].notna()].all(), problem.scene
