@@ -56,10 +56,11 @@ BEDS = (
     ("line", "moved", "moved-line", "Grains that have moved, with the solver’s own flow"),
 )
 """Figures of the beds: kind of scene, quantity, stem and title."""
-AXES = {
-    "ustar_over_ustar0": {"xlabel": "s/h", "ylabel": "u*/u*₀", "xlim": (-3, 12)},
-    "moved": {"xlabel": "load step", "ylabel": "n/N", "ylim": (0, 1)},
+AXES: dict[str, tuple[str, str, Look]] = {
+    "ustar_over_ustar0": ("s/h", "u*/u*₀", {"xlim": (-3, 12)}),
+    "moved": ("load step", "n/N", {"ylim": (0, 1)}),
 }
+"""Labels of a quantity's axes, and their limits."""
 RE = r"$Re^\star = u^\star d/\nu$"
 
 
@@ -151,7 +152,8 @@ def _panels(
     drawn = [scenes[i] for i in np.unique(np.linspace(0, len(scenes) - 1, PANELS).astype(int))]
     looks = _looks(numbers)
     del looks[OURS]
-    canvas, axes = style.grid(len(drawn), 2.0)
+    x_label, y_label, limits = AXES[quantity]
+    canvas, axes = style.grid(len(drawn), 2.0, x_label, y_label, columns=3)
     for ax, scene in zip(axes, drawn, strict=True):
         rows = numbers[numbers["scene"] == scene]
         last = rows[rows["solver"] == OURS].groupby("quantity")["value"].last()
@@ -164,7 +166,7 @@ def _panels(
             else:
                 ax.plot(x, of["answer"] / count, "o", **looks[str(solver)])
         ax.set_title(scene, size=6.5)
-        ax.set(**AXES[quantity])
+        ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
     caption = (
         f"{len(drawn)} of {len(scenes)} scenes. The line and its band are the expected answer and"

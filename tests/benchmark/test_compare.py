@@ -69,7 +69,7 @@ def test_faults_are_caught_and_named(
     outcome = run(formulas, tmp_path, body, SCENE._replace(patterns=names, seconds=15.0))
     verdicts = verdicts_in(tmp_path)
     for name, text in bodies.items():
-        assert re.search(FAULTS[text], verdicts.loc[name, "message"]), text
+        assert re.search(FAULTS[text], str(verdicts.loc[name, "message"])), text
     assert verdicts["passed"].tolist() == [False] * len(FAULTS) + [True]
     assert verdicts["answered"].tolist() == [False] * (len(FAULTS) - 1) + [True] * 2
     assert f"{names[5]} and 1 more of kind closed-form: it ended with 3" in outcome.failures
