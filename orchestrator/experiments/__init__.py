@@ -1,4 +1,1 @@
-"""Experiments on the method: what a fidelity level costs, how far it is off, where it fails.
-
-Each is a module with a function `run`, and one with its figures.
-"""
+"""Experiments on the method: what a level costs, how far it is off, where a method fails."""

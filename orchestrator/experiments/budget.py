@@ -1,7 +1,6 @@
 """The budget: how far the choices that all fidelity levels share move a threshold.
 
-A choice is changed alone, within what measurements and good practice leave open. Each is answered
-on the cheapest levels that feel it.
+A choice is changed alone, on the cheapest levels that feel it.
 """
 
 import tomllib
@@ -21,16 +20,7 @@ from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
 from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, on_levels
-from orchestrator.fidelity.levels import (
-    AS_ASKED,
-    FROZEN,
-    PEELING,
-    Fields,
-    Pair,
-    changed,
-    level,
-    value_of,
-)
+from orchestrator.fidelity.levels import FROZEN, PEELING, Fields, Pair, changed, level, value_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile import line as bed_line
 from orchestrator.grains.threshold import PileThreshold
@@ -78,7 +68,7 @@ class Choice:
     def levels(self, scene: Scene) -> Pair:
         """The levels on which it is changed in a scene."""
         grains = (DYNAMIC_POURED if scene.is_poured else DYNAMIC) if self.dynamic else PEELING
-        return Pair(COARSE if scene.flow.model == "solve" else AS_ASKED, grains)
+        return Pair(COARSE if scene.flow.model == "solve" else levels.AS_ASKED, grains)
 
     def scenes(self, scene: Scene) -> Iterator[tuple[str, Scene]]:
         """The scene with each alternative that it can have, by the alternative's name."""
@@ -112,9 +102,8 @@ class Choice:
         }
 
 
-_FILE = Path(__file__).with_name("choices.toml")
-CHOICES = [Choice(**row) for row in tomllib.loads(_FILE.read_text(encoding="utf-8"))["choice"]]
-"""Every shared choice."""
+_TEXT = Path(__file__).with_name("choices.toml").read_text(encoding="utf-8")
+CHOICES = [Choice(**row) for row in tomllib.loads(_TEXT)["choice"]]
 
 
 class Change(NamedTuple):
@@ -149,8 +138,7 @@ def experiment(study: Study, out: Path) -> Experiment:
     planned = plan.of(asked, cases=out.absolute() / "cases")
 
     def results(runs: Runs) -> Results:
-        moved = measure(listed, runs)
-        if moved.empty:
+        if (moved := measure(listed, runs)).empty:
             return {}, ()
         tables = {"changes": moved, "shares": (shared := shares(moved)), "budget": known(shared)}
         return tables, _sections(listed, moved, shared, runs)
@@ -237,12 +225,8 @@ def _sections(
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     tables = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
-    lost = [
-        (label(change.scene), change.choice.name, change.alternative)
-        for change in listed
-        if not runs.are_done(change.other)
-    ]
-    if lost:
+    refused = [change for change in listed if not runs.are_done(change.other)]
+    if lost := [(label(c.scene), c.choice.name, c.alternative) for c in refused]:
         tables.append(pd.DataFrame(lost, columns=["scene", "choice", "alternative"]))
     text = "The alternatives of the second table have no answer." * bool(lost)
     last = Section("The choices and their alternatives", text, (), tables)

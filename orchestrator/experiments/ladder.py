@@ -49,30 +49,27 @@ REFERENCES = (
 )
 """The reference of a scene is the first of these pairs that it has (over a level bed no flow is
 solved); beside it stands a pair as good with all of its numbers changed: the uncertainty."""
-USED = (
+USED = (  # together
     *(("hill", "pivot"), ("hill", "peeling"), ("coarse at nodes", "peeling")),
     *(("coarse", "1 layer, coarse"), ("coarse", "1 layer, fast")),
     *(("standard", "1 layer, fast"), ("standard", "1 layer, slow")),
 )
-"""Pairs as they are used together."""
 CURVE = np.arange(0.05, 0.86, 0.05)  # fractions at which whole curves are compared
 HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {"error_curve": "whole curve"}
-"""Columns of errors and the heads of their panels."""
+# few load steps, on which the time of one is measured for the naive route
 STEPS = {"protocol.load_increment": 0.2, "protocol.waiting_time": 10.0, "protocol.time_step": 0.2}
-"""Few load steps, on which the time of one is measured for the naive route."""
 LEVEL_PAIR = ["flow_level", "grain_level"]
 FLOOR = 1e-3  # errors below it are drawn on it
-BANDS = {
-    "reference_error": ("error of the reference itself", "0.88"),
-    "model_floor": ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
-}
+BANDS = (
+    ("error of the reference itself", "0.88"),
+    ("the model's own spread: better numerics buy nothing", "#fdf3dc"),
+)
 MARKS: Mapping[str, Look] = {
     "threshold too high": {"marker": "^", "mfc": "0.2"},
     "threshold too low": {"marker": "v", "mfc": "0.2"},
     "hollow: another model": {"marker": "^", "mfc": "white"},
 }
 METHODS = {"pivot": "#009e73", "peeling": "#d55e00", "DEM": "#0072b2"}
-"""Colours of the ways to answer the grains."""
 FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 
 
@@ -124,7 +121,7 @@ def _pairs(scene: Scene, bed: PileBed) -> Iterator[Pair]:
 
 
 def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
-    """A row for each scene and pair whose runs are done: its cost and its thresholds."""
+    """A row for each scene and pair whose runs are done: cost, core-s, and thresholds, Pa."""
     rows, floors = [], levels.floors()
     for key, decision in pairs.items():
         pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
@@ -321,10 +318,9 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         line[0].set_ylabel("largest error of $τ_c$, %" if single else f"{title}\nerror of $τ_c$, %")
         for ax, (column, head) in zip(line, columns.items(), strict=True):
             ax.set_title(head or title, loc="left" if single else "center")
-            ends = {"reference_error": rows["reference_error"].max()}
-            ends["model_floor"] = rows["model_floor"].min()
-            for name, (_, colour) in BANDS.items():
-                ax.axhspan(0, np.nan_to_num(ends[name]), color=colour, lw=0, zorder=len(name) / 100)
+            ends = rows["reference_error"].max(), rows["model_floor"].min()
+            for at, (end, (_, colour)) in enumerate(zip(ends, BANDS, strict=True)):
+                ax.axhspan(0, np.nan_to_num(end), color=colour, lw=0, zorder=0.2 - at / 10)
             tags.append((ax, _points(ax, rows, column, named=single)))
     for ax in grid.ravel():
         ax.set(xscale="log", yscale="log", ylim=(FLOOR / 1.5, None))
@@ -339,7 +335,7 @@ def chart(pairs: pd.DataFrame, columns: Mapping[str, str]) -> Canvas:
         for row in numbered.itertuples(index=False)
     ]
     samples += [Line2D([], [], label=text, **mark, **look) for text, look in MARKS.items()]
-    samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS.values()]
+    samples += [Patch(label=label, color=colour, lw=0) for label, colour in BANDS]
     if single:
         samples.append(Line2D([], [], label="no pair of levels is cheaper and better", **FRONT))
     style.legends(canvas, [style.entry(*method) for method in METHODS.items()], samples)

@@ -221,11 +221,8 @@ def _panel(ax: Axes, one: Map, table: pd.DataFrame, font: float) -> None:
         x, y = places["x"][cell.x], places["y"][cell.y]
         colour, ink, letter = VERDICTS[cell.verdict]
         ax.add_patch(Rectangle((x, y), 1, 1, fc=colour, ec="white", lw=1, gid=cell.verdict))
-        size, text = 100 * abs(cell.error), letter
-        if size >= 1000:
-            text = f"{letter}\n{cell.error:+.0f}×"
-        elif not math.isnan(size):
-            text = f"{letter}\n{100 * cell.error:+.{int(size < 9.95)}f} %".replace("-", "−")
+        error = f"\n{100 * cell.error:+.2g} %".replace("-", "−")
+        text = letter if math.isnan(cell.error) else letter + error
         look: Look = {"ha": "center", "va": "center", "fontsize": font, "color": ink}
         ax.text(x + 0.5, y + 0.5, text, **look)
     ax.set(xlim=(0, len(places["x"])), ylim=(0, len(places["y"])))

@@ -23,21 +23,19 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
 Piles = Mapping[str, Pile]
-LEAST_HELD = 6.0
-"""Waiting time, sqrt(d/g'), from which load steps hold the flow. Shorter ones make a ramp, whose
-rate is a part of what is asked."""
+Names = tuple[str, ...]
+LEAST_HELD = 6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
 ROUNDS = 4
 ASKED = "as the study asks"
-ANSWERS = [q.name.partition(".") for q in FIELDS if q.info.about == "answer"]
-"""The fields about the answer, as part, dot and name."""
+ANSWERS = [q.name.split(".") for q in FIELDS if q.info.about == "answer"]
 
 
 @dataclass(frozen=True)
 class Decision:
     """How a scene is answered: as `asked` by the study, and the `scene` that answers it.
 
-    The `levels` (None for a single grain) with their `known` error of tau_c; `why`, for people; and
-    whether the study file left the levels open.
+    The `levels` (None for a single grain) with their `known` error of tau_c; why; and whether the
+    study file left the levels open.
     """
 
     asked: Scene
@@ -74,33 +72,24 @@ class Bound(NamedTuple):
 
 NO_BOUND = Bound()
 NO_BOUNDS: Mapping[str, Bound] = {}
-THEORY = level("flow", "waves")
-"""Above it the flow is solved."""
+THEORY = level("flow", "waves")  # above it the flow is solved
 CHECK = Bound(level("flow", "coarse"), levels.PEELING, "it checks answers without DEM")
-"""Above it are the levels that check an answer without DEM."""
 
 
 def decide(
     scenes: Iterable[Scene], tolerance: float | None, above: Mapping[str, Bound] = NO_BOUNDS
 ) -> dict[str, Decision]:
-    """Choose the levels that are known to be within a tolerance of the best ones, at least cost.
+    """Choose for each resolved scene levels known to be within a tolerance, at least cost in all.
 
     A flow that several piles share is run once, and a run of DEM costs what it takes for that pile.
     Where no levels are within the tolerance, a scene is on the cheapest whose error is below the
     uncertainty of their reference; it is as asked where nothing is known, or where the way to the
-    answer is a part of what is asked.
+    answer is a part of what is asked. `above` has, by id, levels that turned out to be too low.
 
-    Parameters
-    ----------
-    scenes : iterable of Scene
-        Resolved; those of a study.
-    tolerance : float or None
-        Relative error of tau_c at the scene's fractions, the uncertainty of the reference
-        included; 0: the scenes as they are asked. None: a pile whose file sets no field about the
-        answer is answered on a solved flow, within the lowest `levels.floors` of all classes,
-        so that the scenes of a figure are answered alike; all others, and poured beds, as asked.
-    above : mapping of str to Bound, optional
-        Levels that turned out to be not good enough, by the id of the scene.
+    The tolerance is the relative error of tau_c, the uncertainty of the reference included; 0: all
+    scenes as they are asked. None: a pile whose file sets no field about the answer is answered on
+    a solved flow, within the lowest `levels.floors` of all classes, so that the scenes of a figure
+    are answered alike; all other scenes, and poured beds, as asked.
     """
     decided, offered = {}, {}
     for scene in scenes:
@@ -122,7 +111,7 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
     limit, start = "within the tolerance", ""
     if tolerance is None:
         floors = levels.floors()
-        is_set = any(name in getattr(scene, part).model_fields_set for part, _, name in ANSWERS)
+        is_set = any(name in getattr(scene, part).model_fields_set for part, name in ANSWERS)
         is_lattice = isinstance(bed, PileBed) and not scene.is_poured
         if is_set or not is_lattice or levels.model_class(scene) not in floors:
             return (), ASKED
@@ -145,41 +134,34 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
         return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
     if name := levels.unmeasured(scene):
         return (), f"no error is known for {name}: {ASKED}"
-    taken = (tuple(level for level in part if level.takes(scene)) for part in LEVELS.values())
-    classes = (levels.classes(part, scene) for part in LEVELS)
-    pairs, why = _good_enough(*taken, *classes, above, tolerance)
+    taken = [tuple(level for level in part if level.takes(scene)) for part in LEVELS.values()]
+    classes = tuple(levels.classes(part, scene) for part in LEVELS)
+    pairs, why = _good_enough(tuple(taken), classes, above, tolerance)
     why = f"{start}{why} {limit}" if pairs else why
     return pairs, f"{why}; {above.because}" if above.because else why
 
 
 @cache  # a study has thousands of scenes of a few classes
 def _good_enough(
-    flow: tuple[Level, ...],
-    grains: tuple[Level, ...],
-    flow_classes: tuple[str, ...],
-    grain_classes: tuple[str, ...],
-    above: Bound,
-    tolerance: float,
+    taken: Sequence[tuple[Level, ...]], classes: Sequence[Names], above: Bound, tolerance: float
 ) -> tuple[Sequence[Pair], str]:
-    """Pairs of some levels that are good enough, of which any may be the cheapest, and why."""
+    """Pairs of the levels taken that are good enough, of which any may be the cheapest, and why."""
     offered = []
-    for part, bound in ((flow, above.flow), (grains, above.grains)):
+    for part, bound in zip(taken, above[:2], strict=True):
         start = part.index(bound) + 1 if bound in part else 0
         offered.append([level for level in part[start:] if level.same_model])
-    if flow_classes == (levels.LEVEL_BED,):
+    if classes[0] == (levels.LEVEL_BED,):
         offered[0] = [levels.FLAT]
-    known = {
-        Pair(*pair): levels.known_of_classes(*pair, flow_classes, grain_classes)
-        for pair in itertools.product(*offered)
-    }
-    pairs = sorted(known, key=lambda pair: known[pair].cost_core_s)
-    within, why = [pair for pair in pairs if known[pair].total <= tolerance], "cheapest"
+    pairs = (Pair(*pair) for pair in itertools.product(*offered))
+    known = {pair: levels.known_of_classes(*pair, *classes) for pair in pairs}
+    cheap_first = sorted(known, key=lambda pair: known[pair].cost_core_s)
+    within, why = [pair for pair in cheap_first if known[pair].total <= tolerance], "cheapest"
     if not within:
         best = min((error.total for error in known.values()), default=math.inf)
         if math.isinf(best):
             return (), f"no error is known: {ASKED}"
         # errors below the uncertainty of the reference cannot be ranked
-        within = [pair for pair in pairs if known[pair].error <= best]
+        within = [pair for pair in cheap_first if known[pair].error <= best]
         why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:
@@ -218,10 +200,10 @@ def _option(scene: Scene, pair: Pair, why: str, by_default: bool) -> _Option:
 
 
 def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
-    """One option for each scene, such that all runs together take the least time that is found.
+    """One option for each scene, with the least time of all runs together that the rounds find.
 
-    In each round every scene takes the option with the least time, where a flow is shared by those
-    who took it in the round before: in the first by all who could, and once more by none.
+    In each every scene takes the option with the least time, where a flow is shared by those who
+    took it in the round before: in the first by all who could, and once more by none.
     """
     names = ({name for one in options for name in one.flows_s} for options in offered.values())
     best, least = dict[str, _Option](), math.inf
@@ -262,26 +244,24 @@ def _best_model(scene: Scene) -> str:
 
 
 def _check_group(scene: Scene) -> tuple[float, str, str]:
-    """The key that the piles of one check share."""
     assert isinstance(scene.bed, PileBed)
     return scene.bed.slope_deg, scene.bed.packing, scene.forces.law
 
 
 def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decision]:
-    """The decisions on the piles by DEM that check answers without it.
+    """The decisions on the piles by DEM that check answers without it, by the scene asked for.
 
-    Both are by the id of the scene asked for; the tolerance is the relative error of tau_c.
+    Of each group the pile that DEM answers in the least time; the tolerance is that of tau_c.
     """
-    groups: dict[object, list[tuple[float, str, Decision]]] = {}
+    cheapest: dict[object, tuple[float, str, Decision]] = {}
     for asked, answer in answers.items():
         if answer.is_unchecked:
-            scene = answer.scene
+            scene, group = answer.scene, _check_group(answer.scene)
             dem = changed(scene, {"protocol.method": "dem", "flow.model": _best_model(scene)})
             (check,) = decide([dem], tolerance, {dem.id: CHECK}).values()
             member = (Pile(check.scene).case.cost_s, asked, check)
-            groups.setdefault(_check_group(scene), []).append(member)
-    cheapest = (min(members, key=lambda member: member[:2]) for members in groups.values())
-    return {asked: check for _, asked, check in cheapest}
+            cheapest[group] = min(cheapest.get(group, member), member, key=lambda one: one[:2])
+    return {asked: check for _, asked, check in cheapest.values()}
 
 
 class Comparison(NamedTuple):

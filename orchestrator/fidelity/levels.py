@@ -27,10 +27,8 @@ from orchestrator.study.sizes import extremes
 from orchestrator.study.study import make_scene
 from orchestrator.types import FloatArray
 
-Fields = Mapping[str, Any]
-"""Values of a scene's fields, named as in a study file."""
-STRIP_WIDTH = 5.0
-"""Width of the bed of the level `strip`, d; more where the largest grains need it."""
+Fields = Mapping[str, Any]  # values of a scene's fields, named as in a study file
+STRIP_WIDTH = 5.0  # of the bed of the level `strip`, d; more where the largest grains need it
 FINER = {
     **{"flow.cells_per_face": 1, "flow.expansion_ratio": -1},
     **{"bed.mobile_layers": 1, "grain.stiffness": 1},
@@ -43,8 +41,8 @@ VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it
 LIFT_OFF = 0.95
 """Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
 piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
-LEVEL_BED, LIMITING = "level bed", ", limiting slope"
-"""The class for the flow of beds over which u* is u*_0 everywhere; the end of a class's name."""
+LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
+LIMITING = ", limiting slope"  # end of the name of a class
 BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")
 SETTINGS = (
@@ -60,8 +58,7 @@ DEFAULTS = {
 """Fields that move an answer and that the ladder keeps at their defaults; those of `AT_LEAST` may
 be larger."""
 SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
-FROZEN = "frozen bed"
-"""The choice that the flow of the whole pile acts until the last grain has gone."""
+FROZEN = "frozen bed"  # the choice that the flow of the whole pile acts until the last grain left
 STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
 """Choices whose values a study file states."""
 
@@ -191,8 +188,7 @@ def _load(part: str) -> tuple[Level, ...]:
     return tuple(Level(**row) for row in data[part])
 
 
-AS_ASKED = Level("as asked", "numbers of the study file")
-"""Stands for a level where a scene is on none."""
+AS_ASKED = Level("as asked", "numbers of the study file")  # where a scene is on no level
 FLOW, GRAINS = _load("flow"), _load("grains")
 LEVELS = {"flow": FLOW, "grains": GRAINS}
 """All levels, by the part of a pile that they answer, from cheap to dear."""
@@ -243,9 +239,9 @@ UNKNOWN = Known(math.inf, 0.0, math.inf, 0.0)
 
 
 class Spread(NamedTuple):
-    """How far the choices that all levels share lower and raise a Shields number, relative.
+    """How far the choices of all levels lower and raise a Shields number, relative; the widest.
 
-    With the name of the widest choice, and how far a bed that changes moves the number at most.
+    Last how far a bed that changes moves the number at most.
     """
 
     low: float = math.nan
@@ -257,9 +253,8 @@ class Spread(NamedTuple):
 def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     """The class under which the known error of a level is measured on a scene.
 
-    The class for the flow names how the stress is read and what is above the water; the class for
-    the grains names their packing. Both name the form, the limiting slope, on which a row waits for
-    a touch, and obstacles, unless these are left out.
+    For the flow it names how the stress is read and what is above the bed, for the grains their
+    packing; both name the form, the limiting slope, and obstacles, unless these are left out.
     """
     bed, name = scene.bed, packing(scene)
     assert isinstance(bed, PileBed)
@@ -285,14 +280,12 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     """The measured classes that a scene belongs to; its known error is the largest of theirs.
 
     A slope between those that were measured belongs to both of its neighbours, and so do level rows
-    on any slope: which grain of a chain goes first is chaotic. A form with obstacles has the errors
-    of both.
+    on any slope: which grain of a chain goes first is chaotic.
     """
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
-    base = name.removesuffix(LIMITING)
-    between = 1 <= scene.limiting_slope_deg - bed.slope_deg < BETWEEN_DEG
-    if bed.is_triangle and (between or base == "horizontal"):
+    base, below_deg = name.removesuffix(LIMITING), scene.limiting_slope_deg - bed.slope_deg
+    if bed.is_triangle and (1 <= below_deg < BETWEEN_DEG or base == "horizontal"):
         return base, base + LIMITING
     return (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)
 
@@ -320,9 +313,8 @@ def unmeasured(scene: Scene) -> str:
 def known(pair: Pair, scene: Scene) -> Known:
     """Known error of a pair of levels on a pile, at the fraction where it is largest.
 
-    Errors and uncertainties of the two parts have a cause each and add up by their squares
-    (docs/ladder.md). A study file that is on no level has the error of the most expensive level
-    that is no finer. `UNKNOWN` where it was not measured.
+    Errors and uncertainties of both parts add up by their squares (docs/ladder.md). A scene that is
+    on no level has the error of the most expensive one that is no finer; `UNKNOWN` if not measured.
     """
     if unmeasured(scene):
         return UNKNOWN
@@ -360,9 +352,10 @@ def measured() -> dict[tuple[str, str, str], FloatArray]:
     Each is an array with the rows error, uncertainty and cost (core-s), a column for each fraction.
     """
     table = pd.read_csv(FOLDER / "levels.csv").sort_values("fraction")
-    numbers = ["error", "uncertainty", "cost_core_s"]
-    groups = table.groupby(["part", "level", "scene_class"])
-    return {key: rows[numbers].to_numpy(float).T for key, rows in groups}  # type: ignore[misc]
+    groups = table.groupby(["part", "level", "scene_class"])[
+        ["error", "uncertainty", "cost_core_s"]
+    ]
+    return {key: rows.to_numpy(float).T for key, rows in groups}  # type: ignore[misc]
 
 
 def model_class(scene: Scene) -> str:

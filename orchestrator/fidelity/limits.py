@@ -22,10 +22,8 @@ from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import MOST_GRAINS, Scene
 from orchestrator.study.study import Study
 
-FROZEN_BED = 0.05
-"""Known change of a threshold, relative, up to which the flow of the whole pile may act on."""
-PILE_SLOPES_DEG = (10.0, 35.0)
-"""Slopes of piles that the mesh and the packing have been tried for."""
+FROZEN_BED = 0.05  # relative change of a threshold up to which the flow of the whole pile acts on
+PILE_SLOPES_DEG = (10.0, 35.0)  # of piles that the mesh and the packing have been tried for
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
 LEAST_DAMPING = 0.03
@@ -36,10 +34,7 @@ ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
 class Limit(NamedTuple):
-    """A limit that a scene is beyond: a study is refused, or merely warned.
-
-    The map that shows it, the field of a study file to change, what is wrong and what would do.
-    """
+    """A limit that a scene is beyond: a study is refused, or merely warned."""
 
     map: str
     field: str
@@ -58,12 +53,8 @@ def check_study(study: Study) -> None:
 def check(scene: Scene, where: str) -> None:
     """Refuse a scene outside of the regions in which its answer means something.
 
-    Where the answer is merely worse, a warning is given. `where` names the scene's file.
-
-    Raises
-    ------
-    InputError
-        For the first limit that it is beyond: the field, the map and the remedy.
+    An `InputError` names the first limit that it is beyond: field, map and remedy, and `where`, the
+    scene's file. Where the answer is merely worse, a warning is given.
     """
     for limit in exceeded(scene):
         remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
@@ -88,9 +79,8 @@ def exceeded(scene: Scene) -> Iterator[Limit]:
         what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg: the bed rolls back without flow"
         yield Limit("slope", "bed.slope_deg", what, "lower the slope or the entrainment angle")
     if not isinstance(bed, PileBed) and slope > angle:
-        what = f"{slope:g} deg is beyond the entrainment angle, {angle:g} deg: a grain may come to"
-        what = f"{what} rest half-way, and DEM and the closed form differ by up to a third"
-        remedy = "read it by DEM, or lower the slope"
+        what = f"beyond the entrainment angle, {angle:g} deg, a grain may rest half-way"
+        remedy = "read it by DEM, which differs from the closed form, or lower the slope"
         yield Limit("slope", "bed.slope_deg", what, remedy, refused=False)
     if scene.protocol.method == "dem":
         yield from _dem(scene)
@@ -114,11 +104,8 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
         remedy = f"choose {low:g} ... {high:g} deg, and no more than {ANGLES}"
         yield Limit("slope", "bed.slope_deg", f"a pile of {bed.slope_deg:g} deg", remedy)
     if angle < CLOSE_PACKED_DEG:
-        what = f"a pile of {angle:g} deg: the grains of a row do not touch, and a mobile row is"
-        what, remedy = (
-            f"{what} wedged apart by the row on it",
-            "60 deg; single grains may have less",
-        )
+        what = f"a pile of {angle:g} deg: a mobile row is wedged apart by the row on it"
+        remedy = "60 deg; single grains may have less"
         yield Limit("entrainment-layers", "bed.entrainment_angle_deg", what, remedy)
     if (loaded := scene.forces.loaded_grains) != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
@@ -126,13 +113,7 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
 
 
 def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
-    """Why grains cannot lie on a bed line: too many, or too steep; empty if they can.
-
-    Raises
-    ------
-    UnfitError
-        Where a lattice cannot be laid.
-    """
+    """Why grains cannot lie on a bed line: too many, or too steep; empty if they can."""
     length = line.x[-2] - line.x[1]
     count = length / scene.grain.diameter
     slopes, limit, why = abs(line.slopes_deg), scene.limiting_slope_deg, ANGLES
@@ -185,8 +166,7 @@ def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     ustar0 = float(log_law_ustar(scene.flow.speed, SPEED_HEIGHT * bed.relief, z0))
     ratio = KARMAN * ustar0 * cell / 2 / scene.solve_viscosity
     if ratio < 1:
-        what = "the flow at the bed is not turbulent: in the first cell the eddy viscosity is"
-        what = f"{what} {ratio:.2g} of the molecular one"
+        what = f"not turbulent: the first cell's eddy viscosity is {ratio:.2g} of the molecular one"
         remedy = "take the field of a lower viscosity or a higher speed: u*/U_e is the same"
         yield Limit("similarity", "flow.viscosity", what, remedy)
     if (scheme := scene.flow.convection_scheme) != "linearUpwind":

@@ -88,5 +88,5 @@ def test_each_cell_shows_its_worst_run() -> None:
         cells = {p.get_xy(): p.get_gid() for p in ax.patches if isinstance(p, Rectangle)}
         assert cells == {(0, 0): "good", (0, 1): "wrong", (1, 0): "exploded"}
         texts = {text.get_text() for text in ax.texts}
-        assert texts == {"G\n−1.2 %", "W\n+12×", "X"}
+        assert texts == {"G\n−1.2 %", "W\n+1.2e+03 %", "X"}
         assert [label.get_text() for label in ax.get_xticklabels()] == ["0.5", "2"]
