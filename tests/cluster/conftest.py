@@ -57,18 +57,14 @@ def start(tmp_path: Path, queue: Slurm) -> Iterator[Start]:
     """Start the command line in a process of its own that finds the queue."""
     started: list[subprocess.Popen[str]] = []
     (tmp_path / "small.toml").write_text(STUDY)
+    env, pipe = {**queue.environment, "PYTHONPATH": str(ROOT)}, subprocess.PIPE
 
     def run(*arguments: str) -> "subprocess.Popen[str]":
-        driver = subprocess.Popen(
-            [*ORCHESTRATOR, *arguments],
-            cwd=tmp_path,
-            env={**queue.environment, "PYTHONPATH": str(ROOT)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
+        command = [*ORCHESTRATOR, *arguments]
+        started.append(
+            subprocess.Popen(command, cwd=tmp_path, env=env, stdout=pipe, stderr=pipe, text=True)
         )
-        started.append(driver)
-        return driver
+        return started[-1]
 
     yield run
     for process in started:

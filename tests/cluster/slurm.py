@@ -51,9 +51,7 @@ class Slurm:
 
     def says(self, *command: str) -> str:
         """What one of its commands prints."""
-        return subprocess.run(
-            command, env=self.environment, capture_output=True, text=True, check=True, timeout=60
-        ).stdout
+        return subprocess.check_output(command, env=self.environment, text=True, timeout=60)
 
     def jobs(self) -> dict[str, str]:
         """Ids of the jobs that have not ended, with their state."""
@@ -62,10 +60,9 @@ class Slurm:
 
     def idle(self) -> int:
         """Number of the nodes that wait for a job."""
-        try:
+        with contextlib.suppress(subprocess.CalledProcessError):
             return self.says("sinfo", "--noheader", "--Node", "--format=%t").split().count("idle")
-        except subprocess.CalledProcessError:
-            return 0
+        return 0
 
 
 def missing() -> list[str]:
@@ -98,13 +95,8 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
         log = stack.enter_context((root / "daemons.log").open("ab"))
         for command in daemons:
             # a test run that is killed leaves no daemon
-            daemon = subprocess.Popen(
-                ["setpriv", "--pdeathsig", "KILL", "--", *command],
-                env=slurm.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-            )
+            words = ["setpriv", "--pdeathsig", "KILL", "--", *command]
+            daemon = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
             stack.callback(_end, daemon)
             until((root / "munge.socket").exists, "munged")
         until(lambda: slurm.idle() == nodes, "idle nodes")
@@ -118,15 +110,12 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
 def _free_ports(count: int) -> int:
     """The first of so many neighbouring ports that nobody listens on."""
     while True:
-        with contextlib.ExitStack() as stack:
-            sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
-            try:
-                sockets[0].bind(("127.0.0.1", 0))
-                first: int = sockets[0].getsockname()[1]
-                for place, each in enumerate(sockets[1:], 1):
-                    each.bind(("127.0.0.1", first + place))
-            except (OSError, OverflowError):
-                continue
+        with contextlib.ExitStack() as stack, contextlib.suppress(OSError, OverflowError):
+            first = 0
+            for place in range(count):
+                port = stack.enter_context(socket.socket())
+                port.bind(("127.0.0.1", first + place if place else 0))
+                first = first or port.getsockname()[1]
             return first
 
 

@@ -1,16 +1,19 @@
 """A small study that faults are injected into, its driver as a process, its undisturbed tables."""
 
+import contextlib
+import io
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import psutil
+
+from orchestrator import cli
 
 ROOT = Path(__file__).parents[2]
 ORCHESTRATOR = (sys.executable, "-m", "orchestrator")
@@ -29,8 +32,7 @@ stiffness = 1e3
 CELLS = """
 [[group]]
 name = "cells"
-[group.axes]
-"grain.diameter" = [7e-4, 1e-3]
+axes = { "grain.diameter" = [7e-4, 1e-3] }
 """
 PILE = """
 [[group]]
@@ -42,23 +44,20 @@ flow = { cells_per_face = 10 }
 Driver = subprocess.Popen[str]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Bench:
-    """A directory with one study file, and the directory of its undisturbed run."""
+    """A directory with a study file, its `source`, and the directory of its undisturbed run."""
 
     folder: Path
     undisturbed: Path
     drivers: list[Driver] = field(default_factory=list)
 
-    @property
-    def source(self) -> Path:
-        """The study file."""
-        return self.folder / "small.toml"
+    def __post_init__(self) -> None:
+        self.source, self.out = self.folder / "small.toml", self.folder / "out"
 
-    @property
-    def out(self) -> Path:
-        """The study's directory."""
-        return self.folder / "out"
+    def cases(self, kind: str) -> list[Path]:
+        """The directories of the cases of a kind."""
+        return [*self.out.glob(f"cases/{kind}-*")]
 
     def start(self, *, programs: Path | None = None, under: Sequence[str] = ()) -> Driver:
         """Start the study's driver, with programs before the real ones, under a command."""
@@ -75,22 +74,24 @@ class Bench:
         self.drivers.append(driver)
         return driver
 
-    def close(self) -> None:
-        """End what a test that failed has left."""
-        for driver in self.drivers:
-            with driver:
-                driver.kill()
-
     def study(self, *, programs: Path | None = None) -> tuple[int, str]:
         """Run the study to its end; its exit code and what it printed."""
         return ended(self.start(programs=programs))
+
+    def command(self, word: str, source: Path | None = None) -> tuple[int, str]:
+        """Run a command on the study in this process; its exit code and what it printed."""
+        words = [str(source or self.source), "--out"] if word == "study" else []
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            code = cli.main([word, *words, str(self.out)])
+        return code, printed.getvalue()
 
     def check_finished(self) -> None:
         """See that the same command ends well, with the tables of the undisturbed run."""
         code, printed = self.study()
         assert code == 0, printed
         assert (self.out / "report.html").is_file()
-        assert same_tables(self.out, self.undisturbed)
+        assert tables(self.out) == tables(self.undisturbed)
         assert none_left_in(self.folder)
         assert not list(self.out.rglob("*.tmp"))
 
@@ -98,6 +99,7 @@ class Bench:
 def undisturbed(folder: Path, text: str) -> Path:
     """The directory of a study that has run to its end; it is run once."""
     bench = Bench(folder, folder / "out")
+    folder.mkdir(exist_ok=True)
     if not (bench.out / "report.html").is_file():
         bench.source.write_text(text)
         code, printed = bench.study()
@@ -112,11 +114,6 @@ def ended(driver: Driver) -> tuple[int, str]:
     return driver.returncode, out + printed
 
 
-def same_tables(first: Path, second: Path) -> bool:
-    """Whether two studies have the same tables of results, byte for byte."""
-    return tables(first) == tables(second)
-
-
 def tables(out: Path) -> dict[str, bytes]:
     """The tables of a study, byte for byte."""
     return {path.name: path.read_bytes() for path in (out / "tables").iterdir()}
@@ -129,14 +126,6 @@ def wait_for(seen: Callable[[], bool], driver: Driver) -> bool:
             return False
         time.sleep(0.001)
     return True
-
-
-def pause(driver: Driver) -> None:
-    """Pause a driver where it is, unless it has ended."""
-    driver.send_signal(signal.SIGSTOP)
-    stopped = (psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE)
-    while psutil.Process(driver.pid).status() not in stopped:
-        time.sleep(0.001)
 
 
 def processes_in(folder: Path) -> dict[int, str]:
@@ -165,8 +154,3 @@ def wrapper(folder: Path, program: str, before: str) -> Path:
     path.write_text(f'#!/bin/sh\n{before}\nexec {shutil.which(program)} "$@"\n')
     path.chmod(0o755)
     return folder
-
-
-def case_of(out: Path, kind: str) -> Iterator[Path]:
-    """The directories of the cases of a kind."""
-    return out.glob(f"cases/{kind}-*")

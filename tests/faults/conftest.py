@@ -1,8 +1,8 @@
 """The studies that faults are injected into."""
 
+import contextlib
 import shutil
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,21 +11,30 @@ from tests.conftest import Shared
 from tests.faults.bench import CELLS, HEAD, PILE, Bench, undisturbed
 
 
+@contextlib.contextmanager
+def _bench(folder: Path, text: str, undisturbed: Path) -> Iterator[Bench]:
+    """A study that is not begun; drivers that a failed test has left are ended."""
+    bench = Bench(folder, undisturbed)
+    bench.source.write_text(text)
+    yield bench
+    for driver in bench.drivers:
+        with driver:
+            driver.kill()
+
+
 @pytest.fixture
 def pile(tmp_path: Path, finished_pile: Path) -> Iterator[Bench]:
     """The study of a pile and two cells, not begun."""
-    (tmp_path / "small.toml").write_text(HEAD + CELLS + PILE)
-    with closing(Bench(tmp_path, finished_pile)) as bench:
+    with _bench(tmp_path, HEAD + CELLS + PILE, finished_pile) as bench:
         yield bench
 
 
 @pytest.fixture
 def cells(tmp_path: Path, shared: Shared) -> Iterator[Bench]:
     """The study of two cells, not begun."""
-    (tmp_path / "small.toml").write_text(HEAD + CELLS)
     with shared("cells") as folder:
         finished = undisturbed(folder, HEAD + CELLS)
-    with closing(Bench(tmp_path, finished)) as bench:
+    with _bench(tmp_path, HEAD + CELLS, finished) as bench:
         yield bench
 
 

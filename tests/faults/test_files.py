@@ -1,6 +1,5 @@
 """Files of a study that are harmed, and files of others in its directory: nothing is lost."""
 
-import hashlib
 import os
 import shutil
 from collections.abc import Callable
@@ -8,29 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import cli, plan
+from orchestrator import plan
 from orchestrator.errors import SolverError
 from orchestrator.runs import case
-from orchestrator.runs.files import KEPT, RECORD
+from orchestrator.runs.files import KEPT, RECORD, digest_file
 from orchestrator.study import study
-from tests.faults.bench import Bench, case_of, same_tables
+from tests.faults.bench import Bench, tables
 
 # a file that is not as it was written may be someone's: it is kept, and a warning names it
 pytestmark = pytest.mark.filterwarnings("always:.*is not what this program wrote")
-Command = Callable[..., tuple[int, str]]
-
-
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str]) -> Command:
-    """Run a command on a bench; its exit code and what it printed."""
-
-    def run(word: str, bench: Bench) -> tuple[int, str]:
-        source = [str(bench.source), "--out"] if word == "study" else []
-        code = cli.main([word, *source, str(bench.out)])
-        captured = capsys.readouterr()
-        return code, captured.out + captured.err
-
-    return run
 
 
 def _truncated(share: float) -> Callable[[Path], None]:
@@ -66,17 +51,17 @@ OF_A_PILE = (
 )
 
 
-def _heals(bench: Bench, command: Command) -> None:
-    assert command("status", bench)[0] in (0, 2, 3)
-    code, printed = command("study", bench)
+def _heals(bench: Bench) -> None:
+    assert bench.command("status")[0] in (0, 2, 3)
+    code, printed = bench.command("study")
     assert code == 0, printed
-    assert same_tables(bench.out, bench.undisturbed)
-    assert "no solver was started" in command("study", bench)[1]
+    assert tables(bench.out) == tables(bench.undisturbed)
+    assert "no solver was started" in bench.command("study")[1]
 
 
 @pytest.mark.parametrize("how", HARMS)
-def test_harmed_files_are_noticed_and_healed(finished: Bench, how: str, command: Command) -> None:
-    (directory,) = case_of(finished.out, "cells")
+def test_harmed_files_are_noticed_and_healed(finished: Bench, how: str) -> None:
+    (directory,) = finished.cases("cells")
     (run,) = plan.make(study.load(str(finished.source))).cells
     (finished.out / ".lock").write_text("process 1 on elsewhere\n")
     for path in (directory / name for name in OF_CELLS):
@@ -95,17 +80,17 @@ def test_harmed_files_are_noticed_and_healed(finished: Bench, how: str, command:
         *(directory / name for name in (*OF_CELLS, case.FAILED)),
     ):
         HARMS[how](path)
-    _heals(finished, command)
+    _heals(finished)
 
 
 @pytest.mark.parametrize("how", ["truncated to 30%", "garbage"])
-def test_harmed_files_of_a_flow_and_a_pile(pile: Bench, how: str, command: Command) -> None:
+def test_harmed_files_of_a_flow_and_a_pile(pile: Bench, how: str) -> None:
     shutil.copytree(pile.undisturbed, pile.out)
     paths = [path for name in OF_A_PILE for path in pile.out.glob(f"cases/{name}")]
     assert len(paths) == len(OF_A_PILE)
     for path in paths:
         HARMS[how](path)
-    _heals(pile, command)
+    _heals(pile)
 
 
 @pytest.fixture
@@ -118,20 +103,20 @@ def outside(tmp_path: Path) -> Path:
 
 def _contents(folder: Path) -> dict[str, str]:
     """Every file and link below a directory, with its content."""
-    found = {}
+    contents = {}
     for path in folder.rglob("*"):
         if path.is_symlink():
-            found[str(path.relative_to(folder))] = f"-> {os.readlink(path)}"
+            contents[str(path.relative_to(folder))] = f"-> {os.readlink(path)}"
         elif path.is_file():
-            found[str(path.relative_to(folder))] = hashlib.sha256(path.read_bytes()).hexdigest()
-    return found
+            contents[str(path.relative_to(folder))] = digest_file(path)
+    return contents
 
 
 ODD = ("two\nlines", os.fsdecode(b"\xff\xfe"), "-rf", "*", "x" * 255, ".x.1.tmp", "a.csv")
 """Names of files of a user, whatever they look like."""
 
 
-def test_files_of_others_in_every_directory(pile: Bench, outside: Path, command: Command) -> None:
+def test_files_of_others_in_every_directory(pile: Bench, outside: Path) -> None:
     shutil.copytree(pile.undisturbed, pile.out)
     ours, elsewhere = _contents(pile.out).keys(), _contents(outside)
     for folder in [pile.out, *(path for path in pile.out.rglob("*") if path.is_dir())]:
@@ -143,15 +128,15 @@ def test_files_of_others_in_every_directory(pile: Bench, outside: Path, command:
         (folder / "link.csv").symlink_to(outside / "thesis.txt")
     planted = {name: text for name, text in _contents(pile.out).items() if name not in ours}
     for word in ("status", "study", "report", "prune"):
-        assert command(word, pile)[0] == 0, word
+        assert pile.command(word)[0] == 0, word
         assert planted.items() <= _contents(pile.out).items(), word
         assert not (pile.out / KEPT).exists()
     for path in pile.out.glob("cases/*/done.json"):
         path.unlink()
-    assert command("study", pile)[0] == 0
-    found = _contents(pile.out)
+    assert pile.command("study")[0] == 0
+    after = _contents(pile.out)
     for name, text in planted.items():
-        assert text in (found.get(name), found.get(f"{KEPT}/{name}")), name
+        assert text in (after.get(name), after.get(f"{KEPT}/{name}")), name
     # in a case that is run again nothing is left that a solver could read
     assert not any(path.name in ODD for path in pile.out.glob("cases/*/**/*"))
     assert not list(pile.out.glob(f"{KEPT}/cases/*/log.*"))
@@ -161,22 +146,22 @@ def test_files_of_others_in_every_directory(pile: Bench, outside: Path, command:
 @pytest.mark.parametrize(
     "place", ["tables", "cases", "tables/scenes.csv", "report.html", "study.json", ".lock", RECORD]
 )
-def test_links_are_refused(finished: Bench, outside: Path, command: Command, place: str) -> None:
+def test_links_are_refused(finished: Bench, outside: Path, place: str) -> None:
     path, target = finished.out / place, outside / "moved"
     if path.exists():
         shutil.move(path, target)
     path.symlink_to(target)
     before, inside = _contents(outside), _contents(finished.out)
     for word in ("study", "report", "prune"):
-        code, printed = command(word, finished)
+        code, printed = finished.command(word)
         assert code == 2, printed
         assert f"{path}: it is a link" in printed
         assert (_contents(outside), _contents(finished.out)) == (before, inside)
 
 
-def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path, command: Command) -> None:
+def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path) -> None:
     shutil.copytree(pile.undisturbed, pile.out)
-    (flow,) = case_of(pile.out, "flow")
+    (flow,) = pile.cases("flow")
     mesh = flow / "constant" / "polyMesh"
     shutil.move(mesh, outside / "mesh")
     mesh.symlink_to(outside / "mesh")
@@ -184,25 +169,25 @@ def test_links_in_a_case_are_not_followed(pile: Bench, outside: Path, command: C
     case.prune(plan.make(study.load(str(pile.source))).cases[flow.name], pile.out / "cases")
     assert _contents(outside) == before
     (flow / case.DONE).unlink()
-    assert command("study", pile)[0] == 0
+    assert pile.command("study")[0] == 0
     assert _contents(outside) == before
     assert (pile.out / KEPT / mesh.relative_to(pile.out)).is_symlink()
-    assert same_tables(pile.out, pile.undisturbed)
+    assert tables(pile.out) == tables(pile.undisturbed)
 
 
-def test_cases_of_an_earlier_file_are_named_and_kept(finished: Bench, command: Command) -> None:
-    (old,) = case_of(finished.out, "cells")
+def test_cases_of_an_earlier_file_are_named_and_kept(finished: Bench) -> None:
+    (old,) = finished.cases("cells")
     before, text = _contents(old), finished.source.read_text()
     finished.source.write_text(text.replace("[7e-4, 1e-3]", "[1e-3]"))
-    code, printed = command("study", finished)
+    code, printed = finished.command("study")
     assert code == 0, printed
     assert "the study file has changed: 1 cases are not asked for any more" in printed
     for word in ("status", "prune"):
-        code, printed = command(word, finished)
+        code, printed = finished.command(word)
         assert code == 0, printed
         assert "not asked for: 1 cases of an earlier study file" in printed
         assert old.name in printed
         assert _contents(old) == before
     finished.source.write_text(text)
-    assert "no solver was started" in command("study", finished)[1]
-    assert same_tables(finished.out, finished.undisturbed)
+    assert "no solver was started" in finished.command("study")[1]
+    assert tables(finished.out) == tables(finished.undisturbed)

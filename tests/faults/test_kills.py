@@ -5,39 +5,25 @@ import itertools
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 
+import psutil
 import pytest
 
 from orchestrator.runs import process
-from tests.faults.bench import (
-    ENVIRONMENT,
-    ORCHESTRATOR,
-    Bench,
-    Driver,
-    case_of,
-    ended,
-    none_left_in,
-    pause,
-    processes_in,
-    same_tables,
-    wait_for,
-    wrapper,
-)
+from tests.faults import bench
+from tests.faults.bench import Bench, Driver, ended, none_left_in, processes_in, wait_for, wrapper
 
 SINCE = ".started"
 """A file in the study's parent: younger ones are of the driver that runs."""
+LOG, DONE = "cases/pile-*/log.liggghts", "cases/pile-*/done.json"
 STAGES = {
     "mesh": ("cases/flow-*/parameters", b"\n", "cases/flow-*/case.json"),
     "flow": ("cases/flow-*/log.simpleFoam", b"\n", "cases/flow-*/done.json"),
-    "grains": ("cases/pile-*/log.liggghts", b"\n", "cases/pile-*/done.json"),
-    "collecting": (
-        "cases/pile-*/log.liggghts",
-        b"the protocol has ended",
-        "cases/pile-*/done.json",
-    ),
+    "grains": (LOG, b"\n", DONE),
+    "collecting": (LOG, b"the protocol has ended", DONE),
     "tables": ("tables/*.csv", b"\n", "report.html"),
     "figures": ("figures/*", b"\n", "report.html"),
 }
@@ -65,7 +51,10 @@ def _stopped(pile: Bench, under: Sequence[str], stage: str) -> Driver:
         (pile.folder / SINCE).touch()
         driver = pile.start(under=under)
         if wait_for(partial(_is_in, pile, stage), driver):
-            pause(driver)
+            driver.send_signal(signal.SIGSTOP)
+            stopped = (psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE)
+            while psutil.Process(driver.pid).status() not in stopped:
+                time.sleep(0.001)
             if not list(pile.out.glob(after)):
                 return driver
             # it was faster than this test: once more
@@ -116,16 +105,16 @@ def test_a_hang_up_under_nohup_at_each_stage_ends_nothing(pile: Bench) -> None:
     code, printed = ended(driver)
     assert code == 0, printed
     assert "stopped" not in printed
-    assert same_tables(pile.out, pile.undisturbed)
+    assert bench.tables(pile.out) == bench.tables(pile.undisturbed)
 
 
 @pytest.mark.parametrize("under", [(), NOHUP])
 def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
     master, slave = os.openpty()
     driver = subprocess.Popen(
-        ["setsid", "--ctty", *under, *ORCHESTRATOR, "study", "small.toml", "--out", "out"],
+        ["setsid", "--ctty", *under, *bench.ORCHESTRATOR, "study", "small.toml", "--out", "out"],
         cwd=pile.folder,
-        env=ENVIRONMENT,
+        env=bench.ENVIRONMENT,
         stdin=slave,
         stdout=slave,
         stderr=slave,
@@ -144,14 +133,10 @@ SOLVERS = {"simpleFoam": "flow", "liggghts": "pile"}
 """The solvers of a study in their order, by the kind of their case."""
 
 
-def _kill_program(cases: Path, kind: str, name: str) -> bool:
+def _kill_program(pile: Bench, kind: str, name: str) -> bool:
     """Kill the program of a name in a case of a kind; whether there was one."""
-    pids = [
-        pid
-        for case in cases.glob(f"{kind}-*")
-        for pid, program in processes_in(case).items()
-        if program == name
-    ]
+    running = [process for case in pile.cases(kind) for process in processes_in(case).items()]
+    pids = [pid for pid, program in running if program == name]
     for pid in pids:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, KILL)
@@ -165,8 +150,7 @@ def test_each_solver_that_is_killed_once_is_run_again(pile: Bench) -> None:
         programs = wrapper(pile.folder / "bin", program, wait)
     driver = pile.start(programs=programs)
     for program, kind in SOLVERS.items():
-        kill = partial(_kill_program, pile.out / "cases", kind, program)
-        assert wait_for(kill, driver), program
+        assert wait_for(partial(_kill_program, pile, kind, program), driver), program
     code, printed = ended(driver)
     assert code == 0, printed
     pile.check_finished()
@@ -178,5 +162,5 @@ def test_a_solver_that_is_killed_each_time_fails_and_the_others_are_finished(pil
     assert code == 3, printed
     assert len((pile.folder / "tries").read_text().splitlines()) == process.TRIES
     assert "simpleFoam" in printed
-    assert all((case / "done.json").is_file() for case in case_of(pile.out, "cells"))
+    assert all((case / "done.json").is_file() for case in pile.cases("cells"))
     pile.check_finished()

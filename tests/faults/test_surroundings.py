@@ -12,10 +12,9 @@ from tests.faults.bench import (
     ENVIRONMENT,
     ORCHESTRATOR,
     Bench,
-    case_of,
     ended,
     none_left_in,
-    same_tables,
+    tables,
     wait_for,
     wrapper,
 )
@@ -72,8 +71,6 @@ DIVERGING = "sed -i 's/0\\.9[0-9]*;/2.5;/' system/fvSolution"
 """Over-relaxation: the iterations really diverge."""
 LOSING = "sed -i 's/ceiling_z *equal [^ ]*/ceiling_z equal -1.0/' parameters.liggghts"
 """The roof under the bed: every grain counts as lost."""
-
-
 FAILURES = {
     "flow": ("simpleFoam", DIVERGING, "diverged"),
     "pile": ("liggghts", LOSING, "LIGGGHTS stopped"),
@@ -87,7 +84,7 @@ def test_a_run_that_fails_by_itself_is_not_repeated(pile: Bench, kind: str) -> N
     code, printed = pile.study(programs=wrapper(pile.folder / "bin", program, there))
     assert code == 3, printed
     assert cause in printed
-    (directory,) = case_of(pile.out, kind)
+    (directory,) = pile.cases(kind)
     assert (directory / "failed.json").is_file()
     assert len((pile.folder / "tries").read_text().splitlines()) == 1
     pile.check_finished()
@@ -146,4 +143,4 @@ def test_a_study_ends_well_whatever_its_streams(cells: Bench, redirection: str) 
     )
     assert shell.returncode == STREAMS[redirection], shell.stderr
     assert "Traceback" not in shell.stdout + shell.stderr
-    assert same_tables(cells.out, cells.undisturbed)
+    assert tables(cells.out) == tables(cells.undisturbed)

@@ -1,10 +1,9 @@
-"""Bad input by the hundred: never a traceback, one message, nothing written anywhere."""
+"""Bad input by the hundred, settings and libraries: no traceback, one message, no other result."""
 
 import itertools
 import json
 import os
-import subprocess
-from collections.abc import Iterator
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +14,9 @@ from pydantic import BaseModel
 
 from orchestrator import cli
 from orchestrator.runs import case
+from orchestrator.study import study
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, PileBed, Protocol
-from tests.faults.bench import ENVIRONMENT, ORCHESTRATOR, ROOT
+from tests.conftest import Command
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,6 @@ class Shell:
 
     def run(self, *arguments: str) -> tuple[int, str]:
         """The exit code of a command, and its one line of complaint."""
-        self.captured.readouterr()
         try:
             code = cli.main(arguments)
         except SystemExit as end:  # argparse
@@ -45,15 +44,9 @@ class Shell:
         source.write_bytes(text.encode() if isinstance(text, str) else text)
         # a directory that cannot be used: even a study that is right by chance is refused
         code, printed = self.run("study", "bad.toml", "--out", "bad.toml/out")
-        assert code == 2, (text, printed)
-        assert "bad.toml" in printed, (text, printed)
-        assert place in printed, (text, printed)
+        assert (code, "bad.toml" in printed, place in printed) == (2, True, True), (text, printed)
         assert len(printed) < 1000
-        assert self.files() == {source}
-
-    def files(self) -> set[Path]:
-        """All that there is."""
-        return set(self.folder.rglob("*"))
+        assert [*self.folder.rglob("*")] == [source]
 
 
 @pytest.fixture
@@ -65,42 +58,30 @@ def shell(
 
 
 PARTS: dict[str, type[BaseModel]] = {
-    "fluid": Fluid,
-    "grain": Grain,
-    "bed": PileBed,
-    "flow": Flow,
-    "forces": Forces,
-    "protocol": Protocol,
+    **{"fluid": Fluid, "grain": Grain, "bed": PileBed},
+    **{"flow": Flow, "forces": Forces, "protocol": Protocol},
 }
 HUGE = "1" + "0" * 400
 VALUES = (
     *("-1.0", "nan", "inf", "1e30", "1e308", "'; rm -rf /'", "true", "[[1]]", "{ a = 1 }"),
     *("2026-01-01", "'" + "x" * 3000 + "'", HUGE),
 )
-FIXED = {"grain": {"diameter": "1e-3"}, "bed": {"kind": "'pile'", "slope_deg": "15.0"}}
+FIXED = {"grain.diameter": "1e-3", "bed.kind": "'pile'", "bed.slope_deg": "15.0"}
 
 
-def _bad_values() -> Iterator[tuple[str, str]]:
-    """Field and text of study files with one value that is wrong."""
+def test_study_files_with_one_wrong_value(shell: Shell) -> None:
     for (part, model), value in itertools.product(PARTS.items(), VALUES):
         for field, info in model.model_fields.items():
             if (field, value) == ("seed", HUGE) or (info.annotation, value) == (bool, "true"):
                 continue
-            parts = {**FIXED, part: {**FIXED.get(part, {}), field: value}}
-            lines = (
-                line
-                for name, fields in parts.items()
-                for line in (f"[{name}]", *(f"{key} = {given}" for key, given in fields.items()))
-            )
-            yield f"{part}.{field}", "\n".join(lines)
-
-
-def test_study_files_with_one_wrong_value(shell: Shell) -> None:
-    for field, text in _bad_values():
-        shell.refuses(text, f"bad.toml: {'bed' if field == 'bed.kind' else field}")
+            given = {**FIXED, f"{part}.{field}": value}
+            text = "".join(f"{key} = {value}\n" for key, value in given.items())
+            place = "bed" if (part, field) == ("bed", "kind") else f"{part}.{field}"
+            shell.refuses(text, f"bad.toml: {place}")
 
 
 GRAIN = "[grain]\ndiameter = 1e-3\n"
+PROTOCOL = "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n"
 BAD_FILES = (
     *("", "a = " + "[" * 100_000, "[" + ".".join(["a"] * 5000) + "]", "title = '\x00'"),
     *("time_limit = 1" + "0" * 5000, '"gr\'ain" = 1', '"gr\\nain" = 1', f"{'k' * 3000} = 1"),
@@ -129,7 +110,7 @@ def test_a_study_file_without_an_end_is_not_read_whole(shell: Shell) -> None:
 QUICK = settings(
     deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-VALID = (ROOT / "orchestrator/study/presets/first-look.toml").read_text(encoding="utf-8")
+VALID = Path(study.__file__).with_name("presets").joinpath("first-look.toml").read_text("utf-8")
 
 
 @QUICK
@@ -165,7 +146,7 @@ ARGUMENTS = (
 @pytest.mark.parametrize("words", ARGUMENTS, ids=lambda words: ascii(words)[:60])
 def test_wrong_arguments(shell: Shell, words: str) -> None:
     assert shell.run(*words.split())[0] == 2
-    assert not shell.files()
+    assert not [*shell.folder.iterdir()]
 
 
 JSON = st.recursive(
@@ -185,19 +166,17 @@ def test_any_state(
     root = shell.folder / "out"
     inside = root / "cases" / "cells-0123456789ab"
     inside.mkdir(parents=True, exist_ok=True)
-    states = {
-        root / "study.json": about,
-        inside / case.IDENTITY: identity,
-        inside / case.DONE: done,
-        inside / case.FAILED: failed,
-    }
+    names = (case.IDENTITY, case.DONE, case.FAILED)
+    states = dict(zip((inside / name for name in names), (identity, done, failed), strict=True))
+    states[root / "study.json"] = about
     for path, value in states.items():
         path.write_text(json.dumps(value))
     for command in ("status", "report", "prune"):
         code, printed = shell.run(command, "out")
         assert code in (0, 2, 3), printed
         assert code != 2 or "out" in printed
-    assert {path for path in shell.files() if path.is_file()} <= {*states, root / ".lock"}
+    files = {path for path in root.rglob("*") if path.is_file()}
+    assert files <= {*states, root / ".lock"}
 
 
 NAMES = (
@@ -216,8 +195,7 @@ def test_names_reach_no_shell_and_no_path(shell: Shell, stem: str) -> None:
     source = Path(f"{stem}.toml")
     groups = "".join(f"[[group]]\nname = {json.dumps(name)}\n" for name in NAMES)
     title = json.dumps("<b>".join(NAMES))
-    protocol = "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n"
-    source.write_text(f"title = {title}\n{GRAIN}{protocol}{groups}", encoding="utf-8")
+    source.write_text(f"title = {title}\n{GRAIN}{PROTOCOL}{groups}", encoding="utf-8")
     code, printed = shell.run("study", f"./{source}")
     assert code == 0, printed
     page = (Path("results") / stem / "report.html").read_text(encoding="utf-8")
@@ -225,13 +203,68 @@ def test_names_reach_no_shell_and_no_path(shell: Shell, stem: str) -> None:
     assert "<b>-rf" not in page
     assert {path.name for path in shell.folder.iterdir()} == {"work"}
     assert set(os.listdir()) == {source.name, "results"}
-    assert not any(path.name == "reached" for path in shell.files())
+    assert not [*shell.folder.rglob("reached")]
 
 
-def test_names_that_are_no_text(tmp_path: Path) -> None:
+def test_names_that_are_no_text(tmp_path: Path, orchestrator: Command) -> None:
     source, out = tmp_path / os.fsdecode(b"\xff\xfe.toml"), os.fsdecode(b"out\xff")
-    source.write_text(GRAIN + "[protocol]\nload_increment = 0.2\nwaiting_time = 3.0\n")
-    command = [*ORCHESTRATOR, "study", str(source), "--out", out]
-    ended = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True)
+    source.write_text(GRAIN + PROTOCOL)
+    ended = orchestrator("study", str(source), "--out", out)
     assert ended.returncode == 0, ended.stderr
     assert (tmp_path / out / "report.html").is_file()
+
+
+HOSTILE_RC = """
+text.usetex: True
+backend: nonsense
+axes.facecolor: red
+path.sketch: 3, 10, 2
+savefig.bbox: tight
+svg.fonttype: none
+axes.formatter.use_locale: True
+nonsense: 1
+"""
+SETTINGS = (
+    {"MATPLOTLIBRC": "rc", "MPLBACKEND": "nonsense", "SOURCE_DATE_EPOCH": "abc"},
+    {"MPLCONFIGDIR": "rc", "MPLBACKEND": "TkAgg", "DISPLAY": ":99"},
+    {"MPLCONFIGDIR": "/dev/null/nowhere"},
+)
+
+
+def test_settings_of_matplotlib(
+    finished_pile: Path, tmp_path: Path, orchestrator: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = shutil.copytree(finished_pile, tmp_path / "out")
+    drawn = [out / "report.html", *(out / "figures").iterdir()]
+    before = [path.read_bytes() for path in drawn]
+    (tmp_path / "rc").mkdir()
+    for place in (tmp_path / "rc", tmp_path):
+        (place / "matplotlibrc").write_text(HOSTILE_RC)
+    for variables in SETTINGS:
+        with monkeypatch.context() as patch:
+            for name, value in variables.items():
+                patch.setenv(name, value)
+            ended = orchestrator("report", "out")
+        assert ended.returncode == 0, ended.stderr
+        assert [path.read_bytes() for path in drawn] == before
+
+
+BROKEN = {
+    "scipy": "raise RuntimeError('compiled against another numpy')",
+    "pandas": "def",
+    "pydantic": "import _nothing",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_library_is_one_line(tmp_path: Path, orchestrator: Command, name: str) -> None:
+    (tmp_path / f"{name}.py").write_text(BROKEN[name])  # python -m looks here first
+    (tmp_path / "small.toml").write_text(GRAIN + PROTOCOL)
+    ended = orchestrator("study", "small.toml")
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("orchestrator: a library does not load: ")
+    assert ended.stderr.count("\n") == 1
+    examined = orchestrator("doctor")
+    assert examined.returncode == 1
+    (line,) = (line for line in examined.stdout.splitlines() if line.startswith("NOT"))
+    assert f"pip install --force-reinstall {name}" in line
