@@ -8,11 +8,13 @@ import math
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.calculator import GAS_BELOW, GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
-from orchestrator.types import Row
+
+if TYPE_CHECKING:
+    from orchestrator.types import Row  # its module loads numpy
 
 Value = float | str  # a number, or a part of the diameter such as ``d/30``
 OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
@@ -147,7 +149,7 @@ def _is_nan(value: object) -> bool:
     return isinstance(value, float) and math.isnan(value)
 
 
-def as_json(rows: Sequence[Row]) -> str:
+def as_json(rows: Sequence["Row"]) -> str:
     """A record for one point, or a list of records: parameters, rules, an object for each law."""
     from orchestrator.physics.threshold import LAWS_OF
 
@@ -168,7 +170,7 @@ def as_json(rows: Sequence[Row]) -> str:
     return json.dumps(json.loads(answer, parse_constant=lambda _: None), indent=2)
 
 
-def as_text(rows: Sequence[Row], answer: str, varied: Sequence[str]) -> Iterator[str]:
+def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
     from orchestrator.physics.threshold import LAWS_OF
 
