@@ -4,7 +4,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from orchestrator.errors import OrchestratorError
 from orchestrator.runs import terminal
 
 if TYPE_CHECKING:
@@ -74,20 +73,7 @@ def drawn_from(results: "Results") -> "list[Case]":
 
 
 def said(results: "Results") -> str:
-    """The answer of a study for a terminal: thresholds with their intervals, and sentences.
-
-    Raises
-    ------
-    OrchestratorError
-        If the tables lack columns, as those of another version do.
-    """
+    """The answer of a study for a terminal, see `words.text`."""
     from orchestrator.report import words
 
-    try:
-        return words.text(results)
-    except KeyError as error:
-        raise OrchestratorError(
-            f"its tables lack {error}: another version of this program wrote them",
-            where=str(results.cases.parent),
-            remedy="`orchestrator study` of the same file runs it again",
-        ) from None
+    return words.text(results)

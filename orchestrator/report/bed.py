@@ -249,7 +249,7 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
         fixed=circles(centres, ~mobile),
         mobile=zip(circles(here, mobile), look[mobile], base[mobile], strict=True),
         size=f"{(right - left) / 75:.3g}",
-        d=labels.millimetres(pile.scene.grain.diameter),
+        d=labels.value("d_m", pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",
         title=labels.plain("alpha_deg", pile.bed.slope_deg),
     )

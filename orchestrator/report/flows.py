@@ -9,8 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.figure import SubFigure
+from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from scipy.integrate import cumulative_trapezoid
@@ -27,19 +26,17 @@ from orchestrator.study import fields
 from orchestrator.study.parts import Turbulence
 from orchestrator.types import FloatArray
 
-ESTIMATES: dict[str, tuple[str, Look]] = {
+ESTIMATES = ("wall", "eq10", "eq10_printed")
+LINES: dict[str, tuple[str, Look]] = {
     "wall": ("wall stress", {"color": "black", "lw": 1.3}),
     "eq10": ("Eq. 10, $\\ln((z_e+z_0)/z_0)$", {"color": "#0072b2", "lw": 1.0}),
     "eq10_printed": ("Eq. 10 as printed, $\\ln(z_e/z_0)$", {"color": "#56b4e9", "ls": "--"}),
+    "grains": ("as grains feel it (averaged)", {"color": "#f0a35e", "lw": 0, "marker": "."}),
 }
-GRAINS: Look = {"color": "#f0a35e", "marker": ".", "ls": "", "zorder": 1.5, "gid": "grains"}
 REVERSED: Look = {"color": "0.85", "lw": 0}
 MODELS = dict(zip(get_args(Turbulence), ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), strict=True))
 """Colours of the turbulence models."""
 USTAR = r"$u^\star/u^\star_0$"
-SPEED = r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$"
-NOTABLE_RATIO = 1.5
-"""Ratio of roughness lengths of one slope beyond which both have a panel."""
 BEDS = 4
 """Largest number of beds in the map of thresholds."""
 Window = tuple[float, float, float, float]
@@ -72,22 +69,19 @@ def drawn(results: Results) -> list[Pile]:
 
 def stress(results: Results) -> Iterator[Figure]:
     """The friction velocity along the bed, a panel for each slope at its least and largest z0."""
-    piles = []
-    for least, *others in _kinds(results):
-        rougher = [p for p in others[-1:] if p.bed.roughness > NOTABLE_RATIO * least.bed.roughness]
-        piles += [least, *rougher]
+    piles = [pile for least, *others in _kinds(results) for pile in (least, *others[-1:])]
     if not piles:
         return
     columns = min(len(piles), 2)
     rows = -(-len(piles) // columns)
     figure = style.canvas(3.0 * rows + 0.4)
-    panels = figure.subfigures(rows, columns, squeeze=False).ravel()
-    for panel, pile in zip(panels, piles, strict=False):
-        _stress_panel(panel, results, pile)
-    entries = [Line2D([], [], label=text, **look) for text, look in ESTIMATES.values()]
-    if "pile_grain" in results.tables:
-        entries.append(Line2D([], [], label="as the grains feel it (averaged)", **GRAINS))
-    style.legends(figure, [], [*entries, Patch(label="reversed flow", **REVERSED)])
+    axes = figure.subplots(2 * rows, columns, height_ratios=[4, 1] * rows, squeeze=False)
+    pairs = axes.reshape(rows, 2, columns).swapaxes(1, 2).reshape(-1, 2)
+    for pile, (top, below) in zip(piles, pairs, strict=False):
+        _along(results, pile, top, below)
+    for unused in pairs[len(piles) :].ravel():
+        unused.remove()
+    _legend(figure)
     names = tuple(pile.flow.name for pile in piles)
     mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
     lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
@@ -95,27 +89,36 @@ def stress(results: Results) -> Iterator[Figure]:
     yield Figure("wall-stress", "Friction velocity over the pile", text, names, figure, fold=True)
 
 
-def _stress_panel(panel: SubFigure, results: Results, pile: Pile) -> None:
-    top, below = panel.subplots(2, 1, sharex=True, height_ratios=[4, 1])
-    table, line, h = results.tables["wall_stress"], pile.model.line, pile.bed.height
-    rows = table[table["flow_case"] == pile.flow.name]
-    x, z, wall = (rows[name].to_numpy(float) for name in ("x_m", "z_m", "ustar_over_ustar0_wall"))
-    for name, (_, look) in ESTIMATES.items():
-        values = rows[f"ustar_over_ustar0_{name}"].replace([np.inf, -np.inf], np.nan)
-        top.plot(x / h, values, gid=name, **look)
-    _shade_reversed(top, x / h, wall)
-    grains = results.joined("pile_grain")
+def _legend(figure: Canvas) -> None:
+    entries = [Line2D([], [], label=text, **look) for text, look in LINES.values()]
+    style.legends(figure, [], [*entries, Patch(label="reversed flow", **REVERSED)])
+
+
+def _along(results: Results, pile: Pile, top: Axes, below: Axes) -> None:
+    """Friction velocities along the bed of a pile, and the bed with its marks under them."""
+    line, h = pile.model.line, pile.bed.height
+    rows, grains = results.tables["wall_stress"], results.joined("pile_grain")
+    rows = rows[rows["flow_case"] == pile.flow.name].replace([np.inf, -np.inf], np.nan)
+    x, wall = rows["x_m"].to_numpy() / h, rows["ustar_over_ustar0_wall"].to_numpy()
+    for name in ESTIMATES:
+        top.plot(x, rows[f"ustar_over_ustar0_{name}"], gid=name, **LINES[name][1])
+    top.axhline(0, color="0.4", lw=0.6)
+    top.fill_between(x, wall, 0, where=(wall < 0).tolist(), gid="reversed flow", **REVERSED)
     group = grains[grains["flow_case"] == pile.flow.name] if len(grains) else grains
     if len(group):  # of the scenes that share the flow, the last
         group = group[group["scene_id"] == group["scene_id"].max()]
-        top.plot(group["x_m"] / h, group["ustar_over_ustar0"], **GRAINS)
+        felt = group["ustar_over_ustar0"]
+        top.plot(group["x_m"] / h, felt, zorder=1.5, ms=7, gid="grains", **LINES["grains"][1])
     _draw_bed(below, pile)
     below.text(0.015, 0.6, "flow →", transform=below.transAxes, fontsize=6.5, color="0.35")
-    below.set(xlabel="$x/h$", ylabel="$z/h$", ylim=(z.min() / h - 0.3, z.max() / h + 0.4))
+    low, high = min(line.z) / h, max(line.z) / h
+    below.set(xlabel="$x/h$", ylabel="$z/h$", ylim=(low - 0.3, high + 0.4))
     for name, at in marks(pile).items():
         for ax in (top, below):
             ax.axvline(at / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
         style.upright_note(top, at / h - 0.1, name, at="top")
+    below.sharex(top)
+    top.tick_params(labelbottom=False)
     top.set(xlim=(-4, line.x[-2] / h + 10), ylim=(None, 1.25 * top.get_ylim()[1]), ylabel=USTAR)
     top.set_title(_title(results, pile), loc="left")
 
@@ -126,11 +129,6 @@ def marks(pile: Pile) -> dict[str, float]:
     if pile.bed.form.rises and not pile.bed.profile:
         places |= {"toe": 0.0, "lee toe": line.toe[0]}
     return {name: float(x) for name, x in places.items() if line.x[1] <= x <= line.x[-2]}
-
-
-def _shade_reversed(ax: Axes, x: FloatArray, ustar: FloatArray) -> None:
-    ax.axhline(0, color="0.4", lw=0.6)
-    ax.fill_between(x, ustar, 0, where=(ustar < 0).tolist(), gid="reversed flow", **REVERSED)
 
 
 def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float, float]:
@@ -192,7 +190,7 @@ def flow(results: Results) -> Iterator[Figure]:
             ax.set_title(_title(results, pile), loc="left")
         axes[-1].set_xlabel("$x/h$")
         bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
-        bar.set_label(SPEED)
+        bar.set_label(r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$")
         flows, lid = [pile.scene.flow for pile in shown], not any(p.scene.flow.depth for p in shown)
         models = {labels.value("turbulence_model", flow.turbulence_model): 0 for flow in flows}
         speeds = {labels.value("solve_u_e_m_s", flow.speed): 0 for flow in flows}
@@ -266,7 +264,7 @@ def read_edges(case: Path) -> FloatArray:
 
 
 def where(results: Results) -> Iterator[Figure]:
-    """Beds that are more than one triangle, each by its first scene: stress, flow, thresholds."""
+    """Beds that are more than one triangle, each by its first scene: stress, bed, thresholds."""
     grains = results.tables.get("pile_grain", pd.DataFrame())
     scenes = {} if grains.empty else dict(iter(grains.groupby("scene_id")))
     lines: dict[Any, tuple[Pile, pd.DataFrame]] = {}
@@ -276,47 +274,30 @@ def where(results: Results) -> Iterator[Figure]:
     beds = list(lines.values())[:BEDS]
     if not beds:
         return
-    heights = [*[3.2] * len(beds), 0.6]
-    canvas = style.canvas(sum(heights))
-    *parts, last = canvas.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for part, (pile, rows) in zip(parts, beds, strict=True):
-        _where_bed(part, results, pile, rows)
-    bar = canvas.colorbar(ScalarMappable(cmap="plasma"), last.subplots(), orientation="horizontal")
+    figure = style.canvas(4.4 * len(beds) + 0.9)
+    axes = figure.subplots(3 * len(beds), 1, height_ratios=[1.7, 0.6, 1.5] * len(beds))
+    for (top, below, map_), (pile, rows) in zip(axes.reshape(-1, 3), beds, strict=True):
+        _along(results, pile, top, below)
+        forms = f"{pile.bed.forms} × " * (pile.bed.forms > 1)
+        shape = f"{forms}{pile.bed.profile or pile.bed.form.label or pile.bed.shape}"
+        parts = (shape, *pile.bed.obstacles, _title(results, pile))
+        top.set_title(", ".join(map(str, parts)), loc="left")
+        goes, x = np.isfinite(rows["ustar0_m_s"]), rows["x_m"] / pile.bed.height
+        flow = rows["ustar0_m_s"][goes]
+        look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
+        dots = map_.scatter(x[goes], flow, c=flow.rank(method="first") / len(rows), **look)
+        for at in x[~goes]:
+            map_.axvline(at, color="0.75", lw=0.3, zorder=0)
+        map_.margins(y=0.15)
+        map_.sharex(top)
+        map_.set_yscale("log")
+        style.plain_ticks(map_.yaxis)
+        map_.set(xlabel="$x/h$", ylabel=r"goes at $u^\star_0$, m/s")
+    bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
     bar.set_label("$n/N$ by then")
+    _legend(figure)
     names = tuple(dict.fromkeys(run.name for pile, _ in beds for run in pile.runs))
-    yield Figure("where", "Where grains go", caption("where"), names, canvas)
-
-
-def _where_bed(part: SubFigure, results: Results, pile: Pile, grains: pd.DataFrame) -> None:
-    top, bed, map_ = part.subplots(3, 1, sharex=True, height_ratios=[1.1, 1, 1.5])
-    h, line = pile.bed.height, pile.model.line
-    window = line.x[1] / h - 4.0, line.x[-2] / h + 4.0
-    along = pile.stress(results.cases)
-    top.plot(along.x_m / h, along.ustar_over_ustar0_wall, color="black", lw=1.0, gid="stress")
-    _shade_reversed(top, along.x_m / h, along.ustar_over_ustar0_wall)
-    top.set(ylabel=USTAR, xlim=window)
-    forms = f"{pile.bed.forms} × " * (pile.bed.forms > 1)
-    shape = pile.bed.profile or pile.bed.form.label or pile.bed.shape
-    title = _title(results, pile)
-    top.set_title(", ".join(map(str, (f"{forms}{shape}", *pile.bed.obstacles, title))), loc="left")
-    low, high = min(line.z) / h - 0.2, max(line.z) / h + 2.5
-    if pile.model.cases and is_whole(pile.flow, results.cases):
-        extent = (*window, low + 0.2, high)
-        speed = np.linalg.norm(over_u_e(pile, results.cases, extent, h, 500), axis=-1)
-        bed.imshow(speed, origin="lower", extent=extent, vmin=0, vmax=1.1, aspect="auto")
-    _draw_bed(bed, pile)
-    bed.set(ylim=(low, high), ylabel="$z/h$")
-
-    goes = np.isfinite(grains["ustar0_m_s"])
-    x, flow = grains["x_m"] / h, grains["ustar0_m_s"][goes]
-    look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
-    map_.scatter(x[goes], flow, c=flow.rank(method="first") / len(grains), **look)
-    for at in x[~goes]:
-        map_.axvline(at, color="0.75", lw=0.3, zorder=0)
-    map_.margins(y=0.15)
-    map_.set_yscale("log")
-    style.plain_ticks(map_.yaxis)
-    map_.set(xlabel="$x/h$", ylabel=r"goes at $u^\star_0$, m/s")
+    yield Figure("where", "Where grains go", caption("where"), names, figure)
 
 
 def hills(results: Results) -> Iterator[Figure]:
@@ -325,28 +306,24 @@ def hills(results: Results) -> Iterator[Figure]:
     if not listed:
         return
     flows, table = pd.concat([rows for _, rows in listed]), results.tables["wall_stress"]
-    canvas = style.canvas(2.7 * len(listed) + 0.3)
-    panels = canvas.subplots(2 * len(listed), 1, sharex=True, height_ratios=[3, 1] * len(listed))
+    canvas = style.canvas(2.4 * len(listed) + 0.3)
+    panels = canvas.subplots(len(listed), 1, sharex=True, squeeze=False)[:, 0]
     measured: Look = {"color": "black", "lw": 1.2, "gid": "measured"}
-    for number, (aspect, rows) in enumerate(listed):
-        along, back = panels[2 * number : 2 * number + 2]
+    for ax, (aspect, rows) in zip(panels, listed, strict=True):
         for place, (_, row) in enumerate(rows.iterrows()):
             stress = table[table["flow_case"] == row["flow_case"]]
             line = results.flows[row["flow_case"]].model.line
             x = (stress["x_m"].to_numpy(float) - line.crest[0]) / line.h
-            colour = MODELS[row["turbulence_model"]]
-            along.plot(x, stress["ustar_over_ustar0_wall"], color=colour, lw=1.0, gid="stress")
+            look: Look = {"color": MODELS[row["turbulence_model"]]}
+            ax.plot(x, stress["ustar_over_ustar0_wall"], lw=1.0, gid="stress", **look)
             ends = [row["separation_over_h"], row["reattachment_over_h"]]
-            back.plot(ends, [place, place], color=colour, lw=3, gid="reversed flow")
+            ax.plot(ends, [-0.7 - 0.15 * place] * 2, lw=3, gid="reversed flow", **look)
         end = rows["measured_reattachment_over_h"].iloc[0]
         if end > 0:
-            back.axvline(end, **measured)
-        if rows["reattachment_over_h"].isna().all():
-            back.text(0.5, 0.5, "no reversed flow", transform=back.transAxes, **style.NOTE)
-        along.axhline(0, color="0.4", lw=0.6)
-        along.set(ylabel=USTAR)
-        along.set_title(f"half length {aspect:g} h, {rows['alpha_deg'].iloc[0]:.3g}°", loc="left")
-        back.set(yticks=[], ylim=(len(rows) - 0.3, -0.7), ylabel="reversed")
+            ax.axvline(end, **measured)
+        ax.axhline(0, color="0.4", lw=0.6)
+        ax.set(ylabel=USTAR)
+        ax.set_title(f"half length {aspect:g} h, {rows['alpha_deg'].iloc[0]:.3g}°", loc="left")
     panels[-1].set(xlabel="$x/h$ from the top", xlim=(-9, 13))
     names = [name for name in MODELS if name in set(flows["turbulence_model"])]
     colours = [style.entry(labels.value("turbulence_model", name), MODELS[name]) for name in names]

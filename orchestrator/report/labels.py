@@ -50,15 +50,12 @@ def value(column: str, value: Any) -> str:
 
 def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
     """Columns of a table with their values and heads as a reader sees them."""
-    return {
-        words(column).label: [value(column, item) for item in rows[column]] for column in columns
-    }
+    return {words(name).label: [value(name, item) for item in rows[name]] for name in columns}
 
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     """The values of a row with their symbols, without those that the row does not have."""
-    shown = [column for column in columns if pd.notna(row[column]) or column in LISTS]
-    return [plain(column, row[column]) for column in shown]
+    return [plain(name, row[name]) for name in columns if pd.notna(row[name]) or name in LISTS]
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
@@ -69,16 +66,10 @@ def panel(row: pd.Series, columns: Sequence[str]) -> str:
 
 def amount(value: float, unit: str) -> str:
     """A value with its unit; one in metres is written in millimetres."""
-    match unit:
-        case "m":
-            return millimetres(value)
-        case "d" | "h":
-            return ratio_of(value, unit)
-        case "%":
-            return f"{100 * value:.3g} %"
-        case "°":
-            return f"{value:.4g}°"
-    return f"{value:g} {unit}".rstrip()
+    if unit in ("d", "h"):
+        return ratio_of(value, unit)
+    factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(unit, (0.0, ""))
+    return f"{factor * value:.4g}{written}" if factor else f"{value:g} {unit}".rstrip()
 
 
 def ratio_of(ratio: float, length: str) -> str:
@@ -86,11 +77,6 @@ def ratio_of(ratio: float, length: str) -> str:
     part = 1 / ratio
     whole = round(part)
     return f"{length}/{whole}" if abs(part - whole) < 1e-3 * part else f"{ratio:.3g} {length}"
-
-
-def millimetres(metres: float) -> str:
-    """A length, such as ``0.7 mm``."""
-    return f"{metres * 1e3:.6g} mm"
 
 
 def methods(rows: pd.DataFrame) -> str:
@@ -108,16 +94,17 @@ def varying(table: pd.DataFrame, *shown: str) -> list[str]:
 
     def rank(column: str) -> int:
         info = fields.COLUMNS[column].info
-        return 3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
+        of_answer = 3 if info.about != "question" else 2 if info.scope in OF_METHODS else 0
+        return 1 if column == "method" else of_answer
 
-    columns = [column for column in fields.others(table, *shown) if column in fields.COLUMNS]
+    columns = [name for name in fields.others(table, *shown) if name in fields.COLUMNS]
+    columns = [name for name in columns if fields.COLUMNS[name].info.about != "replica"]
     listed: list[str] = []
     groups = table.groupby(list(shown), dropna=False).ngroup().to_numpy()
-    for column in sorted(columns, key=lambda column: 1 if column == "method" else rank(column)):
-        if fields.COLUMNS[column].info.about != "replica":
-            codes, values = pd.factorize(table[column], use_na_sentinel=False)
-            finer, names = pd.factorize(groups * len(values) + codes)
-            if len(names) > groups.max(initial=-1) + 1:
-                listed.append(column)
-                groups = finer
+    for column in sorted(columns, key=rank):
+        codes, values = pd.factorize(table[column], use_na_sentinel=False)
+        finer, names = pd.factorize(groups * len(values) + codes)
+        if len(names) > groups.max(initial=-1) + 1:
+            listed.append(column)
+            groups = finer
     return listed

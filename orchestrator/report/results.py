@@ -1,7 +1,7 @@
 """The source of a report: the study, its cases and its tables."""
 
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -49,9 +49,7 @@ class Results:
         solved = [name for name, item in columns if item.info.scope == "solved flows"]
         return [name for name in solved if piles[name].nunique(dropna=False) > 1]
 
-    @cached_property
-    def _joins(self) -> dict[str, pd.DataFrame]:
-        return {}
+    _joins: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its rows' scenes beside its own, or an empty one."""
@@ -59,8 +57,7 @@ class Results:
             table = self.tables.get(name, pd.DataFrame())
             if len(table):
                 columns = ["scene_id", *self.scenes.columns.difference(table.columns, sort=False)]
-                scenes = self.scenes[columns]
-                table = table.merge(scenes, on="scene_id", how="left", validate="many_to_one")
+                table = table.merge(self.scenes[columns], on="scene_id", how="left")
             self._joins[name] = table if len(table) else pd.DataFrame()
         return self._joins[name]
 
@@ -69,16 +66,20 @@ class Results:
         return sorted({float(value) for value in self.scenes[column].dropna()})
 
     @cached_property
-    def exemplars(self) -> pd.DataFrame:
-        """The piles of each slope at the fraction of the sentences, those that stand for it first.
+    def at_fraction(self) -> pd.DataFrame:
+        """The thresholds of piles at the fraction of the sentences, the nearest to 30 %."""
+        rows = self.joined("pile_threshold")
+        return rows[rows["fraction"] == nearest_fraction(rows)] if len(rows) else rows
 
-        Usable thresholds, the largest grains, DEM, beds that change and the least z0 come first.
+    @cached_property
+    def exemplars(self) -> pd.DataFrame:
+        """The thresholds at that fraction of each slope, those that stand for it first.
+
+        Usable ones, the largest grains, DEM, beds that change and the least z0 come first.
         """
-        piles = self.joined("pile_threshold")
-        if piles.empty:
-            return piles
-        here = piles[(piles["fraction"] == nearest_fraction(piles)) & piles["shields"].notna()]
-        here = seeds_as_one(here)
+        if self.at_fraction.empty:
+            return self.at_fraction
+        here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
         order = here.assign(dem=here["answered_method"] == "dem", wears=here["update"] > 0)
         by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
         return order.sort_values(by, ascending=[True, *[False] * 4, True], kind="stable")
@@ -97,8 +98,7 @@ class Results:
         """A pile for each flow case whose stress is in the tables, by the flow case's name."""
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
-        piles = self.plan.piles.values()
-        solves = (item for pile in piles for item in pile.solves.items())
+        solves = (item for pile in self.plan.piles.values() for item in pile.solves.items())
         return {name: solve for name, solve in solves if name in done}
 
 
@@ -130,9 +130,8 @@ def split(
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     """Thresholds of piles that differ in their seed alone as one row, with all others as they are.
 
-    A row has the means over the usable seeds, over all seeds where none is usable. The columns
-    ``seeds`` and ``of_seeds`` have the number of these seeds and of all, ``least`` and ``largest``
-    the range of their thresholds.
+    A row has the means over the usable seeds, or over all where none is; ``seeds`` and ``of_seeds``
+    are the number of these seeds and of all, ``least`` and ``largest`` the ends of the thresholds.
     """
     keys = [*fields.others(rows, "seed"), "fraction"]
     twins = valid(rows).groupby([rows[key] for key in keys], dropna=False)
@@ -140,8 +139,7 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     groups = rows.groupby(keys, dropna=False)
     tau = groups["shields"]
     ends = {"least": tau.transform("min"), "largest": tau.transform("max")}
-    means = {name: groups[name].transform("mean") for name in MEANS}
-    rows = rows.assign(**means, **ends, seeds=tau.transform("size"))
+    rows = rows.assign(**groups[MEANS].transform("mean"), **ends, seeds=tau.transform("size"))
     return rows.drop_duplicates(keys)
 
 
@@ -174,6 +172,4 @@ def valid(table: pd.DataFrame) -> "pd.Series[bool]":
 
 def case_names(*tables: pd.DataFrame) -> tuple[str, ...]:
     """The cases behind the rows of tables, each once."""
-    return tuple(
-        sorted({str(item) for table in tables if len(table) for item in table["case"].dropna()})
-    )
+    return tuple(sorted({str(c) for rows in tables if len(rows) for c in rows["case"].dropna()}))

@@ -1,6 +1,6 @@
 """The answer of a study in sentences and tables, and all other words of its page."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from platform import python_version
 from typing import Any
@@ -10,21 +10,14 @@ import numpy as np
 import pandas as pd
 
 from orchestrator import __version__
+from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
 from orchestrator.report import labels, theory
 from orchestrator.report.page import caption
-from orchestrator.report.results import (
-    Results,
-    by_dem,
-    held,
-    measured_hills,
-    nearest_fraction,
-    split,
-    valid,
-)
+from orchestrator.report.results import Results, by_dem, held, measured_hills, split, valid
 from orchestrator.runs import case
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form
@@ -42,9 +35,20 @@ FLUID = ("rho_f_kg_m3", "nu_m2_s")
 
 
 def text(results: Results) -> str:
-    """The short table, then the sentences, for a terminal."""
-    answer = "\n".join(sentences(results)) or "No case has given a result yet."
-    table = short(results)
+    """The short table, then the sentences, for a terminal.
+
+    Raises
+    ------
+    OrchestratorError
+        If the tables lack columns, as those of another version do.
+    """
+    try:
+        answer = "\n".join(sentences(results)) or "No case has given a result yet."
+        table = short(results)
+    except KeyError as error:
+        what = f"its tables lack {error}: another version of this program wrote them"
+        remedy = "`orchestrator study` of the same file runs it again"
+        raise OrchestratorError(what, where=str(results.cases.parent), remedy=remedy) from None
     if table is None:
         return answer
     rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
@@ -130,10 +134,9 @@ def _hills(results: Results) -> Iterator[str]:
 
 def short(results: Results) -> pd.DataFrame | None:
     """The thresholds in at most a screen: of few piles each, of many their range by slope."""
-    rows = results.joined("pile_threshold")
-    if rows.empty:
+    here = results.at_fraction
+    if here.empty:
         return grains(results)
-    here = rows[rows["fraction"] == nearest_fraction(rows)]
     keys = [*EACH, *labels.varying(here, *EACH)]
     few = len(here[keys].drop_duplicates()) <= FEW
     return _thresholds(
@@ -184,7 +187,8 @@ def _thresholds(
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable, d = (rows[name].groupby(number) for name in ("usable", "d_m"))
     shown = rows[rows["usable"] | ~usable.transform("any")].groupby(number)
-    low, high, first = shown.min(numeric_only=True), shown.max(numeric_only=True), shown.first()
+    low, high = (end(numeric_only=True).astype(float) for end in (shown.min, shown.max))
+    first = shown.first()
     table: dict[str, Any] = labels.cells(first, keys)
     if ranges:
         low[~usable.any()] = np.nan
@@ -238,12 +242,10 @@ def parameters(results: Results) -> pd.DataFrame:
 
 def _values(column: pd.Series) -> str:
     """The different values of a column, or how many there are and their range."""
-    values = list(column.dropna().unique())
-    if all(isinstance(value, str) for value in values):
-        return ", ".join(sorted(values))
-    listed = list(dict.fromkeys(f"{number:.6g}" for number in sorted(map(float, values))))
-    many = f"{len(listed)} from {listed[0]} to {listed[-1]}"
-    return ", ".join(listed) if len(listed) <= FEW else many
+    values = sorted(column.dropna().unique(), key=lambda value: (isinstance(value, str), value))
+    texts = list(dict.fromkeys(v if isinstance(v, str) else f"{v:.6g}" for v in values))
+    many = f"{len(texts)} from {texts[0]} to {texts[-1]}" if texts else ""
+    return ", ".join(texts) if len(texts) <= FEW else many
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
@@ -282,12 +284,10 @@ def checks(results: Results) -> pd.DataFrame | None:
         return None
     cells = {
         **labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"]),
-        "τ_c": table["shields"],
-        "by DEM": table["shields_dem"],
+        **{"τ_c": table["shields"], "by DEM": table["shields_dem"]},
         "interval of DEM": _spans(table["shields_dem_low"], table["shields_dem_high"], ".4g"),
         "difference, %": 100 * table["difference"],
-        "agree": table["agree"],
-        "case": table["case"],
+        **{name: table[name] for name in ("agree", "case")},
     }
     return pd.DataFrame(cells)
 
@@ -297,30 +297,20 @@ def remarks(results: Results) -> dict[str, Any]:
     scenes, thresholds = results.scenes, results.joined("pile_threshold")
     outside = scenes[~valid(scenes)]
     both = outside["force_law"].isin(theory.PAIR) & (outside["regime"] == "transition")
-    counts: dict[str, Any] = {
-        "outside": len(outside),
-        "transition": both.sum(),
-        "unreached": thresholds["shields"].isna().sum() if len(thresholds) else 0,
-        "thresholds": len(thresholds),
-        "far": (0, 0),
-        "silent": 0,
-    }
-    curve = results.tables.get("pile_curve", pd.DataFrame())
-    for name in ("carried_off", "fallen_upstream"):
-        largest = curve.groupby("scene_id")[name].max() if len(curve) else pd.Series([0])
-        counts[name] = (largest > 0).sum(), largest.max()
+    names = ["scene_id", "carried_off", "fallen_upstream"]
+    curve = results.tables.get("pile_curve", pd.DataFrame()).reindex(columns=names)
+    lost = curve.groupby("scene_id").max()
     grains = by_dem(results.joined("single_grain"))
+    counts: dict[str, Any] = {
+        **{"outside": len(outside), "transition": both.sum(), "thresholds": len(thresholds)},
+        "unreached": thresholds["shields"].isna().sum() if len(thresholds) else 0,
+        **{name: ((lost[name] > 0).sum(), lost[name].max()) for name in names[1:]},
+    }
     if len(grains):
         ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]
         far = ((ratio - 1).abs() > 0.01) & held(grains)
         counts |= {"far": (far.sum(), (far & valid(grains)).sum()), "silent": ratio.isna().sum()}
-    return counts
-
-
-SHEETS: tuple[Callable[[Results], Any], ...] = (
-    *(short, piles, grains, levels, checks, remarks, force_laws, parameters),
-)
-"""The parts of the page that its template knows by the names of these functions."""
+    return {"far": (0, 0), "silent": 0, **counts}
 
 
 def contents(
@@ -329,21 +319,22 @@ def contents(
     """The words and numbers of the page beside its figures, by the names of its template."""
     from orchestrator.report import flows  # imports what draws
 
-    root, piles = results.cases, results.plan.piles.values()
-    names = [name for name in results.plan.cases if (root / name).is_dir()]
+    sheets = (short, piles, grains, levels, checks, remarks, force_laws, parameters)
+    root, cases = results.cases, results.plan.cases
+    scenes = [pile.scene for pile in results.plan.piles.values()]
     return {
-        **{sheet.__name__: sheet(results) for sheet in SHEETS},
+        **{sheet.__name__: sheet(results) for sheet in sheets},
         "results": results,
         "title": results.study.title,
         "answer": sentences(results),
         "measured": theory.section(results),
-        "programs": versions(case.programs(root, results.plan.cases)),
+        "programs": versions(case.programs(root, cases)),
         "times": times(timings),
         "failures": failures,
-        "links": {name: quote(f"{root.name}/{name}/") for name in names},
+        "links": {n: quote(f"{root.name}/{n}/") for n in cases if (root / n).is_dir()},
         "paper_pair": results.scenes["force_law"].isin(theory.PAIR).any(),
         "eq10": flows.eq10_over_wall(results, tuple(results.flows)) if results.flows else None,
         "methods": set(results.scenes["answered_method"]),
-        "mixed": any(pile.scene.grain.sizes is not None for pile in piles),
-        "strips": any(pile.bed.width for pile in piles),
+        "mixed": any(scene.grain.sizes is not None for scene in scenes),
+        "strips": "answered_width" in results.scenes and results.scenes["answered_width"].any(),
     }

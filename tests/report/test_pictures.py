@@ -218,8 +218,7 @@ def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
     grains = train.tables["pile_grain"]
     (dots,) = (
         artist
-        for part in figure.canvas.subfigs  # type: ignore[union-attr]
-        for axes in part.axes
+        for axes in figure.canvas.axes  # type: ignore[union-attr]
         for artist in axes.collections
         if artist.get_gid() == "thresholds"
     )
