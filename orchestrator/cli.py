@@ -101,9 +101,10 @@ def _study(options: Namespace) -> int:
         print("every case was done already; no solver was started", file=sys.stderr)
         print(*answer_and_page, sep="\n")
         return 0
-    from orchestrator import face, pipeline, plan
+    from orchestrator import pipeline, plan
+    from orchestrator.study.study import load
 
-    study = face.load(options.source, options.tolerance, "--tolerance")
+    study = load(options.source, options.tolerance)
     out = options.out or Path("results") / study.name
     if options.plan:
         lines = plan.forecast(study, out.absolute() / "cases", options.workers)
@@ -115,11 +116,12 @@ def _study(options: Namespace) -> int:
 
 def _experiment(options: Namespace) -> int:
     """Run an experiment; all but the maps of stability are on the scenes of a study."""
-    from orchestrator import face, plan
+    from orchestrator import plan
+    from orchestrator.study.study import load
 
     module = import_module(f"orchestrator.experiments.{options.command}")
     out = options.out or Path("results") / options.command
-    studies = [face.load(options.source)] if "source" in options else []
+    studies = [load(options.source)] if "source" in options else []
     experiment = module.experiment(*studies, out)
     if options.plan:
         lines = plan.expected(experiment.planned, out.absolute() / "cases", options.workers)

@@ -1,11 +1,9 @@
 """Failures that a user can act on: each says what, where and what to do."""
 
-import difflib
 import errno
 import os
 import shutil
 import traceback
-from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -115,17 +113,3 @@ def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
         what = f"a fault of this program: {type(error).__name__}: {error}{at}"
         return Fault(what, where, "report it, with the study file")
     return OrchestratorError(what, where, remedy)
-
-
-def unknown_key(
-    key: str, known: Sequence[str], where: str, elsewhere: Sequence[tuple[str, str]] = ()
-) -> InputError:
-    """The message of an unknown key, with the key that was probably meant as the remedy.
-
-    `elsewhere` has keys of other places, each with the way it is written there.
-    """
-    same = [written for name, written in elsewhere if name == key]
-    names = dict(elsewhere) | {name: name for name in known}
-    close = same or [names[name] for name in difflib.get_close_matches(key, names, n=1)]
-    meant, listed = f"did you mean {' or '.join(close)}?", f"known keys: {', '.join(sorted(known))}"
-    return InputError("unknown key", where, meant if close else listed)

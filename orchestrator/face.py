@@ -1,22 +1,20 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
 import os
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from orchestrator import paper, pipeline, report, tables
+from orchestrator import pipeline, report, tables
 from orchestrator.calculator import table as calculator
 from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
-from orchestrator.study.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,19 +85,14 @@ def run(
     """Run what is missing of a study file, or of a preset by its name, draw it, and open it.
 
     `out` is its directory, by default ``results/NAME``, `workers` the number of cases at a time, by
-    default one for each processor, and `tolerance` the relative error that thresholds may have.
-
-    Raises
-    ------
-    InputError
-        If the study cannot be answered.
-    SolverError
-        If a solver is missing, or if cases failed; what is done stays, and the same call goes on.
+    default one for each processor, and `tolerance` the relative error that thresholds may have. An
+    `InputError` refuses a study that cannot be answered. A `SolverError` says that a solver is
+    missing or that cases failed; what is done stays, and the same call goes on.
     """
     workers = (os.cpu_count() or 1) if workers is None else workers
     if workers < 1:
         raise InputError(f"{workers} is below 1", where="workers")
-    asked = load(source, tolerance)
+    asked = study.load(source, tolerance)
     place = Path(out or Path("results") / asked.name)
     finished = pipeline.run(asked, place, workers=workers)
     if finished.failures:
@@ -107,15 +100,6 @@ def run(
         what = f"{len(finished.failures)} cases failed; {name}: {error}"
         raise SolverError(what, where=str(place))
     return open(place)
-
-
-def load(source: str | Path, tolerance: float | None = None, name: str = "tolerance") -> Study:
-    """Read a study file or a preset, to be answered with a tolerance that messages call `name`."""
-    asked = study.load(str(source), [paper.PRESETS])
-    if tolerance is None:
-        return asked
-    study.check_tolerance(tolerance, name)
-    return replace(asked, tolerance=tolerance)
 
 
 def open(directory: str | Path) -> "Opened":
@@ -135,12 +119,9 @@ class Opened:
     """
 
     def __init__(self, results: Results) -> None:
-        self._results = results
-        self.directory = results.cases.parent
-        self.page = self.directory / report.PAGE
-        self.title = results.study.title
-        self.tables = dict(results.tables)
-        self.plot = Plots(results)
+        self._results, self.plot = results, Plots(results)
+        self.directory, self.page = results.cases.parent, results.cases.parent / report.PAGE
+        self.title, self.tables = results.study.title, dict(results.tables)
 
     @property
     def thresholds(self) -> pd.DataFrame:
@@ -156,14 +137,13 @@ class Opened:
     def case(self, name: str) -> Path:
         """The directory of the one case whose name begins so; else an `InputError`."""
         names = [case for case in self._results.plan.cases if case.startswith(name)]
-        if len(names) != 1:
-            what = f"{len(names)} cases begin with {name!r}"
-            raise InputError(what, where=str(self.directory), remedy="see the column case")
-        return self._results.cases / names[0]
+        if len(names) == 1:
+            return self._results.cases / names[0]
+        what = f"{len(names)} cases begin with {name!r}"
+        raise InputError(what, str(self.directory), "see the column case")
 
 
-@dataclass(frozen=True)
-class Plots:
+class Plots(NamedTuple):
     """Figures of a study."""
 
     results: Results

@@ -53,10 +53,10 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         changed = _describe(space, study, planned)
         started, states = 0, planned.done(space.cases)
         failures: dict[str, OrchestratorError] = {}
-        limit_s = study.time_limit_s
         while todo := planned.missing(space.cases, {**states, **failures}):
             started += len(todo)
-            failures |= complete(todo, space, workers, limit_s, queue, planned.drawing_s)
+            rest = {"queue": queue, "after_s": planned.drawing_s}
+            failures |= complete(todo, space, workers=workers, limit_s=study.time_limit_s, **rest)
             # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
             planned = plan.settled(study, space.cases, first)
             _describe(space, study, planned)
@@ -84,27 +84,23 @@ def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     other = str(before.get("file", ""))
     if changed and other not in ("", file) and (space.root / other).is_file():
         what = f"the directory holds the study of another file, {other}"
-        raise InputError(what, where=str(space.root), remedy="choose another with --out")
+        raise InputError(what, str(space.root), "choose another with --out")
     space.describe(STUDY, study.name, list(planned.cases), **about, file=file)
     return changed
 
 
 def complete(
-    todo: dict[str, Case],
-    space: Workspace,
-    workers: int,
-    limit_s: float,
-    queue: Queue | None = None,
-    after_s: float = 0.0,
+    todo: dict[str, Case], space: Workspace, *, workers: int, limit_s: float, **settings: Any
 ) -> Failures:
     """Run cases, each for `limit_s` at most, show their progress, and give the failures.
 
-    Tables and figures after the runs are expected to take `after_s`.
+    Settings are a `queue`, and the time `after_s` that is expected after the runs, s.
     """
     if not todo:
         return {}
-    make_pool = partial(cluster.pool, queue) if queue else engine.local
-    opened = make_pool(space.cases, workers=workers, limit_s=limit_s)
+    queue, after_s = settings.get("queue"), settings.get("after_s", 0.0)
+    pools = partial(cluster.pool, queue) if queue else engine.local
+    opened = pools(space.cases, workers=workers, limit_s=limit_s)
     with opened as pool, engine.Display(todo.values(), space.cases, workers, after_s) as display:
         return engine.run(todo, pool, display, display.watch)
 
@@ -113,9 +109,8 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     """The study that a directory was made for, and its plan; an `InputError` if it holds none."""
     about = space.description()
     if "study" not in about:
-        what = f"this is no study but an experiment, {about['name']}"
-        remedy = f"`orchestrator {about['name']} --out {space.root}` draws it again"
-        raise InputError(what, where=str(space.root), remedy=remedy)
+        what, remedy = f"this is the experiment {about['name']}", "its own command draws it again"
+        raise InputError(what, str(space.root), remedy)
     study = parse(about["study"], name=about["name"], where=str(space.root))
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.settled(study, space.cases)
@@ -130,8 +125,7 @@ def redraw(out: Path) -> Finished:
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        answer = _draw(study, planned, space, states, failures)
-        return Finished(space.page, 0, failures, answer)
+        return Finished(space.page, 0, failures, _draw(study, planned, space, states, failures))
 
 
 def prune(directory: Path) -> str:
@@ -141,8 +135,8 @@ def prune(directory: Path) -> str:
     with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
-        results = Results(study, planned, made, space.cases)
-        shown = {case.name for case in report.drawn_from(results)}
+        cases = report.drawn_from(Results(study, planned, made, space.cases))
+        shown = {case.name for case in cases}
         return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
 
 

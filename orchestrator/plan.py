@@ -1,7 +1,7 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
 from collections import Counter
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +20,7 @@ from orchestrator.study.study import Study
 START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
 """Times of imports and of the first figures, of each scene, and of each grain of a bed without a
 run, s: measured on `first-look`, `dune` and `paper --tolerance 0.2`, two cores."""
-BYTES = 2.2e6
-"""Mean size of a case of the preset `paper`."""
+BYTES = 2.2e6  # mean size of a case of the preset `paper`
 
 
 @dataclass(frozen=True)
@@ -69,13 +68,8 @@ def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | N
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
     `above` has levels that turned out to be not good enough, by scene id. The grains of a poured
-    bed are read from `cases`, the directory of the runs.
-
-    Raises
-    ------
-    InputError
-        If a scene is beyond a limit of the methods, or asks for a flow that cannot be solved; with
-        the field.
+    bed are read from `cases`, the directory of the runs. A scene beyond a limit of the methods, or
+    a flow that cannot be solved, raises an `InputError` with the field.
     """
     limits.check_study(study)
     return of(decide(study.scenes, study.tolerance, above or {}), study.tolerance, cases)
@@ -85,31 +79,29 @@ def of(
     decisions: Mapping[str, Decision], tolerance: float | None = None, cases: Path | None = None
 ) -> Plan:
     """List the cases that some decisions need; with a tolerance, those of checks by DEM too."""
-    piles, checks = (
-        {
-            asked: Pile(answer.scene, cases)
-            for asked, answer in answers.items()
-            if isinstance(answer.scene.bed, PileBed)
-        }
-        for answers in (decisions, decision.checks(decisions, tolerance) if tolerance else {})
-    )
+
+    def piles_of(answers: Mapping[str, Decision]) -> dict[str, Pile]:
+        scenes = {asked: answer.scene for asked, answer in answers.items()}
+        kept = {asked: scene for asked, scene in scenes.items() if isinstance(scene.bed, PileBed)}
+        return {asked: Pile(scene, cases) for asked, scene in kept.items()}
+
+    piles = piles_of(decisions)
+    checks = piles_of(decision.checks(decisions, tolerance)) if tolerance else {}
     scenes = (answer.scene for asked, answer in decisions.items() if asked not in piles)
     grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
     cells = tuple(batches(grains.values()))
     listed: dict[str, Case] = {}
 
-    def add(case: Case) -> None:
-        """Add a case behind all whose results it needs."""
-        if case.name not in listed:
-            for need in case.needs:
-                add(need)
-            listed[case.name] = case
+    def add(cases: Iterable[Case]) -> None:
+        """Add cases, each behind all whose results it needs."""
+        for case in cases:
+            if case.name not in listed:
+                add(case.needs)
+                listed[case.name] = case
 
-    for run in (
-        *(run for pile in (*piles.values(), *checks.values()) for run in pile.runs),
-        *cells,
-    ):
-        add(run)
+    for pile in (*piles.values(), *checks.values()):
+        add(pile.runs)
+    add(cells)
     first = {name: case for name, case in listed.items() if not case.needs}
     return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
 
@@ -143,13 +135,12 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     plan = settled(study, directory)
     yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
     for group in study.groups:
-        regimes = Counter(str(regime_of(scene)) for scene in group.scenes).most_common()
-        laws = Counter(scene.forces.law for scene in group.scenes).most_common()
-        of = (", ".join(f"{name} {count}" for name, count in each) for each in (regimes, laws))
-        count = _number(len(group.scenes), "scene")
+        regimes = _counted(regime_of(scene) for scene in group.scenes)
+        laws = _counted(scene.forces.law for scene in group.scenes)
         outside = sum(not law_holds(scene) for scene in group.scenes)
         note = f"; in {outside} the law does not hold for a single grain" if outside else ""
-        yield f"  {group.name}: {count}; regimes: {'; force laws: '.join(of)}{note}"
+        count = _number(len(group.scenes), "scene")
+        yield f"  {group.name}: {count}; regimes: {regimes}; force laws: {laws}{note}"
     for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
         yield f"  {times} answered: {why}"
     yield from expected(plan, directory, workers)
@@ -158,10 +149,9 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: the cases of a plan by kind, expected time and disk."""
     missing = plan.missing(directory, plan.done(directory)).values()
-    todo = Counter(case.kind for case in missing)
-    yield f"{_number(len(plan.cases), 'case')}, {len(missing)} to run"
-    for kind, times in Counter(case.kind for case in plan.cases.values()).items():
-        yield f"  {kind}: {times}, {todo[kind]} to run"
+    kinds = _counted(case.kind for case in plan.cases.values())
+    todo = _counted(case.kind for case in missing)
+    yield f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}; to run: {todo or 'none'}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
@@ -169,6 +159,10 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     time = f"about {human(runs + plan.drawing_s)} with {_number(workers, 'worker')}"
     rest = f"{human(plan.drawing_s)} of them for tables and figures"
     yield f"expected: {time}, {rest}; {len(missing) * BYTES / 1e6:.0f} MB"
+
+
+def _counted(names: Iterable[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common())
 
 
 def _number(count: int, noun: str) -> str:

@@ -31,7 +31,7 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
-from orchestrator.tables.piles import shields
+from orchestrator.tables.rows import shields
 
 COARSE = level("flow", "coarse")  # of a solved flow; another flow model is kept
 DYNAMIC, DYNAMIC_POURED = level("grains", "1 layer, fast"), level("grains", "4 layers, fast")

@@ -37,7 +37,7 @@ from orchestrator.report.style import Figure, Look
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
-from orchestrator.tables.scenes import point
+from orchestrator.tables.rows import point
 from orchestrator.types import Row
 
 FINE, FAST = level("flow", "fine"), level("grains", "1 layer, fast")

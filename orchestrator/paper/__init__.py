@@ -1,6 +1,6 @@
 """The paper: its studies, and the report card of its claims.
 
-Only the pipeline and the Python face import it.
+Only the pipeline imports it.
 """
 
 from collections.abc import Sequence

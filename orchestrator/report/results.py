@@ -14,7 +14,7 @@ from orchestrator.runs.case import is_whole
 from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import Tables
-from orchestrator.tables.scenes import measured_hill
+from orchestrator.tables.rows import measured_hill
 
 FRACTION = 0.3
 """n/N at which one threshold stands for all of its pile."""

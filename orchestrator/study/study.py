@@ -5,11 +5,12 @@ The tables at the top hold for every scene. Each ``[[group]]`` overrides some of
 is one group.
 """
 
+import difflib
 import itertools
 import math
 import os
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +19,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from orchestrator.errors import InputError, unknown_key
+from orchestrator.errors import InputError
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
 from orchestrator.study.part import List, Part, UnfitError
@@ -27,7 +28,6 @@ from orchestrator.study.profile import Files, read_text
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.sizes import Sizes, percentile
 
-PRESETS = Path(__file__).parent / "presets"
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
 MOST_SCENES = 100_000
@@ -92,26 +92,30 @@ class Study:
         return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
 
 
-def presets(folders: Iterable[Path] = ()) -> dict[str, Path]:
-    """The study files that the package brings by name, with those in some other folders."""
-    listed = (path for folder in (PRESETS, *folders) for path in folder.glob("*.toml"))
-    return {path.stem: path for path in sorted(listed)}
+def presets() -> dict[str, Path]:
+    """The study files that the package brings, by name."""
+    files = Path(__file__).parents[1].glob("*/presets/*.toml")
+    return {path.stem: path for path in sorted(files)}
 
 
-def load(source: str, folders: Iterable[Path] = ()) -> Study:
-    """Read a study file by its path, or a preset, also of other folders, by its name.
+def load(source: str | Path, tolerance: float | None = None) -> Study:
+    """Read a study file by its path, or a preset by its name; a tolerance replaces the file's.
 
     What is wrong raises an `InputError` with the file, the field and the remedy.
     """
-    brought = presets(folders)
+    source, brought = str(source), presets()
     path = brought.get(source, Path(source))
     if not os.path.isfile(path):
         remedy = f"presets: {', '.join(sorted(brought))}; or give the path of a TOML file"
         raise InputError("there is no such study file, nor a preset of this name", source, remedy)
+    if tolerance is not None and not 0 <= tolerance < 1:
+        what = f"{tolerance!r} is not a relative error from 0 to below 1"
+        raise InputError(what, "tolerance", "0.05 allows tau_c to be 5 % off")
     text = read_text(path, MOST_BYTES, source)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
-    return replace(parse(text, name=name, where=source), file=str(path.absolute()))
+    study = replace(parse(text, name=name, where=source), file=str(path.absolute()))
+    return study if tolerance is None else replace(study, tolerance=tolerance)
 
 
 def parse(text: str, *, name: str, where: str) -> Study:
@@ -150,13 +154,6 @@ def parse(text: str, *, name: str, where: str) -> Study:
     )
     settings = (file.time_limit, file.tolerance, file.cluster, text + files.added)
     return Study(name, file.title or name, groups, *settings)
-
-
-def check_tolerance(value: Any, where: str) -> None:
-    """See that a tolerance is a relative error below 1; else an `InputError`."""
-    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value < 1:
-        what = f"{value!r} is not a relative error from 0 to below 1"
-        raise InputError(what, where, "0.05 allows tau_c to be 5 % off")
 
 
 def _scenes(
@@ -231,8 +228,11 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if branch == "grain" and key in PileBed.model_fields:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
     here = str(path[0]) if path[1:] else ""
-    elsewhere = [
-        (n, f"{part}.{n}") for part in PARTS if part != here for n in PARTS[part].model_fields
-    ]
-    elsewhere += [(name, f"{name}, above the first table") for name in keys if name not in PARTS]
-    return unknown_key(key, [*PARTS[here].model_fields] if here else keys, place, elsewhere)
+    written = {name: f"{name}, above the first table" for name in keys if name not in PARTS}
+    written |= {n: f"{part}.{n}" for part in reversed([*PARTS]) for n in PARTS[part].model_fields}
+    written |= {name: name for name in (PARTS[here].model_fields if here else keys)}
+    close = difflib.get_close_matches(key, written, n=1)
+    listed = "known keys: docs/study-file.md"
+    return InputError(
+        "unknown key", place, f"did you mean {written[close[0]]}?" if close else listed
+    )

@@ -18,7 +18,7 @@ from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
 from orchestrator.study import fields
 from orchestrator.study.study import Study
-from orchestrator.tables import piles, scenes
+from orchestrator.tables import rows
 from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
 
@@ -30,8 +30,8 @@ COLUMNS: dict[str, str] = {
     **{column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()},
 }
 """Every column of every table, with its meaning; units are in the names."""
-BEGINS = ("=", "+", "-", "@", "\t", "\n")
-"""Spreadsheets run a cell that begins with one of these as a formula."""
+FORMULA = r"^(?=[=@\t\n]|[+-](?![\d.]+(e[+-]?\d+)?$|inf$))"
+"""Beginning of a text that spreadsheets run as a formula; no number is one."""
 NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 """Columns of texts that may look like numbers, or be empty."""
 
@@ -41,27 +41,27 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     flows = {name: solve for pile in plan.piles.values() for name, solve in pile.solves.items()}
     flows = {name: solve for name, solve in flows.items() if name in done}
     answers = [
-        piles.Answer.read(plan.decisions[scene_id], pile, cases)
+        rows.Answer(plan.decisions[scene_id], pile, cases)
         for scene_id, pile in plan.piles.items()
         if pile.is_run(done)
     ]
-    asked = pd.DataFrame(scenes.rows(study, plan))
+    asked = pd.DataFrame(rows.scenes(study, plan))
     cells = [cell for cell in plan.cells if cell.name in done]
-    grains = pd.DataFrame(scenes.single_grains(plan, cells, cases))
-    thresholds = pd.DataFrame(row for answer in answers for row in piles.threshold_rows(answer))
+    grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
+    thresholds = pd.DataFrame(row for answer in answers for row in rows.pile_threshold(answer))
     thresholds = with_scatter(thresholds, asked)
-    checks = piles.check_rows(plan, study.tolerance, cases, done) if study.tolerance else ()
+    checks = rows.check(plan, study.tolerance, cases, done) if study.tolerance else ()
     made = {
         "scenes": asked,
         "single_grain": with_usable(grains, asked, study.tolerance),
-        "wall_stress": _stacked(scenes.wall_stress(pile, cases) for pile in flows.values()),
-        "flow": pd.DataFrame(scenes.flow(pile, cases) for pile in flows.values()),
-        "pile_grain": _stacked(map(piles.grains, answers)),
-        "pile_curve": _stacked(map(piles.curve, answers)),
+        "wall_stress": _stacked(rows.wall_stress(pile, cases) for pile in flows.values()),
+        "flow": pd.DataFrame(rows.flow(pile, cases) for pile in flows.values()),
+        "pile_grain": _stacked(map(rows.pile_grain, answers)),
+        "pile_curve": _stacked(map(rows.pile_curve, answers)),
         "pile_threshold": with_usable(thresholds, asked, study.tolerance),
-        "size_class": pd.DataFrame(row for one in answers for row in piles.size_class_rows(one)),
-        "bed_change": _stacked(piles.bed_changes(answers)),
-        "form": pd.DataFrame(row for one in answers for row in piles.forms(one)),
+        "size_class": pd.DataFrame(row for one in answers for row in rows.size_class(one)),
+        "bed_change": _stacked(rows.bed_changes(answers)),
+        "form": pd.DataFrame(row for one in answers for row in rows.forms(one)),
         "check": pd.DataFrame(checks),
     }
     return {name: table for name, table in made.items() if not table.empty}
@@ -92,25 +92,12 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
 
 
 def csv(table: pd.DataFrame, digits: str | None = None) -> str:
-    """A table as CSV, its numbers in a format such as ``%.9g``.
-
-    A text that would begin a formula gets an apostrophe before it.
-    """
+    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe."""
     texts = table.select_dtypes(exclude=["number", "bool"])
-    harmless = {str(name): texts[name].map(_harmless) for name in texts}
-    return table.assign(**harmless).to_csv(index=False, float_format=digits)
-
-
-def _harmless(value: object) -> object:
-    if not isinstance(value, str):
-        return value
     # pandas writes \r without quotes, and a reader takes it for the end of the row
-    text = value.replace("\r\n", "\n").replace("\r", "\n")
-    try:
-        float(text)
-    except ValueError:
-        return f"'{text}" if text.startswith(BEGINS) else text
-    return text
+    harmless = texts.replace({r"\r\n?": "\n"}, regex=True).replace({FORMULA: "'"}, regex=True)
+    columns = {str(name): harmless[name] for name in harmless}
+    return table.assign(**columns).to_csv(index=False, float_format=digits)
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
@@ -134,12 +121,16 @@ def read(folder: Folder, place: str) -> Tables:
     names = {PurePath(file).stem: file for file in files}
     names.pop("columns", None)
     if not names:
-        where, remedy = str(folder.root / place), "run the study first"
-        raise OrchestratorError("there are no tables", where=where, remedy=remedy)
-    texts, tables = dict.fromkeys(NAMES, "str"), {}
-    for name, file in names.items():
-        data = BytesIO(folder.read(file))
-        table = pd.read_csv(data, dtype=texts, keep_default_na=False, na_values=[""])
-        has_reasons = "why_not" in table
-        tables[name] = table.assign(why_not=table["why_not"].fillna("")) if has_reasons else table
+        where = str(folder.root / place)
+        raise OrchestratorError("there are no tables", where, "run the study first")
+    texts: dict[Any, Any] = dict.fromkeys(NAMES, "str")
+    tables = {
+        name: pd.read_csv(
+            BytesIO(folder.read(file)), dtype=texts, keep_default_na=False, na_values=[""]
+        )
+        for name, file in names.items()
+    }
+    for table in tables.values():
+        if "why_not" in table:
+            table["why_not"] = table["why_not"].fillna("")
     return tables

@@ -42,21 +42,20 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
     replicas = of_scene.groupby(fields.others(of_scene, "seed"), dropna=False).ngroup()
     ids = thresholds["scene_id"]
-    table = thresholds.assign(
-        level=ids.map(of_scene["packing"]) == "horizontal",
-        lifted=thresholds["share_carried_off"] > 0,
-        replicas=ids.map(replicas),
+    level, lifted = (
+        ids.map(of_scene["packing"]) == "horizontal",
+        thresholds["share_carried_off"] > 0,
     )
+    table = thresholds.assign(level=level, lifted=lifted, replicas=ids.map(replicas))
     groups = table.dropna(subset=["shields"]).groupby([*SIMILAR, "replicas"])["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
     largest = spread[groups.count() > 1].rename("scatter").groupby(level=SIMILAR).max()
     table = table.merge(largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one")
     wider = table["scatter"].fillna(0.0)
-    return table.drop(columns=["level", "lifted", "replicas"]).assign(
-        shields_low=table["shields_low"] * (1 - wider).clip(lower=0.0),
-        shields_high=table["shields_high"] * (1 + wider),
-    )
+    low, high = table["shields_low"] * (1 - wider).clip(lower=0.0), table["shields_high"]
+    table = table.assign(shields_low=low, shields_high=high * (1 + wider))
+    return table.drop(columns=["level", "lifted", "replicas"])
 
 
 def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | None) -> pd.DataFrame:
@@ -89,13 +88,12 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
     """Reasons against a force law in some rows at their u*, m/s; empty if none."""
-    law, d = LAWS[name], rows["d_m"].to_numpy(float)
-    fluid = (rows[column].to_numpy(float) for column in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
-    exposure = Exposure(d, rows["z0_over_d"].to_numpy(float) * d, *fluid)
+    law, number = LAWS[name], {str(c): rows[c].to_numpy() for c in rows.select_dtypes("number")}
+    d, fluid = number["d_m"], (number[c] for c in ("rho_f_kg_m3", "nu_m2_s", "alpha_s"))
+    exposure = Exposure(d, number["z0_over_d"] * d, *fluid)
     grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
-    if "share_carried_off" in rows:  # a pile has the share of grains that lift carried off
-        grain = {}
-    weights = {key: rows[column].to_numpy(float) for key, column in grain.items()}
+    # a pile has the share of grains that lift carried off
+    weights = {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
     texts = why_not(law, np.asarray(ustar, float), exposure, **weights)
     if law.unverified:
         texts = [f"unverified force law: {law.unverified}; {text}" for text in texts]
@@ -104,11 +102,8 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if np.isnan(row["reynolds"]):
-        if "highest_fraction" in row:
-            highest = f"at most {row['highest_fraction']:.0%} of {row['count']} grains moved"
-            yield f"not reached: {highest}"
-        else:
-            yield "the grain did not move in any load step"
+        highest = f"at most {row.get('highest_fraction', 0):.0%} of {row.get('count', 1)} grains"
+        yield f"not reached: {highest} moved"
     elif row["law"]:
         yield row["law"]
     if row["standing_out"] < EXPOSED_FROM:
@@ -119,8 +114,7 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if number < SMOOTH_BELOW:
         yield f"hydraulically smooth bed: u* z0/nu {number:.2g} is below {SMOOTH_BELOW:.2g}"
     if flow < TURBULENT_FROM:
-        below = f"is below {TURBULENT_FROM:g}"
-        yield f"laminar flow: speed times depth over nu, {flow:.0f}, {below}"
+        yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {TURBULENT_FROM:g}"
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
     if pd.isna(error):

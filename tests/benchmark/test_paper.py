@@ -10,7 +10,6 @@ import pytest
 from orchestrator import plan, tables
 from orchestrator.benchmark import scenes
 from orchestrator.benchmark.export import scene_names
-from orchestrator.paper import PRESETS
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
@@ -27,7 +26,7 @@ def expected() -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def paper() -> Study:
-    return study.load("paper", [PRESETS])
+    return study.load("paper")
 
 
 def test_it_is_of_the_preset_paper(expected: pd.DataFrame, paper: Study) -> None:

@@ -6,10 +6,12 @@ import pytest
 
 from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.table import thresholds
+from orchestrator.fidelity import limits
 from orchestrator.physics.force_law import Exposure
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import threshold, why_not
 from orchestrator.study.fields import FIELDS, PARTS
+from orchestrator.study.study import parse
 
 
 def test_every_point_and_law_is_the_closed_form_of_it() -> None:
@@ -37,6 +39,12 @@ def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> N
         declared = PARTS[part].model_fields[field]
         if name != "roughness":  # its default is a part of the diameter
             assert parameter.default == (None if declared.is_required() else declared.default)
+        for value in map(float, parameter.ordinary):  # no scene of an ordinary value is refused
+            given = {"bed.slope_deg": 30.0, "grain.diameter": 10.0, "grain.density": 2.5e4}
+            given["fluid.density"] = 1e-6
+            text = "\n".join(f"{k} = {v}" for k, v in {**given, parameter.field: value}.items())
+            (scene,) = parse(text, name="t", where="t").scenes
+            limits.check(scene, "t")
 
 
 def test_a_smooth_bed_has_the_wind_of_a_smooth_wall() -> None:

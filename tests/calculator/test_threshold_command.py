@@ -86,32 +86,25 @@ def test_the_answer_comes_first_and_the_other_laws_beside_it(run: Run, law: str)
     code, out, err = run(*SAND_IN_AIR, "--law", law)
     assert (code, err) == (0, "")
     record = _json(run(*SAND_IN_AIR, "--law", law, "--json"))
-    assert record["answer"] == [law]
-    lines = out.splitlines()
-    assert lines[1].split() == ["u*,", "m/s", f"{record[law]['friction_velocity']:.4g}"]
-    for name in LAWS:
-        row = next(line.split() for line in lines[4:] if line.split()[:1] == [name])
-        assert row[1] == f"{record[name]['friction_velocity']:.4g}"
-        assert row[6] == ("yes" if record[name]["valid"] else "no:")
+    answer, *_, table = out.split("\n\n")[0].splitlines()[1:], out.split("\n\n")[1]
+    assert answer[0].split() == ["u*,", "m/s", f"{record[law]['friction_velocity']:.4g}"]
+    rows = [line.split() for line in table.splitlines()[1:]]
+    assert rows[0][0] == law
+    for name, ustar, *_, shields, _, holds in (row[:7] for row in rows):
+        assert (ustar, shields) == tuple(
+            f"{record[name][key]:.4g}" for key in ("friction_velocity", "shields")
+        )
+        assert holds == ("yes" if record[name]["valid"] else "no:")
 
 
 def test_the_papers_rule_gives_both_equations_in_the_transition(run: Run) -> None:
     lines = run(*SAND_IN_AIR, "--law", "paper")[1].splitlines()
-    assert lines[1].split()[-2:] == ["low", "high"]
+    assert lines[1].split() == ["low", "high"]
     assert lines[2].split() == ["u*,", "m/s", "0.4658", "0.2242"]
     rows = csv.DictReader(io.StringIO(run("--diameter", RANGE, "--law", "paper", "--csv")[1]))
     for row in rows:
         laws = {"low": ["low"], "high": ["high"], "transition": ["low", "high"]}[row["regime"]]
         assert (row["answer"] == "True") == (row["law"] in laws)
-
-
-def test_an_answer_outside_its_range_is_marked_and_laws_that_hold_are_named(run: Run) -> None:
-    gravel = ["--diameter", "1e-2", *QUARTZ_IN_WATER[2:]]
-    code, out, _ = run(*gravel)
-    assert code == 0
-    rows = {line.split()[0]: line for line in out.splitlines()[8:] if line}
-    assert "no: particle Reynolds number (Schiller and Naumann)" in rows["bridged"]
-    assert "yes" in rows["bridged-gravel"]
 
 
 def test_ranges_give_the_same_numbers_as_points(run: Run) -> None:
@@ -164,24 +157,7 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
     assert code == 0
     assert question in err
     assert err.count("\n") == 1
-    assert "starts to move at" in out or "\n0." in out or "\n3e-05" in out
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        SAND_IN_AIR,
-        QUARTZ_IN_WATER,
-        ["--diameter", "1e-4", "--slope", "0:30:61"],
-        ["--diameter", "1e-4", "--fluid-density", "1.2", "--viscosity", "1.5e-5"],
-        # Mars, Venus
-        ["--diameter", "1e-4", "--fluid-density", "0.02", "--viscosity", "6e-4"],
-        ["--diameter", "1e-4", "--fluid-density", "65", "--viscosity", "5e-7", "--gravity", "8.87"],
-    ],
-)
-def test_usual_numbers_raise_no_question(run: Run, arguments: list[str]) -> None:
-    code, _, err = run(*arguments)
-    assert (code, err) == (0, "")
+    assert out.startswith("Force law bridged")
 
 
 @pytest.mark.parametrize(

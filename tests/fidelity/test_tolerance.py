@@ -110,4 +110,4 @@ def test_a_tolerance_out_of_range_is_refused(
     value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["study", "first-look", "--tolerance", value]) == 2
-    assert "--tolerance" in capsys.readouterr().err
+    assert "tolerance: " in capsys.readouterr().err

@@ -1,6 +1,5 @@
 """Piles of both solvers, through the whole line: stress, motion, thresholds, poured beds."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from orchestrator.grains.pile import Pile
 from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
-from orchestrator.tables.piles import Answer, size_class_rows
+from orchestrator.tables.rows import Answer, size_class
 from tests import small_study
 
 SMALL = """
@@ -153,10 +152,11 @@ def test_each_size_class_has_its_threshold(mixed: Results) -> None:
     assert (middle["hiding"].dropna() == 1).all()
     # where the first grains of the class around d lie loose, nothing is hidden
     name, pile = next(iter(mixed.plan.piles.items()))
-    answer = Answer.read(mixed.plan.decisions[name], pile, mixed.cases)
+    answer = Answer(mixed.plan.decisions[name], pile, mixed.cases)
     near = np.abs(np.log(pile.packing.sizes[pile.packing.windward])) < np.log(2) / 4
     motion = Motion.of_flows(np.where(near, 0.0, 0.1))
-    loose = pd.DataFrame(size_class_rows(replace(answer, motion=motion)))
+    answer.motion = motion
+    loose = pd.DataFrame(size_class(answer))
     assert set(loose["shields_own"] > 0) == {False, True}
     assert loose["hiding"].isna().all()
 

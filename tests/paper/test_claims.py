@@ -1,6 +1,5 @@
 """The report card: verdicts follow from the numbers, by the rule that it states."""
 
-import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import paper, report
-from orchestrator.paper import PRESETS, claims, measures
+from orchestrator.paper import PRESETS, claims
 from orchestrator.paper.claims import CLAIMS, Judged
 from orchestrator.paper.evidence import BRIDGED, Comparison, Verdict, combined, pairs
 from orchestrator.physics import curves
@@ -20,7 +19,6 @@ from orchestrator.study import fields, study
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.parts import PileBed
 from orchestrator.tables import Tables
-from orchestrator.types import FloatArray
 
 NAMES = [
     " ".join((claim.measure.keywords["table"], claim.measure.keywords["along"]))
@@ -39,7 +37,7 @@ def judge(tables: Tables, **changed: pd.DataFrame) -> dict[str, Judged]:
 def exact() -> Tables:
     """Single grains of the preset of the paper, as if DEM gave the closed form."""
     asked, grains = [], []
-    for scene in study.load("paper", [PRESETS]).scenes:
+    for scene in study.load("paper").scenes:
         if scene.bed.kind == "grain":
             own = {"scene_id": scene.id, **fields.asked(scene), **fields.answered(scene)}
             asked.append({**own, "law_holds": law_holds(scene)})
@@ -158,7 +156,7 @@ def test_grains_on_the_curves_fit_them(exact: Tables) -> None:
 
 def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
     answers: dict[tuple[float, ...], set[str]] = {}
-    for scene in study.load("paper", [PRESETS]).scenes:
+    for scene in study.load("paper").scenes:
         if isinstance(scene.bed, PileBed) and scene.fluid.viscosity == 1e-5:
             key = (scene.bed.slope_deg, scene.grain.diameter, scene.bed.roughness)
             laws = {scene.forces.law} if law_holds(scene) else set()
@@ -166,15 +164,6 @@ def test_every_pile_in_air_has_an_answer_of_a_law_that_holds() -> None:
     assert len(answers) == 56
     assert all(BRIDGED in laws for laws in answers.values())
     assert sum(laws == {BRIDGED} for laws in answers.values()) == 34
-
-
-def test_a_wiggle_is_the_distance_from_a_smooth_curve() -> None:
-    smooth: FloatArray = np.linspace(0.2, 1.0, 40) ** 2
-    assert measures.wiggle(smooth) < 1e-3
-    jumps = np.tile([0.01, -0.01], 20)
-    # the parabola through five values of a zigzag is -13/35 of its middle
-    middle = 1 - (-3 - 12 + 17 - 12 - 3) / 35
-    assert measures.wiggle(0.5 + jumps) == pytest.approx(0.01 * middle)
 
 
 def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> None:
@@ -189,29 +178,12 @@ def test_the_transition_and_other_fluids_are_not_judged(results: Results) -> Non
     assert {one.verdict for one in water.values()} == {"no data"}
 
 
-def test_the_section_counts_and_escapes(results: Results) -> None:
-    judged = claims.judge(results.tables)
-    section = claims.section(judged, ["flow", "dem-horizontal"], has_tolerance=True)
-    assert section.count('<tr><th scope="row">') == sum(one.verdict != "no data" for one in judged)
+def test_the_section_escapes(results: Results) -> None:
+    one = claims.judge(results.tables)[1]
+    bad = replace(one, comparisons=(Comparison("<b>&", [1.0], 0.5),))
+    section = claims.section([bad], [], has_tolerance=True)
+    assert "&lt;b&gt;&amp;" in section
     assert "--tolerance 0" in section
-    assert "Figure 2" in section
-    bad = replace(judged[1], comparisons=(Comparison("<b>&", [1.0], 0.5),))
-    plain = claims.section([bad], [], has_tolerance=False)
-    assert "--tolerance" not in plain
-    assert "&lt;b&gt;&amp;" in plain
-    assert claims.section([], [], has_tolerance=False).strip() == ""
-
-
-def test_only_the_pipeline_and_the_python_face_import_it() -> None:
-    package = Path(paper.__file__).parents[1]
-    users = {
-        path.relative_to(package).as_posix()
-        for path in package.rglob("*.py")
-        if "paper" not in path.relative_to(package).parts
-        and re.search(r"import paper|orchestrator\.paper|import .*\bpaper\b", path.read_text())
-    }
-    assert users <= {"pipeline.py", "face.py"}
-    assert {"paper", "reference"} & set(study.presets()) == set()
 
 
 @pytest.mark.parametrize("is_paper", [True, False])

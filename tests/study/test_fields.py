@@ -14,7 +14,7 @@ from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
 from orchestrator.study.scene import Scene
 from orchestrator.study.sizes import LogNormal
-from orchestrator.tables import COLUMNS, scenes
+from orchestrator.tables import COLUMNS, rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"
 REFERENCE = runpy.run_path(str(PAGE.with_name("study_file.py")))
@@ -140,7 +140,7 @@ def test_a_field_without_effect_is_empty_and_one_left_open_is_worked_out(scene: 
 def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> None:
     asked = study.parse("tolerance = 0.2\n" + PILE, name="test", where="test")
     planned = plan.make(asked)
-    (row,), (scene,) = scenes.rows(asked, planned), asked.scenes
+    (row,), (scene,) = rows.scenes(asked, planned), asked.scenes
     answer = fields.answered(planned.decisions[scene.id].scene)
     assert {"scene_id": scene.id, **fields.asked(scene), **answer}.items() <= row.items()
     assert (row["method"], row["answered_method"] == "dem") == ("dem", False)

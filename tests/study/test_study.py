@@ -114,7 +114,7 @@ BAD = [
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
     ("[fluid]\nslope = 3.7\n", "fluid.slope", "did you mean bed.slope_deg?"),
     ("[fluid]\ntolerance = 0.1\n", "fluid.tolerance", "tolerance, above the first table"),
-    ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "fluid.viscosity or flow.viscosity?"),
+    ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "did you mean fluid.viscosity?"),
     (PILE + "height = 2e-3\n", "bed.height", "raise"),
     (PILE + FENCE % 0.1 + "[flow]\ntop = 'open water'\ndepth = 0.2\n", "flow.depth", "obstacles"),
     (PILE + FENCE % 1.0, "flow.lid", "2 m is less than 3 heights of the forms or obstacles"),

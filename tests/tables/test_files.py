@@ -1,6 +1,5 @@
 """Tables as files: they come back as they were, and hold no formula for a spreadsheet."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +18,9 @@ def test_no_name_is_a_formula_and_all_else_is_as_it_is() -> None:
     written = tables.csv(pd.DataFrame({"group": FORMULAS, "d_m": -1.5}))
     escaped = [f"'{name}".replace("\r", "\n") for name in FORMULAS]
     assert written == pd.DataFrame({"group": escaped, "d_m": -1.5}).to_csv(index=False)
-    table = pd.DataFrame(
-        {
-            "name": ["sand", "", None, "1-A", "'x"],
-            "at": ["-3.5", "+1e-3", "-inf", "", "7"],
-            "number": [-1.0, math.nan, -math.inf, 0.0, 1e-300],
-            "truth": [True, False, True, False, True],
-        }
-    )
+    table = pd.DataFrame({"name": ["sand", "", None, "1-A", "'x", "-3.5", "+1e-3", "-inf"]})
     assert tables.csv(table) == table.to_csv(index=False)
-    assert "-1.0000," in tables.csv(table, "%.4f")
+    assert "-1.0000," in tables.csv(pd.DataFrame({"number": [-1.0], "truth": True}), "%.4f")
 
 
 def test_tables_come_back(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
-"""The tables of piles: the stress on them, their grains, their answer to the flow."""
+"""The rows of the tables: scenes, single grains, flows, and piles with their grains."""
 
-from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Iterator, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -11,38 +10,155 @@ import numpy as np
 from orchestrator.fidelity import decision, levels, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
+from orchestrator.flow.stress import bubble
 from orchestrator.grains import threshold
+from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.physics.measured import egiazaroff_hiding, wilcock_crowe_hiding
+from orchestrator.physics.measured import (
+    MeasuredHill,
+    egiazaroff_hiding,
+    rushil_hill,
+    wilcock_crowe_hiding,
+)
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
+from orchestrator.study import fields
+from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.scene import Scene
-from orchestrator.tables.scenes import point
-from orchestrator.types import BoolArray, FloatArray, Row
+from orchestrator.study.shapes import rushil_aspect
+from orchestrator.study.study import Study
+from orchestrator.types import BoolArray, Row
+
+POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
+"""Columns by which a scene is found in a figure; tables of results have them too."""
+WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
+"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the top."""
 
 
-@dataclass(frozen=True)
+def point(scene: Scene) -> Row:
+    """The columns by which a scene is found in a figure."""
+    return {column: fields.COLUMNS[column].asked(scene) for column in POINT}
+
+
+def scenes(study: Study, plan: Plan) -> Iterator[Row]:
+    """A row for each scene of each group, in the study's order: as asked, and as answered."""
+    cell_of = {scene.id: cell.name for cell in plan.cells for scene in cell.scenes}
+    for group in study.groups:
+        for asked in group.scenes:
+            decision, pile = plan.decisions[asked.id], plan.piles.get(asked.id)
+            scene = decision.scene
+            runs = [case.name for case in pile.runs] if pile else [cell_of.get(scene.id)]
+            yield {
+                "scene_id": asked.id,
+                "group": group.name,
+                **fields.asked(asked),
+                **fields.answered(scene),
+                "law_holds": law_holds(asked),
+                "why": decision.why,
+                "case": runs[-1] if scene.protocol.method == "dem" else None,
+                "flow_case": pile.flow.name if pile and pile.model.cases else None,
+            }
+
+
+def single_grain(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> Iterator[Row]:
+    """A row for each single grain that a finished case or the closed form answers."""
+    # by DEM: u* over that of the closed form, with its interval; a fall upstream; the case
+    by_dem: dict[str, tuple[Any, ...]] = {}
+    for cell in cells:
+        motion = Motion.from_csv(cases / cell.name)
+        steps = threshold.of_grains(motion)
+        ratios = zip(steps.value, steps.low, steps.high, (motion.fallen > 0).tolist(), strict=True)
+        for scene, numbers in zip(cell.scenes, ratios, strict=True):
+            by_dem[scene.id] = (*numbers, {"case": cell.name})
+    for asked, answer in plan.decisions.items():
+        scene = answer.scene
+        if asked in plan.piles or (scene.id not in by_dem and scene.protocol.method == "dem"):
+            continue
+        value, low, high, fell, case = by_dem.get(scene.id, (*[np.nan] * 3, False, {}))
+        exact = closed_form(scene)
+        ustar, shields = float(exact.friction_velocity), float(exact.shields)
+        yield {
+            "scene_id": asked,
+            **point(scene),
+            "answered_method": scene.protocol.method,
+            "reynolds": float(exact.reynolds) * value,
+            "reynolds_closed_form": float(exact.reynolds),
+            "shields_closed_form": shields,
+            "shields_dem": shields * value**2,
+            "shields_dem_low": shields * low**2,
+            "shields_dem_high": shields * high**2,
+            "ustar_closed_form_m_s": ustar,
+            "ustar_m_s": ustar * value,
+            "ustar_low_m_s": ustar * low,
+            "ustar_high_m_s": ustar * high,
+            "drag_over_weight": float(exact.drag) / scene.weight,
+            "fell_upstream": fell,
+            **case,
+        }
+
+
+def wall_stress(pile: Pile, cases: Path) -> Row:
+    """Columns of the friction velocity along the bed, for the solved flow of a pile."""
+    stress = pile.stress(cases)
+    names = ("x_m", "z_m", *(f"ustar_over_ustar0_{kind}" for kind in ("wall", "eq10")))
+    return {
+        "flow_case": pile.flow.name,
+        "alpha_deg": pile.bed.slope_deg,
+        "h_m": pile.bed.height,
+        "z0_m": pile.flow.roughness_m,
+        "s_m": stress.s_m,
+        "s_over_h": stress.s_m / pile.bed.height,
+        **{name: getattr(stress, name) for name in (*names, "ustar_over_ustar0_eq10_printed")},
+    }
+
+
+def flow(pile: Pile, cases: Path) -> Row:
+    """The solved flow of a pile: its settings, its separation and its speed-up."""
+    case, stress, line = pile.flow, pile.stress(cases), pile.model.line
+    separation, reattachment = bubble(stress, line.h) or (np.nan, np.nan)
+    ustar, way = stress.ustar_over_ustar0_wall, np.linspace(0, line.crest_s, len(WAY_UP))
+    windward = (stress.s_m > 0) & (stress.s_m < line.crest_s)
+    length, hill = stress.length_m[windward], measured_hill(pile)
+    row = {
+        "flow_case": case.name,
+        "bed_shape": pile.bed.shape if not pile.bed.profile else "profile",
+        "alpha_deg": pile.bed.slope_deg,
+        "h_m": case.height_m,
+        "z0_m": case.roughness_m,
+        "turbulence_model": case.settings.turbulence_model,
+        "first_cell_m": case.first_cell_m,
+        "lid_over_h": case.lid,
+        "upstream_over_h": case.settings.upstream,
+        "downstream_over_h": case.settings.downstream,
+        "separation_over_h": separation,
+        "reattachment_over_h": reattachment,
+        **dict(zip(WAY_UP, np.interp(way, stress.s_m, ustar).tolist(), strict=True)),
+        "ustar_mean": float(np.average(ustar[windward], weights=length)) if length.size else np.nan,
+        "ustar_largest": float(ustar.max()),
+    }
+    if hill is not None:
+        row["measured_reattachment_over_h"] = hill.reattachment or np.nan
+        row |= {"measured_verified": hill.verified, "measured_source": hill.source}
+    return row
+
+
+def measured_hill(pile: Pile) -> MeasuredHill | None:
+    """The hill of a wind tunnel that a pile is, if any."""
+    bed, case = pile.bed, pile.flow
+    if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
+        return None
+    return rushil_hill(rushil_aspect(bed.slope_deg), case.height_m / case.roughness_m)
+
+
 class Answer:
     """The answer to a scene: a pile with what its finished cases say, read once for all tables."""
 
-    decision: Decision
-    pile: Pile
-    motion: Motion
-    speed: FloatArray
-    row_hold: float
-
-    @classmethod
-    def read(cls, decision: Decision, pile: Pile, cases: Path) -> "Answer":
-        """Read the motion of a pile and the stress on it."""
-        hold = pile.loads(cases).row_hold()
-        return cls(decision, pile, pile.motion(cases), pile.speed(cases), hold)
-
-    @property
-    def scene_id(self) -> str:
-        """Id of the scene that was asked for."""
-        return self.decision.asked.id
+    def __init__(self, decision: Decision, pile: Pile, cases: Path) -> None:
+        self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
+        self.motion, self.speed = pile.motion(cases), pile.speed(cases)
+        self.row_hold = pile.loads(cases).row_hold()
 
     def at(self, fraction: float, chosen: BoolArray | slice = slice(None)) -> PileThreshold:
         """The threshold of the pile, or of some of its counted grains, at a fraction."""
@@ -60,7 +176,7 @@ def _reynolds(scene: Scene, tau: Any) -> Any:
     return np.sqrt(tau / scene.fluid.density) * scene.grain.diameter / scene.fluid.viscosity
 
 
-def grains(answer: Answer) -> Row:
+def pile_grain(answer: Answer) -> Row:
     """Columns of the counted grains of a pile: the stress on each, when and how it moved."""
     motion, pile, packing = answer.motion, answer.pile, answer.pile.packing
     counted, d = packing.windward, pile.scene.grain.diameter
@@ -84,7 +200,7 @@ def grains(answer: Answer) -> Row:
     return columns
 
 
-def curve(answer: Answer) -> Row:
+def pile_curve(answer: Answer) -> Row:
     """Columns of the fraction of a pile that had moved, and the stress, at each load step."""
     scene, motion = answer.pile.scene, answer.motion
     tau = threshold.mean_tau(motion, answer.speed, scene.fluid.density)
@@ -105,7 +221,7 @@ def curve(answer: Answer) -> Row:
     }
 
 
-def threshold_rows(answer: Answer) -> Iterator[Row]:
+def pile_threshold(answer: Answer) -> Iterator[Row]:
     """The threshold of a pile at each fraction that its scene asks for.
 
     The interval holds load steps and count, and at least the known error as a factor both ways; it
@@ -160,37 +276,35 @@ def _levels(answer: Decision) -> Row:
     return {"flow_level": answer.levels.flow.name, "grain_level": answer.levels.grains.name}
 
 
-def size_class_rows(answer: Answer) -> Iterator[Row]:
+def size_class(answer: Answer) -> Iterator[Row]:
     """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
     pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
     if not pile.pouring:
         return
     classes = list(threshold.classes(pile.packing.sizes[pile.packing.windward]))
     for fraction in scene.protocol.fractions:
-        rows = {}
+        level = threshold.first_level(motion, fraction)
+        each = {number: answer.at(fraction, chosen) for number, _, chosen in classes}
+        sizes = {number: size for number, size, _ in classes}
+        # the grains of the middle class may lie loose: no ratio to a threshold of zero
+        middle = shields(scene, each[0].tau) / sizes[0] if 0 in each else np.nan
         for number, size, chosen in classes:
-            found = answer.at(fraction, chosen)
-            level = threshold.first_level(motion, fraction)
-            taus = np.array([found.tau, found.tau_low, found.tau_high])
-            value, low, high = shields(scene, taus) / size
-            rows[number] = {
+            at = each[number]
+            value, low, high = shields(scene, np.array([at.tau, at.tau_low, at.tau_high])) / size
+            yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
                 "size_over_d": size,
                 "count": int(chosen.sum()),
                 "class_moved": motion.moved_by(level)[chosen].mean() if level else np.nan,
-                "ustar0_m_s": found.ustar0,
+                "ustar0_m_s": at.ustar0,
                 "shields_own": value,
                 "shields_own_low": low,
                 "shields_own_high": high,
-                "hiding": np.nan,
+                "hiding": value / middle if middle > 0 else np.nan,
                 "hiding_wilcock_crowe": float(wilcock_crowe_hiding(size) / size),
                 "hiding_egiazaroff": float(egiazaroff_hiding(size)),
             }
-        middle = rows[0]["shields_own"] if 0 in rows else np.nan
-        for row in rows.values():
-            # the grains of the middle class may lie loose: no ratio to a threshold of zero
-            yield row | {"hiding": row["shields_own"] / middle if middle > 0 else np.nan}
 
 
 def forms(answer: Answer) -> Iterator[Row]:
@@ -201,24 +315,24 @@ def forms(answer: Answer) -> Iterator[Row]:
     period = bed.spacing or (pile.model.line.x[-2] - pile.model.line.x[1]) / bed.forms
     x = pile.packing.centres[pile.packing.windward, 0] * pile.scene.grain.diameter
     form = np.clip(np.floor(x / period).astype(int), 0, bed.forms - 1)
-    ustar0 = np.nan_to_num(threshold.of_grains(answer.motion).value, nan=np.inf)
+    ustar0 = threshold.of_grains(answer.motion).value
     for fraction in pile.scene.protocol.fractions:
         first = np.nan
         for number in range(bed.forms):
+            # a grain that has not moved is not a number, which sorts last
             grains, speed = np.sort(ustar0[form == number]), answer.speed[form == number]
             needed = max(ceil(fraction * len(grains) - 1e-9), 1)
             reached = float(grains[needed - 1]) if len(grains) else np.nan
             first = reached if number == 0 else first
-            # loose grains of the first form move in still fluid: nothing is a multiple of that
-            ratio = reached / first if first > 0 else np.nan
             yield {
                 "scene_id": answer.scene_id,
                 "form": number + 1,
                 "count": len(grains),
                 "fraction": fraction,
                 "mean_ustar_over_ustar0": float(speed.mean()) if len(speed) else np.nan,
-                "ustar0_m_s": reached if np.isfinite(reached) else np.nan,
-                "over_first_form": ratio if np.isfinite(ratio) else np.nan,
+                "ustar0_m_s": reached,
+                # loose grains of the first form move in still fluid: nothing is a multiple of that
+                "over_first_form": reached / first if first > 0 else np.nan,
             }
 
 
@@ -227,16 +341,17 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
 
     For each pile that the study asks for on both, up to its last fraction.
     """
-    frozen = {one.scene_id: one for one in answers if not one.pile.scene.protocol.update}
+    frozen = {each.scene_id: each for each in answers if not each.pile.scene.protocol.update}
     for answer in answers:
         scene, count = answer.pile.scene, answer.motion.count
         twin = frozen.get(changed(answer.decision.asked, {"protocol.update": 0.0}).id)
         if not scene.protocol.update or twin is None:
             continue
         moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
-        pairs = [(answer.at(n / count), twin.at(n / count)) for n in moved.tolist()]
-        tau, tau_frozen = np.array([[one.tau for one in pair] for pair in pairs]).T
-        ustar0, ustar0_frozen = np.array([[one.ustar0 for one in pair] for pair in pairs]).T
+        at = ([each.at(n / count) for n in moved.tolist()] for each in (answer, twin))
+        (tau, ustar), (tau_frozen, ustar_frozen) = (
+            np.array([(each.tau, each.ustar0) for each in steps]).T for steps in at
+        )
         change = tau / tau_frozen - 1
         beyond = moved[np.abs(change) > limits.FROZEN_BED] / count
         yield {
@@ -249,12 +364,12 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
             "shields": shields(scene, tau),
             "shields_frozen": shields(scene, tau_frozen),
             "change": change,
-            "change_ustar0": ustar0 / ustar0_frozen - 1,
+            "change_ustar0": ustar / ustar_frozen - 1,
             "holds_until": beyond[0] if len(beyond) else np.nan,
         }
 
 
-def check_rows(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
+def check(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
     """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
     compared = decision.compare(plan.piles, plan.checks, tolerance, cases, done)
     for asked, cheap, dem, agree in compared:
