@@ -6,7 +6,6 @@ A choice is changed alone, on the cheapest levels that feel it.
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +22,6 @@ from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import FROZEN, PEELING, Fields, Pair, changed, level, value_of
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.pile import line as bed_line
-from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
 from orchestrator.report.page import Section
@@ -38,8 +36,6 @@ DYNAMIC, DYNAMIC_POURED = level("grains", "1 layer, fast"), level("grains", "4 l
 """Levels for a choice that dynamics alone feel; on poured beds, with more layers."""
 SEEDS = (1, 2, 3)  # other draws of a random packing that are as good
 QUANTITIES = {"shields": "Shields number $θ$", "ustar0": "undisturbed friction velocity $u^*_0$"}
-"""The Shields number of the mean stress on the moved grains, and the undisturbed friction velocity
-at which they moved."""
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
 COLOURS = ("#0072b2", "#d55e00")
@@ -121,12 +117,12 @@ def changes(study: Study) -> tuple[list[Change], dict[str, Decision]]:
     listed, asked = [], {}
     for scene in piles(study):
         for choice in CHOICES:
-            levels = choice.levels(scene)
-            start, why = f"{scene.id} | {levels.text} | ", "the budget changes one choice"
-            asked[start + BASE] = on_levels(scene, levels, why)
+            pair, why = choice.levels(scene), "the budget changes one choice"
+            start = f"{scene.id} | {pair.text} | "
+            asked[start + BASE] = on_levels(scene, pair, why)
             for name, other in choice.scenes(scene):
                 key = f"{start}{choice.name}: {name}"
-                asked[key] = on_levels(other, levels, why)
+                asked[key] = on_levels(other, pair, why)
                 listed.append(Change(scene, choice, name, start + BASE, key))
     return listed, asked
 
@@ -151,12 +147,11 @@ def experiment(study: Study, out: Path) -> Experiment:
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
     """A row for each scene, alternative and fraction: how far the threshold moved, relative."""
-
-    @cache
-    def thresholds(key: str) -> list[PileThreshold]:
-        pile = runs.planned.piles[key]
-        return pile.thresholds(runs.cases, pile.scene.protocol.fractions)
-
+    thresholds = {
+        key: pile.thresholds(runs.cases, pile.scene.protocol.fractions)
+        for key, pile in runs.planned.piles.items()
+        if runs.are_done(key)
+    }
     return pd.DataFrame(
         {
             "scene_id": change.scene.id,
@@ -170,7 +165,7 @@ def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:
         }
         for change in listed
         if runs.are_done(change.base, change.other)
-        for before, after in zip(thresholds(change.base), thresholds(change.other), strict=True)
+        for before, after in zip(thresholds[change.base], thresholds[change.other], strict=True)
     )
 
 

@@ -61,10 +61,7 @@ class Experiment:
     failing: Container[str] | None = None
 
     def run(self, out: Path, *, workers: int) -> Finished:
-        """Run what is missing in a directory, write the tables and draw the page.
-
-        An `OrchestratorError` if too little ran to its end for a table.
-        """
+        """Run what is missing, write tables and page; an `OrchestratorError` if too little ran."""
         space, planned = Workspace(out.absolute()), self.planned
         with claimed(space.root, EXPERIMENT, self.name) as folder:
             space.describe(EXPERIMENT, self.name, list(planned.cases))

@@ -188,14 +188,10 @@ def together(points: pd.DataFrame) -> pd.DataFrame:
         return math.nan if values.isna().any() else float(max(values, key=abs))
 
     rows = points[points["asked"] == "dem"].groupby(["packing", *LEVEL_PAIR], sort=False)
-    table = rows.agg(
-        **{name: (name, largest) for name in HEADS},
-        piles=("scene_id", "size"),
-        cost_core_s=("cost_core_s", "mean"),
-        reference_error=("reference_error", "max"),
-        model_floor=("model_floor", "min"),
-        same_model=("same_model", "first"),
-    ).reset_index()
+    means: dict[str, Any] = {"piles": ("scene_id", "size"), "cost_core_s": ("cost_core_s", "mean")}
+    ends = {"reference_error": "max", "model_floor": "min", "same_model": "first"}
+    means |= {name: (name, how) for name, how in (dict.fromkeys(HEADS, largest) | ends).items()}
+    table: pd.DataFrame = rows.agg(**means).reset_index()
     each = table[[*HEADS][:-1]].to_numpy(float)
     worst = each[np.arange(len(each)), np.nan_to_num(np.abs(each)).argmax(axis=1)]
     whole = np.isfinite(each).all(axis=1)
@@ -245,7 +241,8 @@ def naive_routes(study: Study) -> dict[str, Decision]:
     lattices = piles(study, by_dem=True)
     scene = min(lattices, key=lambda scene: lattices[scene].height / scene.grain.diameter)
     whole = changed(WHOLE.answer(scene), STEPS)
-    stiffness = {"K = 1e6 N/m": levels.paper_stiffness(scene), "K d/W = 1e4": 1e4}
+    of_paper = level("grains", "paper's K, fast").fields(scene)["grain.stiffness"]
+    stiffness = {"K = 1e6 N/m": of_paper, "K d/W = 1e4": 1e4}
     return {
         f"every Re* alone, {name}": as_asked(changed(whole, {"grain.stiffness": value}))
         for name, value in stiffness.items()
@@ -274,8 +271,8 @@ def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
 def _sections(pairs: pd.DataFrame, known: pd.DataFrame, naive: pd.DataFrame) -> list[Section]:
     words, index = TEXTS["ladder"], ["part", "scene_class", "level", "scenes", "cost_core_s"]
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
-    heads |= {"cost_core_s": "core-s", "flow_level": "flow", "grain_level": "grains"}
-    heads["scene_class"] = "scene class"
+    heads |= {"flow_level": "flow", "grain_level": "grains", "scene_class": "scene class"}
+    heads["cost_core_s"] = "core-s"
     means = pairs.sort_values(["packing", "cost_core_s"]).assign(**(100 * pairs[[*HEADS]]))
     means = means[["packing", *LEVEL_PAIR, "piles", "cost_core_s", *HEADS]].rename(columns=heads)
     rows = [(part, each.name, each.meaning) for part, levels in LEVELS.items() for each in levels]
@@ -372,21 +369,21 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
 
 
 def gains(routes: pd.DataFrame) -> Canvas:
-    """How many times cheaper each route is than the first, the naive one; hatched if extrapolated.
+    """How many times cheaper the routes of `naive_costs` are than the first, the naive one.
 
-    `routes` is as `naive_costs` gives it; what was not measured has no bar.
+    What is extrapolated is hatched; what was not measured has no bar.
     """
-    canvas, factor = style.canvas(0.34 * len(routes) + 0.75), routes["core_s"].iloc[0]
-    ax, factor = canvas.subplots(), factor / routes["core_s"]
-    look: Look = {"fc": "white", "ec": "#0072b2", "hatch": "////"}
-    hatches = np.where(routes["extrapolated"], look["hatch"], "")
-    faces = np.where(routes["extrapolated"], "white", look["ec"])
-    bars = ax.barh(routes["route"], factor - 1, 0.62, 1, ec=look["ec"], color=faces, hatch=hatches)
+    canvas, blue = style.canvas(0.34 * len(routes) + 0.75), METHODS["DEM"]
+    ax, factor = canvas.subplots(), routes["core_s"].iloc[0] / routes["core_s"]
+    faces = np.where(routes["extrapolated"], "white", blue)
+    hatches = np.where(routes["extrapolated"], "////", "")
+    bars = ax.barh(routes["route"], factor - 1, 0.62, 1, ec=blue, color=faces, hatch=hatches)
     costs = zip(factor, routes["core_s"], strict=True)
     ax.bar_label(bars, [f" {gain:,.0f} × ({cost:,.1f} s)" for gain, cost in costs], fontsize=7)
     ax.set(xscale="log", xlabel="times cheaper than the naive route")
     ax.set_xlim(0.8, factor.max() ** 1.5)  # the texts beyond the bars need a third of the width
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)
-    style.legends(canvas, [], [Patch(label="extrapolated, not run", **look)])
+    sample = Patch(label="extrapolated, not run", fc="white", ec=blue, hatch="////")
+    style.legends(canvas, [], [sample])
     return canvas

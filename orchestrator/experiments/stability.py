@@ -1,10 +1,9 @@
 """Maps of failure: where in a plane of two parameters a run is good, and what happens elsewhere.
 
 A map's file has the tables of a study file. An axis changes fields of them: a list of values, each
-times a factor where it is a number; or entries with a label and the fields they set; or, without
-runs of their own, the fractions of a pile at which its threshold is read. A run that fails says so
-itself: its verdict is what it noticed. The answer of another is compared with the reference of its
-place: beyond `WRONG` it is wrong, and nothing said so.
+times a factor where it is a number; entries with a label and the fields they set; or the fractions
+of a pile at which the threshold of one run is read. A run that fails gives its own verdict. Another
+answer is wrong where it differs by more than `WRONG` from the reference of its place.
 """
 
 import math
@@ -104,11 +103,8 @@ def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> 
 def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
     """Where each method fails: every map of a folder, by default those of the package."""
     maps = [load(path) for path in sorted(folder.glob("*.toml"))]
-    scenes: dict[str, Scene] = {}
-    for each in maps:
-        for place in each.places:
-            references = place.references if each.data["judge"] == "pile" else ()
-            scenes |= {scene.id: scene for scene in (*place.scenes, *references)}
+    places = [place for each in maps for place in each.places]
+    scenes = [scene for place in places for scene in (*place.scenes, *place.references)]
 
     def results(runs: Runs) -> Results:
         table = pd.concat([judge(each, runs) for each in maps], ignore_index=True)
@@ -120,7 +116,7 @@ def experiment(out: Path, folder: Path = FOLDER) -> Experiment:
             sections.append(Section(title, question, [drawn], (), each.data.get("limits", ())))
         return {"maps": table}, sections
 
-    planned = plan.of({name: as_asked(scene) for name, scene in scenes.items()})
+    planned = plan.of({scene.id: as_asked(scene) for scene in scenes})
     return Experiment("stability", TITLE, planned, results, verdicts=NOTICED, failing=())
 
 

@@ -279,7 +279,7 @@ def compare(
     """Compare the answers of the piles that DEM checks at each fraction, where both are run.
 
     They agree where the answer without DEM lies in the interval of DEM, widened by the tolerance,
-    or where neither reaches the fraction. All piles are by the id of the scene asked for.
+    or where neither reaches the fraction.
     """
     for asked, check in checking.items():
         both, fractions = (piles[asked], check), piles[asked].scene.protocol.fractions

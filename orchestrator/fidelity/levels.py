@@ -38,25 +38,19 @@ FINER = {
 FOLDER = Path(__file__).with_name("calibration")
 DISORDERS = (0.02, 0.05, 0.2)  # ends of the ranges of disorder that share their known errors, d
 VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it is rough
+# lift over weight at the threshold of a grain: below 0.93 it rolls, above 0.98 it is carried off
 LIFT_OFF = 0.95
-"""Lift over the weight at a grain's own threshold from which it lifts off before it rolls: of the
-piles of the preset `paper` those below 0.93 roll, those above 0.98 are carried off."""
 LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
 LIMITING = ", limiting slope"  # end of the name of a class
 BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
-AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")
+AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
 SETTINGS = (
     *(*AT_LEAST, "flow.turbulence_model", "flow.convection_scheme", "forces.averaging_length"),
     *("forces.loaded_grains", "forces.exposure", "protocol.displacement_criterion"),
 )
-DEFAULTS = {
-    f"{part}.{name}": field.default
-    for part, model in PARTS.items()
-    for name, field in model.model_fields.items()
-    if f"{part}.{name}" in SETTINGS
-}
-"""Fields that move an answer and that the ladder keeps at their defaults; those of `AT_LEAST` may
-be larger."""
+_AT = {name: name.split(".") for name in SETTINGS}
+DEFAULTS = {name: PARTS[part].model_fields[key].default for name, (part, key) in _AT.items()}
+"""Fields that move an answer and that the ladder keeps at their defaults."""
 SAME_CELL = 0.02  # relative difference of the first cell that changes no known error
 FROZEN = "frozen bed"  # the choice that the flow of the whole pile acts until the last grain left
 STATED = ("packing", "roughness length", "entrainment angle", "friction angle", "lift coefficient")
@@ -126,7 +120,7 @@ class Level:
             fields["flow.speed"] = float(f"{speed:.6g}")
             fields["flow.first_cell_height"] = scene.first_cell_height
         elif self.derived == "paper_stiffness":
-            fields["grain.stiffness"] = paper_stiffness(scene)
+            fields["grain.stiffness"] = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
         elif self.derived == "strip_width":
             least = math.ceil(LEAST_WIDTH * extremes(scene.grain.sizes, scene.grain.diameter)[1])
             fields["bed.width"] = max(STRIP_WIDTH, float(least)) if scene.is_poured else 0.0
@@ -163,11 +157,6 @@ def changed(scene: Scene, fields: Fields) -> Scene:
     return make_scene(parts, "fields that are changed")
 
 
-def paper_stiffness(scene: Scene) -> float:
-    """K d/W of the paper's K = 1e6 N/m."""
-    return 1e6 * scene.grain.diameter / scene.weight
-
-
 def packing(scene: Scene) -> str:
     """The packing of a pile as levels tell them apart: a poured bed in space is a "strip"."""
     assert isinstance(scene.bed, PileBed)
@@ -176,15 +165,9 @@ def packing(scene: Scene) -> str:
 
 def _load(part: str) -> tuple[Level, ...]:
     data = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-
-    def by_dem(row: dict[str, Any]) -> Fields:
-        layers = {"protocol.method": "dem", "bed.mobile_layers": row.pop("layers")}
-        return {**layers, **data["rules"][row.pop("rules")]}
-
     for row in data[part]:
-        if "rules" in row:
-            row["sets"] = by_dem(row)
-            row["on_poured"] = by_dem(row["on_poured"]) if "on_poured" in row else {}
+        for sets in (row["sets"], row.get("on_poured", {})):
+            sets |= data["rules"].get(sets.pop("rules", ""), {})
     return tuple(Level(**row) for row in data[part])
 
 
@@ -215,8 +198,7 @@ def meaning(names: Iterable[str]) -> str:
 class Known(NamedTuple):
     """Known relative error of tau_c against the reference, of a pair of levels.
 
-    The uncertainty is how far the reference itself moved when its numbers were changed, the times
-    are the measured means of a scene on one core, s.
+    With the change of the reference itself when its numbers were changed; mean times, core-s.
     """
 
     error: float
