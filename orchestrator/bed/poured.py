@@ -211,25 +211,12 @@ class PouredBed(Case):
         """Write the grains in the air, the walls and the cut."""
         start, end = self.ends
         centres, sizes = self.grains
-        deck.write_parameters(
-            directory,
-            {
-                "diameter": DIAMETER,
-                "smallest": float(sizes.min()),
-                "density": DENSITY,
-                "gravity": GRAVITY,
-                "friction": tan(radians(self.friction_angle_deg)),
-                **CONTACT,
-                "upstream": start * DIAMETER,
-                "downstream": end * DIAMETER,
-                "most_looks": LONGEST,
-                "width": self.width,
-                "ranks": self.ranks,
-                "stiffness": STIFFNESS,
-                "drag": DRAG,
-                "calm": CALM,
-            },
-        )
+        grain = {"diameter": DIAMETER, "smallest": float(sizes.min()), "density": DENSITY}
+        contact = {"gravity": GRAVITY, "friction": tan(radians(self.friction_angle_deg)), **CONTACT}
+        walls = {"upstream": start * DIAMETER, "downstream": end * DIAMETER, "most_looks": LONGEST}
+        sharing = {"width": self.width, "ranks": self.ranks}
+        stages = {"stiffness": STIFFNESS, "drag": DRAG, "calm": CALM}
+        deck.write_parameters(directory, {**grain, **contact, **walls, **sharing, **stages})
         (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
         x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
         cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}

@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import SPEED_HEIGHT
-from orchestrator.flow.model import model
+from orchestrator.flow.model import FlowModel
 from orchestrator.flow.theory import half_length, seen_by_the_flow
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
@@ -63,7 +63,7 @@ def check(scene: Scene, where: str) -> None:
         warnings.warn(f"{limit.field}: {limit.what} ({remedy})", stacklevel=2)
     if isinstance(scene.bed, PileBed):
         try:
-            _ = model(scene).cases  # a mesh that cannot be made is refused before anything runs
+            _ = FlowModel(scene).cases  # a mesh that cannot be made is refused before anything runs
         except InputError as error:
             raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
 

@@ -1,6 +1,5 @@
-"""Flow models: each gives the stress along a bed line, and says which cases it needs for that."""
+"""The flow model of a scene: the stress along its bed line, and the cases that this needs."""
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from math import floor, log10
@@ -22,8 +21,15 @@ NODES_PER_DECADE, NODES = 2, 4
 
 
 @dataclass(frozen=True)
-class FlowModel(ABC):
-    """A way to find the stress on the bed of a scene with a pile."""
+class FlowModel:
+    """A way to find the stress on the bed of a scene with a pile.
+
+    The scene has the undisturbed stress, that of a linear theory, or that of steady turbulent flow
+    by OpenFOAM, which scenes that differ in their grains alone share. With `flow.nodes` the flow is
+    solved at fixed values of z0/h, which beds of one form share: on one mesh the stress of each
+    face is a smooth function of ln z0, and the cubic through the four nodes around it is within
+    0.4 % of the solve, where they are half a decade apart.
+    """
 
     scene: Scene
 
@@ -38,77 +44,15 @@ class FlowModel(ABC):
         """U_e over u*_0: the approaching flow's speed at 10 h over its friction velocity."""
         return float(log_law_speed(1.0, SPEED_HEIGHT * self.line.h, self.scene.solve_roughness))
 
-    @property
-    def cases(self) -> tuple[FlowCase, ...]:
-        """The runs that it needs; an InputError names the field if one cannot be meshed."""
-        return tuple(run for solve in self.solves for run in solve.cases)
-
-    @property
-    def solves(self) -> "tuple[Solved, ...]":
-        """The solved flows that it is made of."""
-        return ()
-
-    @abstractmethod
-    def stress(self, cases: Path) -> WallStress:
-        """The stress along the bed; `cases` holds the finished runs."""
-
-
-class Theory(FlowModel):
-    """The undisturbed stress, or a linear theory of the flow over low hills or waves."""
-
-    def stress(self, cases: Path) -> WallStress:
-        """The stress by `theory.flat`, `theory.hill` or `theory.waves`."""
-        name, z0 = self.scene.flow.model, self.scene.solve_roughness
-        if name == "flat":
-            return theory.flat(self.line)
-        return (theory.hill if name == "hill" else theory.waves)(self.line, z0)
-
-
-class Solved(FlowModel):
-    """Steady turbulent flow by OpenFOAM; scenes that differ in their grains alone share it."""
-
-    @property
-    def solves(self) -> "tuple[Solved, ...]":
-        """Itself."""
-        return (self,)
-
-    @property
-    def cases(self) -> tuple[FlowCase, ...]:
-        """The run."""
-        scene, bed = self.scene, self.scene.bed
-        assert isinstance(bed, PileBed)
-        settings = scene.flow.model_copy(
-            update={
-                "roughness": scene.solve_roughness,
-                "viscosity": scene.solve_viscosity,
-                "first_cell_height": scene.first_cell_height,
-            }
-        )
-        # on a gentler profile cells are as fine as on flat bed
-        slope = bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0
-        return (_shared(bed.relief, slope, settings, self.line, bed.profile),)
-
-    def stress(self, cases: Path) -> WallStress:
-        """The stress that the finished run left."""
-        path = cases / self.cases[0].name / WALL_STRESS
-        file = path.stat()
-        return _read(path, file.st_size, file.st_mtime_ns)
-
-
-class Interpolated(FlowModel):
-    """The flow between solves at fixed values of z0/h, which beds of one form share.
-
-    On one mesh the stress of each face is a smooth function of ln z0. The cubic through the four
-    nodes around it is within 0.4 % of the solve, where they are half a decade apart.
-    """
-
     @cached_property
-    def weights(self) -> "dict[Solved, float]":
-        """The weight of each solve, that of the nearest node first.
+    def solves(self) -> dict[Scene, float]:
+        """The scenes whose flow is solved, with the weight of each; the nearest node comes first.
 
         A bed so rough that the mesh does not resolve the node above it is solved by itself.
         """
         scene, height, z0 = self.scene, self.line.h, self.scene.solve_roughness
+        if scene.flow.model != "solve" or not scene.flow.nodes:
+            return {scene: 1.0} if scene.flow.model == "solve" else {}
         place = NODES_PER_DECADE * log10(z0 / height)
         highest = floor(NODES_PER_DECADE * log10(scene.first_cell_height / height))
         if floor(place) + 1 > highest:
@@ -119,30 +63,55 @@ class Interpolated(FlowModel):
         weights = [np.prod([(place - m) / (n - m) for m in nodes if m != n]) for n in nodes]
         return {s: float(w) for s, w in zip(solves, weights, strict=True) if abs(w) > 1e-9}
 
-    @property
-    def solves(self) -> tuple[Solved, ...]:
-        """The solves at the nodes."""
-        return tuple(self.weights)
+    @cached_property
+    def cases(self) -> tuple[FlowCase, ...]:
+        """The runs that it needs; an InputError names the field if one cannot be meshed."""
+        return tuple(_case(scene) for scene in self.solves)
 
     def stress(self, cases: Path) -> WallStress:
-        """The stress between the nodes, cubic in ln z0."""
-        parts = [(solve.stress(cases), weight) for solve, weight in self.weights.items()]
+        """The stress along the bed; `cases` holds the finished runs."""
+        name, z0 = self.scene.flow.model, self.scene.solve_roughness
+        if name == "flat":
+            return theory.flat(self.line)
+        if name != "solve":
+            return (theory.hill if name == "hill" else theory.waves)(self.line, z0)
+        first, *others = (_read(cases / run.name / WALL_STRESS) for run in self.cases)
+        if not others:
+            return first
+        parts = list(zip((first, *others), self.solves.values(), strict=True))
         names = "tau_wall", "ustar_over_ustar0_eq10", "ustar_over_ustar0_eq10_printed"
         sums = {name: sum(weight * getattr(part, name) for part, weight in parts) for name in names}
-        return replace(parts[0][0], **sums)
+        return replace(first, **sums)
 
 
-def _at(scene: Scene, roughness: float) -> Solved:
-    """The solve at a roughness length, on the mesh of the scene."""
+def _at(scene: Scene, roughness: float) -> Scene:
+    """The scene whose flow is solved at a roughness length, on the mesh of this one."""
     changes = {"roughness": roughness, "nodes": False, "first_cell_height": scene.first_cell_height}
     parts = {name: getattr(scene, name) for name in Scene.model_fields}
-    return Solved(Scene(**{**parts, "flow": scene.flow.model_copy(update=changes)}))
+    return Scene(**{**parts, "flow": scene.flow.model_copy(update=changes)})
+
+
+def _read(path: Path) -> WallStress:
+    """The stress that a finished run left."""
+    file = path.stat()
+    return _read_once(path, file.st_size, file.st_mtime_ns)
 
 
 @lru_cache(maxsize=256)
-def _read(path: Path, size: int, changed_ns: int) -> WallStress:
+def _read_once(path: Path, size: int, changed_ns: int) -> WallStress:
     """The stress in a file as it is now: hundreds of piles share a flow."""
     return WallStress.from_csv(path)
+
+
+def _case(scene: Scene) -> FlowCase:
+    """The run of a scene whose flow is solved."""
+    bed, update = scene.bed, {"roughness": scene.solve_roughness}
+    assert isinstance(bed, PileBed)
+    update |= {"viscosity": scene.solve_viscosity, "first_cell_height": scene.first_cell_height}
+    # on a gentler profile cells are as fine as on flat bed
+    slope = bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0
+    settings = scene.flow.model_copy(update=update)
+    return _shared(bed.relief, slope, settings, of_bed(bed), bed.profile)
 
 
 @cache
@@ -153,10 +122,3 @@ def _shared(
     case = FlowCase(height, slope_deg, settings, line, profile)
     case.check_mesh()
     return case
-
-
-def model(scene: Scene) -> FlowModel:
-    """The flow model that a scene of a pile asks for."""
-    if scene.flow.model != "solve":
-        return Theory(scene)
-    return Interpolated(scene) if scene.flow.nodes else Solved(scene)

@@ -93,16 +93,11 @@ class SingleGrainCase(GrainCase):
         """Write the grains with their forces, and the load steps of the protocol."""
         rules = self.scenes[0].protocol
         parameters = {
-            "diameter": DIAMETER,
-            "smallest": 1.0,
-            "density": DENSITY,
-            "gravity": GRAVITY,
+            **{"diameter": DIAMETER, "smallest": 1.0, "density": DENSITY, "gravity": GRAVITY},
             **deck.contact(self.grain, rules),
             **deck.raising(rules, enough=0),
             # no face, no ceiling, no crest: the planes lie far outside the box
-            "slope": 0.0,
-            "ceiling_x": 0.0,
-            "ceiling_z": 1e3 * DIAMETER,
+            **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 1e3 * DIAMETER},
             "behind": 1e3 * DIAMETER,
         }
         rising = flows(self.scenes[0])

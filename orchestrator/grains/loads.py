@@ -12,7 +12,7 @@ from orchestrator.bed.packing import APRON, Lattice, Packing
 from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
-from orchestrator.flow.model import FlowModel, model
+from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling
 from orchestrator.grains.peeling import FEWER, PLACES, ForceTable, Loading
@@ -50,7 +50,7 @@ class Geometry:
     @cached_property
     def model(self) -> FlowModel:
         """The flow over it."""
-        return model(self.scene)
+        return FlowModel(self.scene)
 
     @property
     def flow(self) -> FlowCase:

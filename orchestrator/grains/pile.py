@@ -337,17 +337,14 @@ class PileCase(GrainCase):
         grains, (slope, ridge) = table(loads, worn), geometry.line.roof(MARGIN + 0.5)
         mobile = grains.kind > deck.FIXED
         smallest = float(grains.sizes[mobile].min())
+        density, gravity = self.scene.grain.density, self.scene.reduced_gravity
+        behind = grains.position[mobile, 0].max() + deck.AWAY * d
         numbers = {
-            "diameter": d,
-            "smallest": smallest,
-            "density": self.scene.grain.density,
-            "gravity": self.scene.reduced_gravity,
+            **{"diameter": d, "smallest": smallest, "density": density, "gravity": gravity},
             **deck.contact(self.scene.grain, rules),
             **deck.raising(rules, enough, smallest=smallest, is_poured=self.scene.is_poured),
-            "slope": slope,
-            "ceiling_x": ridge[0] * d,
-            "ceiling_z": ridge[1] * d,
-            "behind": grains.position[mobile, 0].max() + deck.AWAY * d,
+            **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
+            "behind": behind,
         }
         force = loads.loading.in_steps(rising.tolist())
         deck.write(directory, grains, numbers, rising, force, margin=MARGIN * d, ranks=self.ranks)
@@ -570,8 +567,8 @@ class Pile(Geometry):
     @property
     def solves(self) -> "dict[str, Pile]":
         """By the name of each solved flow over the whole bed, the pile under that flow alone."""
-        solves = self.model.solves
-        return {run.cases[0].name: Pile(run.scene, self.cases) for run in solves}
+        solves = zip(self.model.cases, self.model.solves, strict=True)
+        return {run.name: Pile(scene, self.cases) for run, scene in solves}
 
     def stress(self, cases: Path) -> WallStress:
         """The stress along the whole bed; `cases` is the directory of the finished runs."""

@@ -9,7 +9,7 @@ from orchestrator import plan, tables
 from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import as_asked
 from orchestrator.flow.case import WALL_STRESS
-from orchestrator.flow.model import model
+from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains.pile import Pile
 from orchestrator.physics.velocity import depth_mean_speed
@@ -70,7 +70,7 @@ def test_a_flat_beds_height_moves_nothing_behind_a_fence() -> None:
     flat = f'shape = "flat", length = 0.2, {fence}, height = '
     texts = [TEXT.replace("slope_deg = 15.0", f"{flat}{height}") for height in (0.05, 0.2)]
     scenes = [study.parse(text, name="t", where="t").scenes[0] for text in texts]
-    assert len({model(scene).cases for scene in scenes}) == 1
+    assert len({FlowModel(scene).cases for scene in scenes}) == 1
     assert len({scene.first_cell_height for scene in scenes}) == 1
 
 
