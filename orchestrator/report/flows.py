@@ -9,9 +9,7 @@ from typing import Any, get_args
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Rectangle
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 
@@ -26,14 +24,13 @@ from orchestrator.study import fields
 from orchestrator.study.parts import Turbulence
 from orchestrator.types import FloatArray
 
-ESTIMATES = ("wall", "eq10", "eq10_printed")
-LINES: dict[str, tuple[str, Look]] = {
-    "wall": ("wall stress", {"color": "black", "lw": 1.3}),
-    "eq10": ("Eq. 10, $\\ln((z_e+z_0)/z_0)$", {"color": "#0072b2", "lw": 1.0}),
-    "eq10_printed": ("Eq. 10 as printed, $\\ln(z_e/z_0)$", {"color": "#56b4e9", "ls": "--"}),
-    "grains": ("as grains feel it (averaged)", {"color": "#f0a35e", "lw": 0, "marker": "."}),
+ESTIMATES: dict[str, Look] = {
+    "wall": {"label": "wall stress", "color": "black", "lw": 1.3},
+    "eq10": {"label": "Eq. 10, $\\ln((z_e+z_0)/z_0)$", "color": "#0072b2", "lw": 1.0},
+    "eq10_printed": {"label": "Eq. 10 as printed, $\\ln(z_e/z_0)$", "color": "#56b4e9", "ls": "--"},
 }
-REVERSED: Look = {"color": "0.85", "lw": 0}
+FELT: Look = {"color": "#f0a35e", "lw": 0, "marker": ".", "ms": 7, "zorder": 1.5, "gid": "grains"}
+REVERSED: Look = {"color": "0.85", "lw": 0, "gid": "reversed flow", "label": "reversed flow"}
 MODELS = dict(zip(get_args(Turbulence), ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), strict=True))
 """Colours of the turbulence models."""
 USTAR = r"$u^\star/u^\star_0$"
@@ -72,16 +69,11 @@ def stress(results: Results) -> Iterator[Figure]:
     piles = [pile for least, *others in _kinds(results) for pile in (least, *others[-1:])]
     if not piles:
         return
-    columns = min(len(piles), 2)
-    rows = -(-len(piles) // columns)
-    figure = style.canvas(3.0 * rows + 0.4)
-    axes = figure.subplots(2 * rows, columns, height_ratios=[4, 1] * rows, squeeze=False)
-    pairs = axes.reshape(rows, 2, columns).swapaxes(1, 2).reshape(-1, 2)
-    for pile, (top, below) in zip(piles, pairs, strict=False):
-        _along(results, pile, top, below)
-    for unused in pairs[len(piles) :].ravel():
-        unused.remove()
-    _legend(figure)
+    figure, axes = style.grid(len(piles), 3.0, "$x/h$", USTAR)
+    for ax, pile in zip(axes, piles, strict=True):
+        _along(results, pile, ax)
+    axes[0].set_xlim(-4, max(pile.model.line.x[-2] / pile.bed.height for pile in piles) + 10)
+    style.legends(figure, [], style.samples(axes))
     names = tuple(pile.flow.name for pile in piles)
     mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
     lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
@@ -89,38 +81,30 @@ def stress(results: Results) -> Iterator[Figure]:
     yield Figure("wall-stress", "Friction velocity over the pile", text, names, figure, fold=True)
 
 
-def _legend(figure: Canvas) -> None:
-    entries = [Line2D([], [], label=text, **look) for text, look in LINES.values()]
-    style.legends(figure, [], [*entries, Patch(label="reversed flow", **REVERSED)])
-
-
-def _along(results: Results, pile: Pile, top: Axes, below: Axes) -> None:
-    """Friction velocities along the bed of a pile, and the bed with its marks under them."""
+def _along(results: Results, pile: Pile, ax: Axes) -> None:
+    """Friction velocities along the bed of a pile, over the bed with its marks."""
     line, h = pile.model.line, pile.bed.height
     rows, grains = results.tables["wall_stress"], results.joined("pile_grain")
     rows = rows[rows["flow_case"] == pile.flow.name].replace([np.inf, -np.inf], np.nan)
     x, wall = rows["x_m"].to_numpy() / h, rows["ustar_over_ustar0_wall"].to_numpy()
-    for name in ESTIMATES:
-        top.plot(x, rows[f"ustar_over_ustar0_{name}"], gid=name, **LINES[name][1])
-    top.axhline(0, color="0.4", lw=0.6)
-    top.fill_between(x, wall, 0, where=(wall < 0).tolist(), gid="reversed flow", **REVERSED)
+    for name, look in ESTIMATES.items():
+        ax.plot(x, rows[f"ustar_over_ustar0_{name}"], gid=name, **look)
+    ax.axhline(0, color="0.4", lw=0.6)
+    ax.fill_between(x, wall, 0, where=(wall < 0).tolist(), **REVERSED)
     group = grains[grains["flow_case"] == pile.flow.name] if len(grains) else grains
     if len(group):  # of the scenes that share the flow, the last
         group = group[group["scene_id"] == group["scene_id"].max()]
-        felt = group["ustar_over_ustar0"]
-        top.plot(group["x_m"] / h, felt, zorder=1.5, ms=7, gid="grains", **LINES["grains"][1])
-    _draw_bed(below, pile)
-    below.text(0.015, 0.6, "flow →", transform=below.transAxes, fontsize=6.5, color="0.35")
-    low, high = min(line.z) / h, max(line.z) / h
-    below.set(xlabel="$x/h$", ylabel="$z/h$", ylim=(low - 0.3, high + 0.4))
+        label = "as the grains feel it (averaged)"
+        ax.plot(group["x_m"] / h, group["ustar_over_ustar0"], label=label, **FELT)
     for name, at in marks(pile).items():
-        for ax in (top, below):
-            ax.axvline(at / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
-        style.upright_note(top, at / h - 0.1, name, at="top")
-    below.sharex(top)
-    top.tick_params(labelbottom=False)
-    top.set(xlim=(-4, line.x[-2] / h + 10), ylim=(None, 1.25 * top.get_ylim()[1]), ylabel=USTAR)
-    top.set_title(_title(results, pile), loc="left")
+        ax.axvline(at / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
+        style.upright_note(ax, at / h - 0.1, name, at="top")
+    ax.margins(y=0.25)
+    ax.set_title(_title(results, pile), loc="left")
+    below, low, high = ax.twinx(), min(line.z) / h, max(line.z) / h
+    below.set(ylim=(low - 0.2, low + 6 * (high - low)), yticks=[])
+    _draw_bed(below, pile)
+    ax.set(zorder=1, frame_on=False)  # the lines lie over the bed
 
 
 def marks(pile: Pile) -> dict[str, float]:
@@ -177,18 +161,15 @@ def flow(results: Results) -> Iterator[Figure]:
         window = left, right, bottom, top = -2.0, toe + 8.0, 0.0, 3.0
         # as high as to scale, with a title over each panel
         panel = 0.4 + 0.9 * style.WIDTH * (top - bottom) / (right - left)
-        figure = style.canvas(panel * len(shown) + 0.9)
-        axes = list(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0])
+        figure, axes = style.grid(len(shown), panel, "$x/h$", "$z/h$", 1)
         for ax, pile in zip(axes, shown, strict=True):
             field = over_u_e(pile, results.cases, window, pile.bed.height)
             speed = np.linalg.norm(field, axis=-1)
             image = ax.imshow(speed, origin="lower", extent=window, vmin=0, vmax=1.1)
             _streamlines(ax, window, field)
             _draw_bed(ax, pile)
-            ax.set(ylabel="$z/h$", aspect="equal", xlim=window[:2], ylim=window[2:])
-            ax.set_yticks([0, 1, 2, 3])
+            ax.set(aspect="equal", xlim=window[:2], ylim=window[2:], yticks=range(4))
             ax.set_title(_title(results, pile), loc="left")
-        axes[-1].set_xlabel("$x/h$")
         bar = figure.colorbar(image, ax=axes, location="bottom", aspect=60, pad=0.02)
         bar.set_label(r"speed over that of the approaching flow at 10 h, $|\mathbf{u}|/U_e$")
         flows, lid = [pile.scene.flow for pile in shown], not any(p.scene.flow.depth for p in shown)
@@ -242,13 +223,13 @@ def mesh(results: Results) -> Iterator[Figure]:
             # as one line with gaps: thousands of lines would take seconds and megabytes
             ends = np.pad(edges[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
             ax.plot(*ends.reshape(-1, 2).T, color="0.25", lw=0.3, gid="mesh")
-            ax.set(xlim=(left, right), ylim=(bottom, top), ylabel="$z/h$", aspect="equal")
+            ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+            ax.set(xlabel="$x/h$", ylabel="$z/h$")
             _draw_bed(ax, pile)
         box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
         axes[0].add_patch(box)
         axes[0].set_title(_title(results, pile), loc="left")
         axes[1].set_title("the crest", loc="left")
-        axes[1].set(xlabel="$x/h$")
         first = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}"
         cells, lid = pile.flow.settings.cells_per_face, not pile.scene.flow.depth
         text = caption("mesh", cells=cells, first=first, lid=lid)
@@ -275,14 +256,15 @@ def where(results: Results) -> Iterator[Figure]:
     if not beds:
         return
     figure = style.canvas(4.4 * len(beds) + 0.9)
-    axes = figure.subplots(3 * len(beds), 1, height_ratios=[1.7, 0.6, 1.5] * len(beds))
-    for (top, below, map_), (pile, rows) in zip(axes.reshape(-1, 3), beds, strict=True):
-        _along(results, pile, top, below)
+    axes = figure.subplots(2 * len(beds), 1, height_ratios=[1.6, 1] * len(beds))
+    for (top, map_), (pile, rows) in zip(axes.reshape(-1, 2), beds, strict=True):
+        _along(results, pile, top)
         forms = f"{pile.bed.forms} × " * (pile.bed.forms > 1)
         shape = f"{forms}{pile.bed.profile or pile.bed.form.label or pile.bed.shape}"
-        parts = (shape, *pile.bed.obstacles, _title(results, pile))
+        parts, h = (shape, *pile.bed.obstacles, _title(results, pile)), pile.bed.height
         top.set_title(", ".join(map(str, parts)), loc="left")
-        goes, x = np.isfinite(rows["ustar0_m_s"]), rows["x_m"] / pile.bed.height
+        top.set(xlim=(-4, pile.model.line.x[-2] / h + 10), ylabel=USTAR)
+        goes, x = np.isfinite(rows["ustar0_m_s"]), rows["x_m"] / h
         flow = rows["ustar0_m_s"][goes]
         look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
         dots = map_.scatter(x[goes], flow, c=flow.rank(method="first") / len(rows), **look)
@@ -295,7 +277,7 @@ def where(results: Results) -> Iterator[Figure]:
         map_.set(xlabel="$x/h$", ylabel=r"goes at $u^\star_0$, m/s")
     bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
     bar.set_label("$n/N$ by then")
-    _legend(figure)
+    style.legends(figure, [], style.samples(axes))
     names = tuple(dict.fromkeys(run.name for pile, _ in beds for run in pile.runs))
     yield Figure("where", "Where grains go", caption("where"), names, figure)
 
@@ -306,9 +288,10 @@ def hills(results: Results) -> Iterator[Figure]:
     if not listed:
         return
     flows, table = pd.concat([rows for _, rows in listed]), results.tables["wall_stress"]
-    canvas = style.canvas(2.4 * len(listed) + 0.3)
-    panels = canvas.subplots(len(listed), 1, sharex=True, squeeze=False)[:, 0]
+    canvas, panels = style.grid(len(listed), 2.4, "$x/h$ from the top", USTAR, 1)
+    unverified = "" if flows["measured_verified"].all() else " (unverified)"
     measured: Look = {"color": "black", "lw": 1.2, "gid": "measured"}
+    measured["label"] = f"measured end of the reversed flow{unverified}"
     for ax, (aspect, rows) in zip(panels, listed, strict=True):
         for place, (_, row) in enumerate(rows.iterrows()):
             stress = table[table["flow_case"] == row["flow_case"]]
@@ -322,14 +305,10 @@ def hills(results: Results) -> Iterator[Figure]:
         if end > 0:
             ax.axvline(end, **measured)
         ax.axhline(0, color="0.4", lw=0.6)
-        ax.set(ylabel=USTAR)
         ax.set_title(f"half length {aspect:g} h, {rows['alpha_deg'].iloc[0]:.3g}°", loc="left")
-    panels[-1].set(xlabel="$x/h$ from the top", xlim=(-9, 13))
+    panels[0].set_xlim(-9, 13)
     names = [name for name in MODELS if name in set(flows["turbulence_model"])]
     colours = [style.entry(labels.value("turbulence_model", name), MODELS[name]) for name in names]
-    unverified = "" if flows["measured_verified"].all() else " (unverified)"
-    entry = Line2D([], [], label=f"measured end of the reversed flow{unverified}", **measured)
-    has_end = (flows["measured_reattachment_over_h"] > 0).any()
-    style.legends(canvas, colours, [entry] if has_end else [])
+    style.legends(canvas, colours, style.samples(panels))
     cases, title = tuple(flows["flow_case"]), "Hills that others measured"
     yield Figure("hills", title, caption("hills"), cases, canvas, first=True)

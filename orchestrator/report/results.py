@@ -69,7 +69,10 @@ class Results:
     def at_fraction(self) -> pd.DataFrame:
         """The thresholds of piles at the fraction of the sentences, the nearest to 30 %."""
         rows = self.joined("pile_threshold")
-        return rows[rows["fraction"] == nearest_fraction(rows)] if len(rows) else rows
+        if rows.empty:
+            return rows
+        nearest: float = min(set(rows["fraction"]), key=lambda n: abs(float(n) - FRACTION))
+        return rows[rows["fraction"] == nearest]
 
     @cached_property
     def exemplars(self) -> pd.DataFrame:
@@ -111,12 +114,6 @@ def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
         hill = measured_hill(results.flows[str(rows["flow_case"].iloc[0])])
         assert hill
         yield hill.aspect, rows
-
-
-def nearest_fraction(thresholds: pd.DataFrame) -> float:
-    """The fraction of the sentences: the nearest to 30 %."""
-    fractions = thresholds["fraction"].unique().tolist()
-    return float(min(fractions, key=lambda fraction: abs(fraction - FRACTION)))
 
 
 def split(

@@ -18,16 +18,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
 from orchestrator.report.page import caption
-from orchestrator.report.results import (
-    Results,
-    by_dem,
-    case_names,
-    drawable,
-    held,
-    nearest_fraction,
-    split,
-    valid,
-)
+from orchestrator.report.results import Results, by_dem, case_names, drawable, held, split, valid
 from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
@@ -325,8 +316,7 @@ def shown_piles(results: Results) -> pd.DataFrame:
     rows = results.joined("pile_threshold")
     if rows.empty:
         return rows
-    if rows["scene_id"].nunique() > FEW:
-        rows = rows[rows["fraction"] == nearest_fraction(rows)]
+    rows = results.at_fraction if rows["scene_id"].nunique() > FEW else rows
     return rows[drawable(rows, "reynolds", "shields")]
 
 
