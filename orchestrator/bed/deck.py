@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.errors import SolverError
-from orchestrator.study.parts import Grain, Protocol
-from orchestrator.study.sizes import extremes
+from orchestrator.study.parts import Grain, Protocol, extremes
 from orchestrator.types import FloatArray, IntArray
 
 MEANING = {

@@ -18,8 +18,7 @@ from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
 from orchestrator.errors import InputError, Noisy, SolverError
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
-from orchestrator.study.parts import Range
-from orchestrator.study.sizes import Sizes, drawn
+from orchestrator.study.parts import LogNormal, Range, Sizes
 from orchestrator.types import FloatArray
 
 HEAP = 2.0
@@ -56,6 +55,24 @@ NEAR = 0.5
 """Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
 LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
+
+
+def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:
+    """Diameters of some grains over one diameter, in random order, shape (count,).
+
+    They are evenly spread over the distribution by number: no bed has more of a size by chance.
+    """
+    part = (np.arange(count) + 0.5) / count
+    if sizes is None:
+        return np.ones(count)
+    if isinstance(sizes, LogNormal):
+        each = sizes.quantile(part, power=3)
+    else:
+        diameters, fractions = np.array(sizes).T
+        number = fractions / diameters**3
+        classes = np.searchsorted(np.cumsum(number) / number.sum(), part)
+        each = diameters[np.minimum(classes, len(diameters) - 1)] / diameter
+    return np.random.default_rng(seed).permutation(each)
 
 
 @dataclass(frozen=True)

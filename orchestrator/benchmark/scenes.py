@@ -12,6 +12,7 @@ from orchestrator.benchmark.pack import Problem, expectation
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
+from orchestrator.grains.loads import forces
 from orchestrator.grains.pile import MARGIN, Pile
 from orchestrator.study import closed_form as study_form
 from orchestrator.study import fields
@@ -95,7 +96,7 @@ def closed_form(name: str, scene: Scene) -> Problem:
     """Level 1: the forces on a grain and its threshold."""
     exact = study_form.closed_form(scene)
     flows = [float(f"{x * float(exact.friction_velocity):.4g}") for x in FLOWS]
-    drag, lift = study_form.forces(scene)
+    drag, lift = forces(scene)
     rows = [expectation("drag_n", float(drag(u)), FORMULA, u) for u in flows]
     rows += [expectation("lift_n", float(lift(u)), FORMULA, u) for u in flows]
     rows += [expectation("ustar_m_s", float(exact.friction_velocity), FORMULA)]

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.calculator import GAS_BELOW, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS, law
+from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, why_not
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, smooth_wall_roughness
 from orchestrator.types import FloatArray, Row
@@ -88,7 +87,8 @@ def _grains(points: Mapping[str, Any], count: int) -> Table:
         is_safe &= (name == "depth") | (grains[name] >= low) & (grains[name] <= high)
     for index in np.flatnonzero(~is_safe):
         from orchestrator.fidelity import limits
-        from orchestrator.study.closed_form import SingleGrain, single_grain
+        from orchestrator.physics.threshold import SingleGrain
+        from orchestrator.study.closed_form import single_grain
         from orchestrator.study.study import make_scene
 
         parts: dict[str, Row] = defaultdict(dict)

@@ -21,9 +21,8 @@ import pandas as pd
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study.closed_form import closed_form
 from orchestrator.study.fields import PARTS
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import PileBed, extremes
 from orchestrator.study.scene import LEAST_WIDTH, Scene, default_first_cell_height
-from orchestrator.study.sizes import extremes
 from orchestrator.study.study import make_scene
 from orchestrator.types import FloatArray
 

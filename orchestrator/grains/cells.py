@@ -14,11 +14,12 @@ import numpy as np
 
 from orchestrator.bed import deck
 from orchestrator.grains import motion
+from orchestrator.grains.loads import forces
 from orchestrator.runs import process
 from orchestrator.runs.case import Case
 from orchestrator.runs.files import canonical_json
 from orchestrator.solvers import liggghts
-from orchestrator.study.closed_form import closed_form, forces
+from orchestrator.study.closed_form import closed_form
 from orchestrator.study.parts import Grain
 from orchestrator.study.scene import Scene
 from orchestrator.types import FloatArray

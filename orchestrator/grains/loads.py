@@ -1,10 +1,12 @@
 """The bed of a scene in grains, and the flow's forces on them: what each needs to move."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine, of_bed
@@ -16,7 +18,9 @@ from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling
 from orchestrator.grains.peeling import FEWER, PLACES, ForceTable, Loading
-from orchestrator.study.closed_form import closed_form, forces, on_slopes
+from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.threshold import thresholds_of
+from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
@@ -29,6 +33,32 @@ DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
 _packed, _covered, _poured = cache(packing.pile), cache(packing.cover), cache(poured.read)
+Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities (m/s)
+
+
+def forces(
+    scene: Scene, sizes: ArrayLike = 1.0, gaps: ArrayLike | None = None
+) -> tuple[Force, Force]:
+    """Drag and lift on exposed grains of a resolved scene.
+
+    `sizes` are diameters over that of the scene; `gaps` are heights of the grains' lowest points
+    above the level at which the flow begins, m, by default z0.
+    """
+    law, grain = LAWS[scene.forces.law], single_grain(scene)
+    exposure = Exposure(grain.diameter * np.asarray(sizes, float), *grain[1:5], gaps)
+    return partial(law.drag, at=exposure), partial(law.lift, at=exposure)
+
+
+def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
+    """Friction velocity at which the grain of a scene would leave on other slopes, m/s.
+
+    It is 0 on slopes down which a grain rolls by itself.
+    """
+    slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
+    grain = single_grain(scene)
+    grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
+    each = [answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)]
+    return np.asarray(np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf)[place])
 
 
 @dataclass(frozen=True)

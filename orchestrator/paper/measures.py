@@ -21,8 +21,7 @@ from orchestrator.paper.evidence import (
     parts,
 )
 from orchestrator.physics import curves
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.types import FloatArray
 
 Comparisons = Iterator[Comparison]

@@ -1,6 +1,7 @@
 """Measured thresholds, pivots of natural beds, hiding in mixtures, flows over hills."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -113,8 +114,36 @@ RUSHIL = (
 )
 
 
-def rushil_hill(aspect: float, height_over_roughness: float) -> MeasuredHill | None:
-    """The hill of the experiment that a hill of this half length and roughness is, if any."""
+def rushil_form(aspect: float) -> tuple[FloatArray, FloatArray]:
+    """X from the top and z of a hill of RUSHIL over its height, by its half length over that.
+
+    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
+    case 69: xi = a sin(t) runs from one foot to the other.
+    """
+    t = np.linspace(-np.pi / 2, np.pi / 2, 4001)
+    m = 1 / aspect + np.sqrt(1 / aspect**2 + 1)
+    q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
+    xs, zs = aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+    # equal steps of t would crowd at the feet, where x is level in it
+    x = np.linspace(-aspect, aspect, 81)
+    return x, np.interp(x, xs, zs)
+
+
+@cache
+def rushil_aspect(slope_deg: float) -> float:
+    """Half length over height of the hill of RUSHIL whose steepest slope is given, degrees."""
+    from scipy.optimize import brentq
+
+    def steeper(logarithm: float) -> float:
+        x, z = rushil_form(np.exp(logarithm))
+        return float(np.max(np.diff(z) / np.diff(x)) - np.tan(np.radians(slope_deg)))
+
+    return float(np.exp(brentq(steeper, np.log(0.1), np.log(1e3))))
+
+
+def rushil_hill(slope_deg: float, height_over_roughness: float) -> MeasuredHill | None:
+    """The hill of the experiment that one of this steepest slope and roughness is, if any."""
     if abs(height_over_roughness / HEIGHT_OVER_ROUGHNESS - 1) > 10 * NEAR:
         return None
-    return next((one for one in RUSHIL if abs(aspect / one.aspect - 1) < NEAR), None)
+    aspect = rushil_aspect(slope_deg)
+    return next((hill for hill in RUSHIL if abs(aspect / hill.aspect - 1) < NEAR), None)

@@ -1,32 +1,26 @@
 """The threshold of motion of one exposed grain that rolls over its downstream neighbour."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize.elementwise import find_root
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
-from orchestrator.physics.force_law import Exposure, ForceLaw, Validity, reasons
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure, ForceLaw, Validity, reasons
 from orchestrator.types import BoolArray, FloatArray
 
 Regime = Literal["low", "high", "transition"]
-LAWS_OF: dict[Regime, tuple[str, ...]] = {
-    "low": ("low",),
-    "high": ("high",),
-    "transition": ("low", "high"),
-}
+LAWS_OF: dict[Regime, tuple[str, ...]]
+LAWS_OF = {"low": ("low",), "high": ("high",), "transition": ("low", "high")}
 """Names of the laws that the paper's rule picks in each regime."""
 PAPER = "paper"
 """The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, both in the transition."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
-"""Friction Reynolds numbers between which the first root is looked for.
-
-A sum that is above its target for less than half a decade is missed; the sum of a pivot rises
-throughout.
-"""
+"""Friction Reynolds numbers between which the first root is looked for. A sum that is above its
+target for less than half a decade is missed; the sum of a pivot rises throughout."""
 LIFT_OFF = 1 + 1e-9
 """Lift over the weight normal to the bed from which a grain leaves without rolling: on level bed
 without drag the pivot itself is at 1."""
@@ -94,13 +88,8 @@ def friction_velocity_at(
     is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` < 0) drag
     and torque change their sign. About a contact, `along` and `outward` are the arms of drag and
     lift over a length, `turning` is one over it (1/m), and the target (N) is the moment of the
-    weight alike.
-
-    Returns
-    -------
-    ndarray
-        Friction velocity, m/s, in the broadcast shape; NaN where the target is not positive, since
-        such a grain needs no flow, and infinite where no flow reaches it.
+    weight alike. Returned are m/s in the broadcast shape: NaN where the target is not positive,
+    since such a grain needs no flow, and infinite where no flow reaches it.
     """
     local = np.asarray(speed_up, float)
     weights = (np.sign(local) * along, np.asarray(outward), np.sign(local) * turning)
@@ -235,3 +224,32 @@ def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
     """
     slow, fast = low.reynolds < LAWS["low"].reynolds[1], high.reynolds >= LAWS["high"].reynolds[0]
     return np.where(slow, "low", np.where(fast, "high", "transition"))
+
+
+class SingleGrain(NamedTuple):
+    """All quantities that the closed form depends on, SI units and degrees."""
+
+    diameter: float
+    roughness: float
+    fluid_density: float
+    viscosity: float
+    lift_coefficient: float
+    density: float
+    slope_deg: float
+    entrainment_angle_deg: float
+    gravity: float
+
+
+_CACHE: dict[tuple[str, tuple[float, ...]], Threshold] = {}
+
+
+def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold]:
+    """The thresholds of grains (as `SingleGrain`) under a force law, each of shape ()."""
+    keys = [(name, tuple(grain)) for grain in grains]
+    if new := [key for key in dict.fromkeys(keys) if key not in _CACHE]:
+        columns = np.array([grain for _, grain in new]).T
+        rest = dict(zip(SingleGrain._fields[5:], columns[5:], strict=True))
+        columnwise = threshold(LAWS[name], Exposure(*columns[:5]), **rest)
+        rows = zip(*vars(columnwise).values(), strict=True)
+        _CACHE.update(zip(new, (Threshold(*row) for row in rows), strict=True))
+    return [_CACHE[key] for key in keys]

@@ -21,17 +21,13 @@ from orchestrator.types import FloatArray
 
 SMOOTH_WALL = 0.11
 """Roughness length of a smooth wall over nu/u* (Nikuradse 1932: u/u* = 2.5 ln(u* z/nu) + 5.5)."""
-HIDDEN = 1e-9
-"""Least exposed part of a grain: it avoids a division by zero for grains below the flow."""
-DAMPING = 26.0
-"""van Driest's A+."""
-ROUGHEST = 2000.0
-"""ks ustar/nu up to which the correlation of the shift is in use."""
+HIDDEN = 1e-9  # least exposed part of a grain: none below the flow divides by zero
+DAMPING = 26.0  # van Driest's A+
+ROUGHEST = 2000.0  # ks ustar/nu up to which the correlation of the shift is in use
 SMOOTHEST, TALLEST = 1e-3, 1e9
 """Wall units between which the integrals are tabulated. Below, the speed is y to 16 digits; above,
 the shear is that of the log law to 9."""
-STEP = 0.03
-"""Step of the table in ln y: interpolation errs by less than 1e-12, relative."""
+STEP = 0.03  # of the table in ln y: interpolation errs by less than 1e-12, relative
 
 
 def log_law_ustar(

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.study import fields
-from orchestrator.study.part import Info
+from orchestrator.study.parts import Info
 
 RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"

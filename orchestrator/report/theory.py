@@ -14,14 +14,12 @@ import pandas as pd
 
 from orchestrator.physics import curves
 from orchestrator.physics.curves import Air
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY, MEASURED_SOURCE
-from orchestrator.physics.threshold import LAWS_OF, Threshold, shields_at
+from orchestrator.physics.threshold import LAWS_OF, Threshold, shields_at, thresholds_of
 from orchestrator.report import labels
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, split
-from orchestrator.study import closed_form
 from orchestrator.types import BoolArray, FloatArray
 
 PAIR = LAWS_OF["transition"]
@@ -49,7 +47,7 @@ GRAIN = [
     *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
     *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2"),
 ]
-"""Columns of all that the closed form depends on, in the order of `closed_form.SingleGrain`."""
+"""Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 LEAST_CURVES = 2
 """The band for water is drawn only where at least this many curves were published for."""
 BAGNOLD_FROM = 3.5
@@ -202,7 +200,7 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
 
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     """The closed form of the single grains of some rows under a law."""
-    return closed_form.thresholds(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
+    return thresholds_of(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
 
 
 def water_band(reynolds: FloatArray) -> tuple[FloatArray, FloatArray]:

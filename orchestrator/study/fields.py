@@ -8,11 +8,9 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.part import Info, Part
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import Info, LogNormal, Part, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
-from orchestrator.study.sizes import LogNormal
 
 PARTS: Mapping[str, type[Part]] = {
     name: PileBed if name == "bed" else declared.annotation  # type: ignore[misc]
@@ -101,16 +99,10 @@ FIELDS: tuple[Quantity, ...] = tuple(
 )
 """Every field of a study file, in the order of the file."""
 _REGIME = "forces that are valid at the threshold of a single grain of the scene, or transition"
-
-
-def _ratio(scene: Scene) -> float:
-    # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
-    return round(scene.bed.roughness / scene.grain.diameter, 9)
-
-
-_RATIO = Info("roughness length", "z_0", "d")
+_RATIO, _Z0 = "roughness length over diameter", Info("roughness length", "z_0", "d")
 DERIVED = (
-    Quantity("", "z0_over_d", _RATIO, "roughness length over diameter", _ratio),
+    # rounded: d/30 over d is not 1/30 to the last digit, and figures group by it
+    Quantity("", "z0_over_d", _Z0, _RATIO, lambda s: round(s.bed.roughness / s.grain.diameter, 9)),
     Quantity("", "regime", Info("regime"), _REGIME, regime_of),
 )
 COLUMNS: Mapping[str, Quantity] = {

@@ -6,19 +6,24 @@ begin with a dash give the meaning of one word each. Angles are in degrees and s
 names; all else is in SI units or in the unit that is declared. Ranges are limits of nature.
 """
 
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
-from math import radians, tan
-from typing import TYPE_CHECKING, Annotated, Literal
+from math import log, radians, tan
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, InstanceOf, PlainSerializer
+import numpy as np
+import pydantic
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Field, InstanceOf, PlainSerializer, field_validator
+from pydantic.fields import FieldInfo
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
-from orchestrator.study.part import Height, Length, List, Part, Roughness, Viscosity, field
-from orchestrator.study.part import UnfitError as UnfitError
 from orchestrator.study.profile import Profile
 from orchestrator.study.shapes import SHAPES, Shape
-from orchestrator.study.sizes import Sizes
+from orchestrator.types import FloatArray
 
 LAW_LABELS = {"paper": "Eq. 2 or Eq. 4 where each holds, both in the transition"}
 LAW_LABELS |= {name: law.label for name, law in LAWS.items()}
@@ -30,11 +35,102 @@ if TYPE_CHECKING:
     LawName = str
 else:
     ShapeName, LawName = Literal[tuple(SHAPES)], Literal[tuple(LAW_LABELS)]
+List = Field(strict=False)  # beside a type of tuples: a list of TOML is taken as one
 Range = Annotated[tuple[float, float], List]
 Fraction = Annotated[float, Field(ge=1e-6, le=1)]
 File = Annotated[InstanceOf[Profile], PlainSerializer(lambda profile: profile and profile.digest)]
-LEVEL = 4.0  # length of level bed with grains, over the height
+Roughness = Annotated[float, Field(ge=1e-12, le=10)]  # from smooth walls to the largest boulder
+Height = Annotated[float, Field(ge=1e-6, le=1e4)]  # from five of the smallest grains to mountains
+Length = Annotated[float, Field(ge=1e-12, le=1e4)]  # the least that the fields above allow
+Viscosity = Annotated[float, Field(ge=1e-8, le=1e3)]  # liquid helium, 2e-8, to thin gases and lava
 
+
+class UnfitError(ValueError):
+    """Two fields of a scene that do not go together: which, why and what would."""
+
+    def __init__(self, field: str, what: str, remedy: str = "leave it out") -> None:
+        self.field, self.what, self.remedy = field, what, remedy
+        super().__init__(f"{field}: {what} ({remedy})")
+
+
+@dataclass(frozen=True)
+class Info:
+    """The words for a field; its meaning is the text under its declaration."""
+
+    label: str = ""
+    symbol: str = ""  # as formulas write it, an index after an underscore
+    unit: str = ""
+    column: str = ""  # of tables, with the unit, where that is not its name; "-" for none
+    scope: str = "every scene"  # the scenes on which it has an effect, a key of `fields.APPLIES`
+    about: Literal["question", "answer", "replica"] = "question"
+    """A question to nature, a way to answer it (levels change these), or one of many alike."""
+    choices: Mapping[str, str] = dataclasses.field(default_factory=dict)  # meanings of words
+    read: str = ""  # property of a scene with the value in use, where the field may be left open
+
+
+def field(default: Any = ..., *words: str, since: bool = False, **settings: Any) -> Any:
+    """Declare a field: default (none: required), symbol, unit, column, label, `read` of `Info`.
+
+    `settings` are further words of `Info`, and rules of `pydantic.Field` such as ``ge``. A field
+    that came after the first studies is `since`: scenes that have its default keep their id.
+    """
+    about = {name: settings.pop(name) for name in Info.__annotations__ if name in settings}
+    about |= dict(zip(("symbol", "unit", "column", "label", "read"), words, strict=False))
+    if since:
+        settings["exclude_if"] = lambda value: value == default
+    declared: FieldInfo = Field(default, **settings)
+    declared.metadata.append(Info(**about))
+    return declared
+
+
+class Part(BaseModel):
+    """Base of a scene's parts: immutable, exact types, no unknown keys, no NaN."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _without_minus_zero(cls, value: Any) -> Any:
+        """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
+        return value + 0.0 if isinstance(value, float) else value
+
+
+class LogNormal(Part):
+    """A log-normal distribution by mass, whose median is the grain diameter."""
+
+    sigma_g: Annotated[float, Field(ge=1.001, le=3)]
+    smallest: Annotated[float | None, Field(ge=0.1, le=1)] = None
+    largest: Annotated[float | None, Field(ge=1, le=10)] = None
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Cut-offs over the median; by default two geometric standard deviations."""
+        return self.smallest or self.sigma_g**-2, self.largest or self.sigma_g**2
+
+    def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
+        """Diameter over the median that a part of the mass (power 0) or number (3) is below."""
+        from scipy.special import ndtr, ndtri
+
+        width = log(self.sigma_g)
+        middle = -power * width**2
+        low, high = (ndtr((log(end) - middle) / width) for end in self.ends)
+        sizes = np.exp(middle + width * ndtri(low + np.asarray(part) * (high - low)))
+        return np.asarray(np.clip(sizes, *self.ends))
+
+    def __str__(self) -> str:
+        low, high = self.ends
+        return f"log-normal, sigma_g {self.sigma_g:g}, {low:.3g} to {high:.3g} d50"
+
+
+_Number = Annotated[float, Field(gt=0, lt=100)]
+_Rows = tuple[Annotated[tuple[_Number, _Number], List], ...]
+Sieve = Annotated[_Rows, Field(min_length=1), List, pydantic.Tag("rows")]
+"""Classes of a sieve table: diameter, m, rising, and fraction of the mass."""
+_kind = pydantic.Discriminator(lambda value: "rows" if isinstance(value, list | tuple) else "")
+Sizes = Annotated[Annotated[LogNormal, pydantic.Tag("")] | Sieve, _kind]
+"""In a study file ``[[5e-4, 0.4], [1e-3, 0.6]]``, or ``{ sigma_g = 1.3 }``."""
 _pile = partial(field, scope="piles")
 _answer = partial(field, scope="piles", about="answer")
 _dune = partial(field, scope="dunes", since=True)
@@ -51,7 +147,6 @@ class Fluid(Part):
     """density of the fluid"""
     viscosity: Viscosity = field(1e-5, "ν", "m²/s", "nu_m2_s")
     """kinematic viscosity that the grains feel"""
-    # from a small asteroid's to that of a centrifuge
     gravity: float = field(GRAVITY, "g", "m/s²", "g_m_s2", ge=1e-6, le=1e4)
     """acceleration of gravity"""
 
@@ -67,7 +162,6 @@ class Grain(Part):
         2500.0, "ρ_sol", "kg/m³", "rho_sol_kg_m3", "grain density", ge=0.1, le=25_000
     )
     """density of the grains"""
-    # from wet ice to grains that hold by more than friction
     friction_angle_deg: float = field(35.0, "φ", "°", "phi_deg", ge=1, le=89)
     """angle of Coulomb's friction between grains"""
     # softer grains sink into one another by a hundredth, harder ones are harder than steel
@@ -87,14 +181,12 @@ class Forces(Part):
 
     law: LawName = field("bridged", label="force law", column="force_law", choices=LAW_LABELS)
     """drag and lift on an exposed grain"""
-    # from none to sixty times Saffman's
     lift_coefficient: float = field(LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100)
     """lift coefficient"""
     stress: Literal["wall", "eq10"] = _pile("wall")
     """stress on the bed: at the wall, or at the first cell
     - wall: wall stress
     - eq10: stress of Eq. 10"""
-    # from far below a cell of any mesh to several piles
     averaging_length: float = _pile(1 / 40, unit="h", ge=1e-4, le=100)
     """least length of bed that a grain's stress is averaged on: the crest's own never converges
     with the mesh"""
@@ -326,7 +418,7 @@ class PileBed(Bed):
     @property
     def level_length(self) -> float:
         """Length of level bed with grains, m."""
-        return self.length or LEVEL * self.height
+        return self.length or 4.0 * self.height
 
     @property
     def relief(self) -> float:
@@ -364,3 +456,26 @@ class PileBed(Bed):
     def is_replica(self) -> bool:
         """Whether it is a lattice but for shifts that matter to nothing but round-off."""
         return self.packing in ("aligned", "horizontal") and self.seed > 0
+
+
+def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
+    """Diameter that a part (0 ... 1) of the mass is finer than, m.
+
+    It is straight in its logarithm between classes. `diameter` is that of equal grains, where
+    `sizes` is None, or the median of a log-normal distribution, m.
+    """
+    if sizes is None:
+        return diameter
+    if isinstance(sizes, LogNormal):
+        return diameter * float(sizes.quantile(part, power=0))
+    diameters, fractions = np.array(sizes).T
+    finer = np.cumsum(fractions) - fractions / 2
+    # the exponential of a logarithm is not the number itself to the last digit
+    return float(f"{np.exp(np.interp(part, finer, np.log(diameters))):.12g}")
+
+
+def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:
+    """The smallest and the largest grain of a mixture over one diameter; both 1 of equal grains."""
+    if isinstance(sizes, LogNormal):
+        return sizes.ends
+    return (sizes[0][0] / diameter, sizes[-1][0] / diameter) if sizes else (1.0, 1.0)

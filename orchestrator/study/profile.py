@@ -28,13 +28,10 @@ class Profile:
     """A bed line of n points, x rising, that begins at the origin."""
 
     name: str = field(compare=False)  # the file's
-    x: tuple[float, ...]  # m, from the first point; so is z
-    z: tuple[float, ...]
+    x: tuple[float, ...] = field(compare=False)  # m, from the first point; so is z
+    z: tuple[float, ...] = field(compare=False)
     text: str = field(compare=False, repr=False)  # the file itself
     digest: str  # of the corners: two profiles with one digest are one bed
-
-    def __hash__(self) -> int:
-        return hash(self.digest)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.digest[:12]})"
@@ -54,8 +51,6 @@ class Files:
         replaced = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
         for given in bed.keys() & replaced:
             raise InputError(f"it has its own {given}", where, f"leave out bed.{given}")
-        if not isinstance(name, str):
-            raise InputError(f"{name!r} is not accepted", where, "name a file")
         smoothing = bed.get("smoothing", 0.0)
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value

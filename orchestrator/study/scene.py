@@ -1,6 +1,7 @@
 """One scene: a fluid, its grains, their bed, the flow and the protocol."""
 
 import re
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 from math import acos, cos, degrees, radians
@@ -14,22 +15,18 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import weight
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.runs.files import canonical_json, digest_text
-from orchestrator.study import sizes
-from orchestrator.study.part import Part, UnfitError
-from orchestrator.study.parts import Bed, Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
+from orchestrator.study import parts
+from orchestrator.study.parts import Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.shapes import SHAPES
 
 BUILDABLE_DEG = (2.0, 60.0)  # slopes of piles that can be meshed and packed
 SOLVE_VISCOSITY = 1e-5  # at which flows are solved, m2/s, where it is low enough for their cells
 VISCOUS_CELLS = 2.5  # first cell over nu/(kappa u*_0): at its centre the flow is turbulent
-LEAST_DEPTH = 3.0
-"""Least depth of a flow over the height of forms and obstacles: the rows of its mesh are level at
-half of it."""
+LEAST_DEPTH = 3.0  # of a flow, over forms and obstacles: mesh rows are level at half of it
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in one another by
 1e-3 d are thrown apart by stiffer springs."""
-LEAST_WIDTH = 3.0
-"""Least width of a strip, diameters of its largest grain: none touches another from both sides."""
+LEAST_WIDTH = 3.0  # of a strip, in its largest grains: none touches another from both sides
 MOST_GRAINS = 1e5  # largest length of a bed, diameters
 NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 """Least distance of two points of a profile, over the diameter and over the height of the first
@@ -37,9 +34,16 @@ cell. Nearer ones make columns of cells in which the flow does not converge: on 
 a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
 ROUGHEST = 1 / 3  # largest z0 over the diameter of the bed's grains; measured are up to 1/7
 LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
+LARGEST_RATIO = 10.0  # of a mixture's grains: the time of DEM rises with its square
+OFF_MEDIAN = 0.01
+"""Relative difference of a log-normal mixture's d50 from the diameter, of which Shields numbers and
+a roughness length of d/30 are made."""
+Rule = tuple[object, str, str, str]
+"""Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
+OUT = "leave it out"
 
 
-class Scene(Part):
+class Scene(parts.Part):
     """One point of a study; a `pydantic.ValidationError` names each field that is wrong."""
 
     fluid: Fluid = Fluid()
@@ -51,117 +55,112 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        grain, bed, law, protocol = self.grain, self.bed, LAWS.get(self.forces.law), self.protocol
-        d, z0, is_raised = grain.diameter, bed.roughness, self.forces.exposure == "protrusion"
-        if grain.sizes is not None:
-            sizes.check(grain.sizes, d)
-        if grain.density <= self.fluid.density:
-            what = f"{grain.density:g} kg/m3 is not above the fluid's {self.fluid.density:g} kg/m3"
-            raise UnfitError("grain.density", what, "raise it, or lower fluid.density")
-        bed_grains = d / bed.relative_size * sizes.extremes(grain.sizes, d)[1]
-        if z0 > ROUGHEST * bed_grains * (1 + 1e-9) or z0 >= d:
-            what = f"{z0:g} m is above a third of the bed's grains of {bed_grains:g} m, or above d"
-            raise UnfitError("bed.roughness", what, "typical: d/30")
-        if law and law.turns and protocol.method != "pivot":
-            what = (
-                f"{law.name} turns the grain about its centre, which {protocol.method} leaves out"
-            )
-            raise UnfitError("forces.law", what, 'choose the method "pivot", or another law')
-        if law and is_raised and not law.protrudes:
-            names = ", ".join(name for name, each in LAWS.items() if each.protrudes)
-            raise UnfitError("forces.exposure", f"{law.name} knows none", f"laws that do: {names}")
-        width = bed.width if isinstance(bed, PileBed) else 0.0
-        of_poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
-        for name, value in of_poured.items():
-            if value and not self.is_poured:
-                raise UnfitError(
-                    name, "it is of poured beds", 'bed.packing = "poured", or leave it out'
-                )
-        if self.is_poured and protocol.method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS:
-            what = f"springs of {grain.stiffness:.3g} W/d throw poured grains apart"
-            raise UnfitError("grain.stiffness", what, f"at most {MOST_POURED_STIFFNESS:g}")
-        if 0 < protocol.update < LEAST_UPDATE:
-            remedy = f"each update is a solve of the flow: 0, or at least {LEAST_UPDATE:g}"
-            raise UnfitError("protocol.update", f"{protocol.update:g} of the grains", remedy)
-        if isinstance(bed, PileBed):
-            self._check_bed(bed)
-            self._check_flow(bed)
-        elif pocket_cosine(bed) >= 1:
-            what = f"a grain of {bed.relative_size:g} d falls between its neighbours"
-            raise UnfitError("bed.relative_size", what, "raise it, or bed.entrainment_angle_deg")
-        elif protocol.update:
-            raise UnfitError("protocol.update", "a single grain leaves no bed that changes")
+        for is_broken, *words in self._rules():
+            if is_broken:
+                raise parts.UnfitError(*words)
         return self
 
-    def _check_bed(self, bed: PileBed) -> None:
-        d, profile, (low, high) = self.grain.diameter, bed.profile, BUILDABLE_DEG
-        least = LEAST_WIDTH * sizes.extremes(self.grain.sizes, d)[1]
-        if bed.width and (self.protocol.method == "peeling" or self.protocol.update):
-            raise UnfitError("bed.width", "peeling and protocol.update know beds in a plane alone")
-        if 0 < bed.width < least:
-            remedy = f"at least {least:.4g}, or 0: a bed in the plane"
-            raise UnfitError("bed.width", "less than three of the largest grains", remedy)
-        if bed.relative_size != 1:
-            raise UnfitError("bed.relative_size", "it is of a single grain on its neighbours")
-        if bed.spacing and bed.forms == 1:
-            raise UnfitError("bed.spacing", "one form has no neighbour", "raise bed.forms")
-        if bed.height < 5 * d:
-            what = f"{bed.height:g} m is less than five grains of {d:g} m"
-            raise UnfitError("bed.height", what, "raise bed.height, or lower grain.diameter")
-        for obstacle, other in pairwise(sorted(bed.obstacles, key=lambda each: each.x)):
-            if other.x - obstacle.x < obstacle.reach + other.reach:
-                raise UnfitError("bed.obstacles", f"{obstacle} and {other} overlap", "move one")
-        if profile is None:
-            if bed.form.rises and not low <= bed.slope_deg <= high:
-                what, remedy = (
-                    f"a pile of {bed.slope_deg:g} deg",
-                    f"choose {low:g} ... {high:g} deg",
-                )
-                raise UnfitError("bed.slope_deg", what, remedy)
-            if bed.slope_deg and not bed.form.rises:
-                raise UnfitError("bed.slope_deg", f"the shape {bed.shape} does not rise")
-            if bed.smoothing:
-                raise UnfitError("bed.smoothing", "it is of a profile")
-            for name, declared in PileBed.model_fields.items():
-                shapes = [shape for shape, facts in SHAPES.items() if name in facts.fields]
-                if shapes and bed.shape not in shapes and getattr(bed, name) != declared.default:
-                    remedy = f"leave it out; it is of: {', '.join(shapes)}"
-                    raise UnfitError(f"bed.{name}", f"the shape {bed.shape} has none", remedy)
-        elif (length := profile.x[-1]) > MOST_GRAINS * d:
-            what = f"{length:g} m are {length / d:.0f} grains of {d:g} m"
-            raise UnfitError("bed.profile", what, "are its columns in mm? or cut a part out of it")
+    def _rules(self) -> Iterator[Rule]:
+        grain, bed, update = self.grain, self.bed, self.protocol.update
+        d, z0, law, method = grain.diameter, bed.roughness, self.forces.law, self.protocol.method
+        if grain.sizes is not None:
+            yield from self._rules_of_sizes(grain.sizes)
+        light = grain.density <= self.fluid.density
+        yield light, "grain.density", "not above the fluid's", "raise it, or lower fluid.density"
+        size = d / bed.relative_size * parts.extremes(grain.sizes, d)[1]
+        what = f"above d, or a third of the bed's grains of {size:g} m"
+        yield z0 > ROUGHEST * size * (1 + 1e-9) or z0 >= d, "bed.roughness", what, "typical: d/30"
+        turns = law in LAWS and LAWS[law].turns and method != "pivot"
+        yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
+        is_raised = self.forces.exposure == "protrusion"
+        blind = is_raised and law in LAWS and not LAWS[law].protrudes
+        yield blind, "forces.exposure", f"{law} knows none", 'choose the law "bridged"'
+        width = bed.width if isinstance(bed, PileBed) else 0.0
+        poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
+        for name, value in poured.items():
+            yield value and not self.is_poured, name, "it is of poured beds", 'packing = "poured"'
+        stiff = self.is_poured and method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS
+        most = f"at most {MOST_POURED_STIFFNESS:g}"
+        yield stiff, "grain.stiffness", "such springs throw poured grains apart", most
+        few = 0 < update < LEAST_UPDATE
+        yield few, "protocol.update", "each is a solve of the flow", f"0, or {LEAST_UPDATE:g} on"
+        if isinstance(bed, PileBed):
+            yield from self._rules_of_bed(bed)
+            yield from self._rules_of_flow(bed)
         else:
-            steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
-            near, cell = int(np.argmin(steps)), self.first_cell_height
-            cells = NARROWEST_OVER_CELL * cell if self.flow.model == "solve" else 0.0
-            if steps[near] < (least := max(NARROWEST_OVER_D * d, cells)):
-                what = f"{profile.name}, x = {profile.x[near + 1]:.6g} m: nearer than {least:.2g} m"
-                remedy = "leave out a point, or raise bed.smoothing"
-                raise UnfitError("bed.profile", f"{what} to the point before it", remedy)
+            falls = self.pocket_cosine >= 1
+            yield falls, "bed.relative_size", "it falls between its neighbours", "raise it"
+            yield update, "protocol.update", "it is of piles", OUT
 
-    def _check_flow(self, bed: PileBed) -> None:
-        flow, cell, update = self.flow, self.first_cell_height, self.protocol.update
-        depth = flow.depth or flow.lid * bed.relief
-        highest = max([bed.relief, *(obstacle.height for obstacle in bed.obstacles)])
-        if (flow.top == "boundary layer") == bool(flow.depth):
-            what = f"{flow.top} {'has none' if flow.depth else 'needs one, in m'}"
-            raise UnfitError("flow.depth", what, 'only "open water" and "closed channel" have one')
-        if depth < LEAST_DEPTH * highest:
-            what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
-            raise UnfitError("flow.depth" if flow.depth else "flow.lid", what, "raise it")
-        if flow.depth and flow.model not in ("solve", "flat"):
-            raise UnfitError("flow.model", "the theories have no top", 'choose "solve" or "flat"')
-        if flow.model == "solve" and cell > bed.relief / 4:
-            what = f"{cell:g} m is above a quarter of the pile's {bed.relief:g} m"
-            raise UnfitError("flow.first_cell_height", what, "lower it, or raise bed.height")
-        if update and (flow.nodes or flow.model != "solve" or self.protocol.method == "pivot"):
-            remedy = 'flow.model "solve" without nodes and the method "dem", or leave it out'
-            raise UnfitError(
-                "protocol.update", "this flow or method knows no bed that changes", remedy
-            )
-        if update and cell > self.grain.diameter:
-            what = f"the first cell, {cell:g} m, is higher than a grain"
-            raise UnfitError("protocol.update", what, "lower flow.first_cell_height")
+    def _rules_of_sizes(self, mixture: parts.Sizes) -> Iterator[Rule]:
+        d, slack = self.grain.diameter, OFF_MEDIAN
+        if isinstance(mixture, tuple):
+            (diameters, fractions), slack = np.array(mixture).T, 1e-9
+            wrong = np.any(np.diff(diameters) <= 0) or abs(fractions.sum() - 1) > 1e-6
+            what = f"diameters do not rise, or fractions add up to {fractions.sum():.6g}, not 1"
+            yield wrong, "grain.sizes", what, "look at the rows"
+        median, (low, high) = parts.percentile(mixture, d, 0.5), parts.extremes(mixture, d)
+        what = f"the d50 of grain.sizes is {median:.6g} m"
+        yield (
+            abs(median / d - 1) > slack,
+            "grain.diameter",
+            what,
+            "write it, or change the cut-offs",
+        )
+        what = f"the largest grain is {high / low:.3g} times the smallest"
+        yield high / low > LARGEST_RATIO, "grain.sizes", what, f"at most {LARGEST_RATIO:g}"
+
+    def _rules_of_bed(self, bed: PileBed) -> Iterator[Rule]:
+        d, profile, slope, shape = self.grain.diameter, bed.profile, bed.slope_deg, bed.shape
+        planar = self.protocol.method == "peeling" or self.protocol.update
+        yield planar and bed.width, "bed.width", "peeling and updates know planar beds alone", OUT
+        least = LEAST_WIDTH * parts.extremes(self.grain.sizes, d)[1]
+        what = f"three of the largest grains are {least:.4g} d"
+        yield 0 < bed.width < least, "bed.width", what, "raise it, or 0: a planar bed"
+        yield bed.relative_size != 1, "bed.relative_size", "it is of single grains", OUT
+        yield bed.spacing and bed.forms == 1, "bed.spacing", "one form has no neighbour", OUT
+        yield bed.height < 5 * d, "bed.height", f"less than five grains of {d:g} m", "raise it"
+        for obstacle, other in pairwise(sorted(bed.obstacles, key=lambda each: each.x)):
+            overlap = other.x - obstacle.x < obstacle.reach + other.reach
+            yield overlap, "bed.obstacles", f"{obstacle} and {other} overlap", "move one"
+        if profile is None:
+            (low, high), rises = BUILDABLE_DEG, bed.form.rises
+            gentle = low <= slope <= high or not rises
+            yield not gentle, "bed.slope_deg", f"not {low:g} ... {high:g} deg", "change it"
+            yield slope and not rises, "bed.slope_deg", f"the shape {shape} does not rise", OUT
+            yield bed.smoothing, "bed.smoothing", "it is of a profile", OUT
+            for name, declared in PileBed.model_fields.items():
+                shapes = [each for each, facts in SHAPES.items() if name in facts.fields]
+                foreign = shapes and shape not in shapes and getattr(bed, name) != declared.default
+                yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
+            return
+        count, cell = profile.x[-1] / d, self.first_cell_height
+        yield count > MOST_GRAINS, "bed.profile", f"{count:.0f} grains long", "is it in mm?"
+        steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
+        cells = NARROWEST_OVER_CELL * cell if self.flow.model == "solve" else 0.0
+        near, least = int(np.argmin(steps)), max(NARROWEST_OVER_D * d, cells)
+        what = f"points at x = {profile.x[near + 1]:.6g} m are nearer than {least:.2g} m"
+        yield steps[near] < least, "bed.profile", what, "leave out one, or raise bed.smoothing"
+
+    def _rules_of_flow(self, bed: PileBed) -> Iterator[Rule]:
+        flow, update, height = self.flow, self.protocol.update, bed.relief
+        cell = self.first_cell_height
+        solved, is_open = flow.model == "solve", flow.top != "boundary layer"
+        what = f"{flow.top} {'needs one, in m' if is_open else 'has none'}"
+        yield is_open != bool(flow.depth), "flow.depth", what, "see flow.top"
+        depth = flow.depth or flow.lid * height
+        shallow = depth < LEAST_DEPTH * max([height, *(each.height for each in bed.obstacles)])
+        what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
+        yield shallow, "flow.depth" if is_open else "flow.lid", what, "raise it"
+        topped = is_open and flow.model not in ("solve", "flat")
+        yield topped, "flow.model", "the theories have no top", 'choose "solve" or "flat"'
+        coarse = solved and cell > height / 4
+        yield coarse, "flow.first_cell_height", "above a quarter of the pile", "lower it"
+        frozen = flow.nodes or not solved or self.protocol.method == "pivot"
+        what = 'it needs a flow that is solved, without nodes, and the method "dem"'
+        yield update and frozen, "protocol.update", what, OUT
+        coarse = bool(update) and cell > self.grain.diameter
+        yield coarse, "protocol.update", "the first cell is higher than a grain", "lower it"
 
     @cached_property
     def id(self) -> str:
@@ -190,11 +189,18 @@ class Scene(Part):
         return min(self.grain.friction_angle_deg, 90 - self.pocket_angle_deg)
 
     @property
+    def pocket_cosine(self) -> float:
+        """Cosine of the angle at which a single grain leaves its pocket; above 1 it falls through.
+
+        Its neighbours' centres are 2 d cos(beta) apart and (D + d)/2 from its own.
+        """
+        return 2 * cos(radians(self.bed.entrainment_angle_deg)) / (1 + self.bed.relative_size)
+
+    @property
     def pocket_angle_deg(self) -> float:
         """Angle at which a grain leaves its pocket, degrees: beta, of equal grains."""
-        is_equal = self.bed.relative_size == 1.0
-        beta = self.bed.entrainment_angle_deg
-        return beta if is_equal else degrees(acos(pocket_cosine(self.bed)))
+        equal = self.bed.relative_size == 1.0
+        return self.bed.entrainment_angle_deg if equal else degrees(acos(self.pocket_cosine))
 
     @property
     def solve_roughness(self) -> float:
@@ -223,14 +229,6 @@ class Scene(Part):
         return KARMAN * float(log_law_ustar(self.flow.speed, height, self.solve_roughness))
 
 
-def pocket_cosine(bed: Bed) -> float:
-    """Cosine of the angle at which a single grain leaves its pocket; above 1 it falls through.
-
-    Its neighbours' centres are 2 d cos(beta) apart and (D + d)/2 from its own.
-    """
-    return 2 * cos(radians(bed.entrainment_angle_deg)) / (1 + bed.relative_size)
-
-
 def default_first_cell_height(height: float, roughness: float, viscous: float = 0.0) -> float:
     """Height of the first cell on the bed of a pile, m.
 
@@ -241,7 +239,7 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
     return min(max(height / 40, 2.5 * roughness, VISCOUS_CELLS * viscous), height / 4)
 
 
-def roughness_length(text: str, diameter: float, mixture: sizes.Sizes | None = None) -> float:
+def roughness_length(text: str, diameter: float, mixture: parts.Sizes | None = None) -> float:
     """A roughness in metres from a part of the diameter (m) such as ``"d/30"``.
 
     In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
@@ -249,7 +247,9 @@ def roughness_length(text: str, diameter: float, mixture: sizes.Sizes | None = N
     """
     match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", text)
     if not match or float(match[2]) == 0:
-        raise UnfitError("bed.roughness", f"{text!r} is not a length", 'write metres, or "d/30"')
+        raise parts.UnfitError(
+            "bed.roughness", f"{text!r} is not a length", 'write metres, or "d/30"'
+        )
     # rounded, so that d/10 of one grain and d/30 of another are one length and share a flow
-    size = sizes.percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
+    size = parts.percentile(mixture, diameter, int(match[1]) / 100) if match[1] else diameter
     return float(f"{size / float(match[2]):.12g}")

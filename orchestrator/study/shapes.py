@@ -6,12 +6,12 @@ shape is one entry of `SHAPES`; mesh, packing, checks, labels and the study file
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from math import cos, exp, log, pi, radians, sin, sqrt, tan
+from math import cos, exp, pi, radians, sin, sqrt, tan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from orchestrator.physics.measured import rushil_aspect, rushil_form
 from orchestrator.types import FloatArray
 
 if TYPE_CHECKING:
@@ -100,78 +100,43 @@ def _gaussian(bed: "PileBed") -> FloatArray:
 
 
 def _rushil(bed: "PileBed") -> FloatArray:
-    x, z = rushil_hill(rushil_aspect(bed.slope_deg))
+    x, z = rushil_form(rushil_aspect(bed.slope_deg))
     return bed.height * np.column_stack([x - x[0], z])
 
 
-def rushil_hill(aspect: float) -> tuple[FloatArray, FloatArray]:
-    """X from the top and z of a hill of RUSHIL over its height, by its half length over that.
-
-    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
-    case 69: xi = a sin(t) runs from one foot to the other.
-    """
-    t = np.linspace(-pi / 2, pi / 2, 100 * CHORDS + 1)
-    m = 1 / aspect + sqrt(1 / aspect**2 + 1)
-    q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
-    xs, zs = aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
-    # equal steps of t would crowd at the feet, where x is level in it
-    x = np.linspace(-aspect, aspect, 2 * CHORDS + 1)
-    return x, np.interp(x, xs, zs)
-
-
-@cache
-def rushil_aspect(slope_deg: float) -> float:
-    """Half length over height of the hill of RUSHIL whose steepest slope is given, degrees."""
-
-    def steeper(logarithm: float) -> float:
-        x, z = rushil_hill(exp(logarithm))
-        return float(np.max(np.diff(z) / np.diff(x))) - tan(radians(slope_deg))
-
-    from scipy.optimize import brentq
-
-    return exp(brentq(steeper, log(0.1), log(1e3)))
-
-
-def _step_up(bed: "PileBed") -> FloatArray:
-    face = bed.height / tan(radians(bed.slope_deg))
-    return np.array([[0, 0], [face, bed.height], [face + bed.level_length, bed.height]])
-
-
-def _step_down(bed: "PileBed") -> FloatArray:
-    face = bed.height / tan(radians(bed.lee_slope))
-    return np.array([[0, 0], [bed.level_length, 0], [bed.level_length + face, -bed.height]])
-
-
-def _flat(bed: "PileBed") -> FloatArray:
-    return np.array([[0, 0], [bed.level_length, 0]])
+def _level(bed: "PileBed") -> FloatArray:
+    """Level bed, behind a face up to it or before a face down from it."""
+    height, length = bed.height, bed.level_length
+    if bed.shape == "step up":
+        face = height / tan(radians(bed.slope_deg))
+        return np.array([[0, 0], [face, height], [face + length, height]])
+    level = np.array([[0, 0], [length, 0]])
+    down = [length + height / tan(radians(bed.lee_slope or 90)), -height]
+    return np.vstack([level, down]) if bed.shape == "step down" else level
 
 
 TRAIN, LEE, LEVEL = ("forms", "spacing"), ("lee_slope_deg",), ("length",)
 DUNE = ("windward", "brink_radius", *TRAIN, *LEE)
 SLIP_FACE_DEG = 30.0  # lee slope of a dune and of a step down
+DOWN: tuple[bool, float, Literal["all"]] = (False, SLIP_FACE_DEG, "all")
 _LISTED = (
     Shape("triangle", "two straight faces", _faces, TRAIN + LEE),
     Shape("dune", "a windward side and a slip face", _dune, DUNE, lee_slope_deg=SLIP_FACE_DEG),
     Shape("cosine", "one wave of a cosine, trough to trough", _cosine, TRAIN, "wave of a cosine"),
     Shape("gaussian", "a Gaussian hill", _gaussian, TRAIN, "Gaussian hill"),
-    Shape(
-        "rushil",
-        "a hill of the wind tunnel RUSHIL, level at its feet",
-        _rushil,
-        TRAIN,
-        "hill of RUSHIL",
-    ),
+    Shape("rushil", "a hill of the wind tunnel RUSHIL", _rushil, TRAIN, "hill of RUSHIL"),
     Shape("trapezoid", "two straight faces and a level top", _trapezoid, LEVEL + TRAIN + LEE),
-    Shape("step up", "a straight face up to higher ground", _step_up, LEVEL),
+    Shape("step up", "a straight face up to higher ground", _level, LEVEL),
     Shape(
         "step down",
         "a straight face down to lower ground",
-        _step_down,
+        _level,
         LEVEL + LEE,
-        rises=False,
-        lee_slope_deg=SLIP_FACE_DEG,
-        counted="all",
+        "",
+        False,
+        30,
+        "all",
     ),
-    Shape("flat", "level bed", _flat, LEVEL, rises=False, counted="all"),
+    Shape("flat", "level bed", _level, LEVEL, rises=False, counted="all"),
 )
 SHAPES = {shape.name: shape for shape in _LISTED}  # all shapes, by what a study file calls them

@@ -1,8 +1,7 @@
 """A study file: fluid, grain, bed, flow, protocol and axes in TOML, read into scenes.
 
 The tables at the top hold for every scene. Each ``[[group]]`` overrides some of them, and its
-``axes`` span a grid: every combination of the listed values is a scene. Without groups the file
-is one group.
+``axes`` span a grid: every combination of the listed values is a scene.
 """
 
 import difflib
@@ -22,17 +21,13 @@ from pydantic import Field, TypeAdapter, ValidationError
 from orchestrator.errors import InputError
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
-from orchestrator.study.part import List, Part, UnfitError
-from orchestrator.study.parts import PileBed
+from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
 from orchestrator.study.profile import Files, read_text
 from orchestrator.study.scene import Scene, roughness_length
-from orchestrator.study.sizes import Sizes, percentile
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
-MOST_SCENES = 100_000
-MOST_BYTES = 2**24
-"""Largest study file, bytes: one that lists every scene that there may be is smaller."""
+MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
 Table = dict[str, Any]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
@@ -127,11 +122,9 @@ def parse(text: str, *, name: str, where: str) -> Study:
     """
     try:
         file = _File.model_validate(tomllib.loads(text))
-    except RecursionError:
-        raise InputError("tables or lists are nested too deeply", where) from None
     except ValidationError as error:
         raise _explained(error, where) from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not TOML: {error}", where) from None
     files = Files(Path(where).parent, dict(file.profiles))
     listed, count = [], 0
@@ -184,7 +177,7 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
     are those that the tables may name. The first thing wrong raises an `InputError`.
     """
     bed, grain = {**BED, **parts["bed"]}, dict(parts["grain"])
-    if files and bed["kind"] == "pile" and "profile" in bed:
+    if files and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
         bed |= files.bed(bed, where)
     if files and isinstance(grain.get("sizes"), str):
         grain["sizes"] = files.sieve(grain["sizes"], where)
@@ -218,7 +211,7 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if path[0] == "group" and len(path) > 2:
         where, path, keys = f"{where}: group {int(path[1]) + 1}", path[2:], [*_Group.model_fields]
     branch = path.pop(1) if path[0] == "bed" and path[1:] else ""
-    path = [step for step in path if step not in ("log-normal", "rows")]
+    path = [step for step in path if step not in ("", "rows")]
     place, key = f"{where}: {'.'.join(map(str, path))}", str(path[-1])
     if first["type"] == "missing":
         return InputError("is missing", place, "add it to the file")

@@ -27,7 +27,6 @@ from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
 from orchestrator.study.scene import Scene
-from orchestrator.study.shapes import rushil_aspect
 from orchestrator.study.study import Study
 from orchestrator.types import BoolArray, Row
 
@@ -149,7 +148,7 @@ def measured_hill(pile: Pile) -> MeasuredHill | None:
     bed, case = pile.bed, pile.flow
     if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
         return None
-    return rushil_hill(rushil_aspect(bed.slope_deg), case.height_m / case.roughness_m)
+    return rushil_hill(bed.slope_deg, case.height_m / case.roughness_m)
 
 
 class Answer:

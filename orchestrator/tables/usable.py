@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.study import fields
 

@@ -16,7 +16,7 @@ from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
-from orchestrator.study.sizes import LogNormal, Sizes
+from orchestrator.study.parts import LogNormal, Sizes
 from orchestrator.types import FloatArray, IntArray
 
 SURFACE, WIDTH = 0.5 + 1 / 30, 4.0

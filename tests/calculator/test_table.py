@@ -7,8 +7,7 @@ import pytest
 from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator.table import thresholds
 from orchestrator.fidelity import limits
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import threshold, why_not
 from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.study import parse

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from orchestrator.bed import deck
 from orchestrator.grains.peeling import ForceTable, Loading
-from orchestrator.physics.force_law import Exposure, ForceLaw
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
 from tests.grains.test_motion import copied
 
 WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)

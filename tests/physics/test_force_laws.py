@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.force_law import CLIFT_GAUVIN, SCHILLER_NAUMANN, Exposure, reasons
-from orchestrator.physics.laws import LAWS, law
+from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, SCHILLER_NAUMANN, Exposure, law, reasons
 
 FORCES = ("drag", "lift", "torque")
 every_law = pytest.mark.parametrize("name", LAWS)

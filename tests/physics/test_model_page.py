@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import shields_at
 
 PAGE = Path(__file__).parents[2] / "docs" / "model.md"

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.physics import curves
-from orchestrator.physics.force_law import Exposure
-from orchestrator.physics.laws import LAWS
+from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import (
     LAWS_OF,
     Threshold,

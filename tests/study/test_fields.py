@@ -12,8 +12,8 @@ from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import LEVELS, Level, changed
 from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
+from orchestrator.study.parts import LogNormal
 from orchestrator.study.scene import Scene
-from orchestrator.study.sizes import LogNormal
 from orchestrator.tables import COLUMNS, rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "study-file.md"

@@ -71,7 +71,6 @@ def test_the_papers_rule_takes_the_laws_that_hold(d: float, regime: str, laws: l
     scenes = _parse(text + '[forces]\nlaw = "paper"\n').scenes
     assert [scene.forces.law for scene in scenes] == laws
     assert {closed_form.regime_of(scene) for scene in scenes} == {regime}
-    assert _parse(text).scenes[0].forces.law == "bridged"
 
 
 def test_the_id_follows_the_content_alone() -> None:
@@ -189,12 +188,11 @@ def test_the_closed_form_bears_the_ends_of_all_ranges_together() -> None:
         assert all(closed_form.closed_form(scene).friction_velocity > 0 for scene in scenes)
 
 
-@pytest.mark.parametrize("scale", [0.1, 10.0])
-def test_a_grain_of_another_scale_in_a_fluid_of_the_same_numbers_is_the_same(scale: float) -> None:
+def test_a_grain_of_another_scale_in_a_fluid_of_the_same_numbers_is_the_same() -> None:
     """Shields number and Re* depend on d^3 (s - 1) g/nu^2, s, z0/d and the angles alone."""
     text = "grain = {{ diameter = {} }}\nfluid = {{ viscosity = {!r}, gravity = {!r} }}"
-    one = _parse(text.format(1e-3, 1e-5, 9.81)).scenes[0]
-    other = _parse(text.format(1e-3 * scale, 1e-5 * scale**2, 9.81 * scale)).scenes[0]
-    a, b = closed_form.closed_form(one), closed_form.closed_form(other)
-    assert float(a.shields) == pytest.approx(float(b.shields), rel=1e-9)
-    assert float(a.reynolds) == pytest.approx(float(b.reynolds), rel=1e-9)
+    for scale in (0.1, 10.0):
+        values = (1e-3, 1e-5, 9.81), (1e-3 * scale, 1e-5 * scale**2, 9.81 * scale)
+        a, b = (closed_form.closed_form(_parse(text.format(*each)).scenes[0]) for each in values)
+        assert float(a.shields) == pytest.approx(float(b.shields), rel=1e-9)
+        assert float(a.reynolds) == pytest.approx(float(b.reynolds), rel=1e-9)
