@@ -57,15 +57,6 @@ def test_a_form_has_its_height_and_its_steepest_slope(name: str) -> None:
     assert of_bed(bed(**BEDS["rounded dune"])).bends_deg.max() < 2.1
 
 
-def test_the_nearest_place_on_a_line() -> None:
-    line, far = triangle(30.0, 10.0), 1e4
-    points = [[0.0, 0.0], line.crest, [2 * line.crest[0], 0.0], [-far, 0.0], [far, 0.0]]
-    segment, s = line.nearest(np.array(points))
-    ends = line.arc_lengths[[0, -1]]
-    np.testing.assert_allclose(s, [0.0, 20.0, 40.0, *ends], atol=1e-12)
-    assert segment[3:].tolist() == [0, len(line.lengths) - 1]
-
-
 def test_forms_of_a_train_are_alike_and_do_not_overlap() -> None:
     line, alone = of_bed(bed(**BEDS["apart"])), of_bed(bed())
     x = np.linspace(0, alone.x[-2], 50)

@@ -39,7 +39,8 @@ def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     assert case.done_state(PILE, directory.parent)
     kept = WallStress.from_csv(directory / WALL_STRESS)
     read = SolvedFlow(directory).stress(PILE.roughness_m)
-    np.testing.assert_array_equal(kept.tau_wall, read.tau_wall)
+    for name, values in vars(read).items():  # the table loses nothing
+        np.testing.assert_array_equal(getattr(kept, name), values)
     assert (directory / "parameters").read_text().count("//") == 13
     sums = (directory / "results.sha256").read_text()
     for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress"):
@@ -258,9 +259,3 @@ def test_runs_without_an_answer(
 def test_results_of_another_mesh_are_refused(solve: Solve) -> None:
     with pytest.raises(SolverError, match=r"z_e is 0.5 to 0.5 of that of the first cells"):
         changed(PILE, first_cell_height=1e-3).collect(solve(PILE))
-
-
-def test_the_identity_of_a_case() -> None:
-    assert replace(PILE, slope_deg=15).id == changed(PILE, speed=10.0).id == PILE.id
-    others = (changed(PILE, roughness=3.4e-5), changed(PILE, turbulence_model="kOmegaSST"), OPEN)
-    assert len({PILE.id, *(flow.id for flow in others)}) == 4

@@ -96,20 +96,6 @@ def test_tables_have_the_discharge(tmp_path: Path) -> None:
     assert "u_1m_m_s" not in rows
 
 
-@pytest.mark.parametrize(
-    ("flow", "what"),
-    [
-        ("depth = 1.0", "flow.depth: boundary layer has none"),
-        ('top = "open water"', "flow.depth: open water needs one"),
-        ('top = "open water"\ndepth = 0.05', "less than 3 heights of the forms"),
-        ('top = "open water"\ndepth = 1.0\nmodel = "hill"', "the theories have no top"),
-    ],
-)
-def test_a_channel_has_a_depth_that_forms_do_not_fill(flow: str, what: str) -> None:
-    with pytest.raises(InputError, match=what):
-        study.parse(TEXT + flow, name="t", where="t")
-
-
 def test_between_nodes_the_stress_is_cubic_in_ln_z0(tmp_path: Path) -> None:
     text = 'nodes = true\n[axes]\n"bed.roughness" = [3e-6, 3.3e-5, 1.1e-4, 2.4e-4]\n'
     *between, rough = (pile.model for pile in piles(text))

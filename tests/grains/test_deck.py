@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.bed import deck
 from orchestrator.grains.peeling import ForceTable, Loading
 from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
 from tests.grains.test_motion import copied
@@ -43,27 +42,6 @@ def test_a_grain_feels_the_closed_forms_force_at_its_own_stress(
     ustar = ForceTable(drag, lift, 1e-5, 0.5).reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))
     assert moment / 1e-5 == pytest.approx(goal, rel=1e-10)
-
-
-def test_files_hold_every_digit_and_all_grains_are_well_inside_the_box(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    kind, along = np.array([deck.FIXED, deck.MOBILE, deck.COUNTED]), np.tile([1.0, 0.0], (3, 1))
-    grains = deck.GrainTable(rng.normal(size=(3, 3)), kind, along, np.ones(3), 1e-3, 2500.0)
-    load_steps, force = np.array([1 / 3, 0.5]), rng.normal(size=(2, 3, 2))
-    parameters = {"diameter": np.float64(1e-3), "enough": 7}
-    deck.write(tmp_path, grains, parameters, load_steps, force, margin=0.1)
-    lines = (tmp_path / "grains.data").read_text().splitlines()
-    rows = [line.split() for line in lines[lines.index("Atoms") + 2 :]]
-    np.testing.assert_array_equal([[float(v) for v in row[4:]] for row in rows], grains.position)
-    assert [int(row[1]) for row in rows] == grains.kind.tolist()
-    box = np.array([line.split()[:2] for line in lines if line.endswith("hi")], float)
-    ends = grains.position.min(axis=0) - 0.1, grains.position.max(axis=0) + 0.1
-    np.testing.assert_allclose(box, np.transpose(ends))
-    written = (tmp_path / "force.z.txt").read_text().split()
-    # of the three grains the last alone may be pushed
-    assert written == ["1", "3", repr(float(force[0, 2, 1])), "1", "3", repr(float(force[1, 2, 1]))]
-    flows = (tmp_path / "load_steps.txt").read_text().splitlines()
-    assert [float(line) for line in flows] == load_steps.tolist()
 
 
 def _solve(copy: Path) -> "tuple[list[str], list[bytes]]":

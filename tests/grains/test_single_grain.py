@@ -82,16 +82,9 @@ def test_a_bed_has_no_scale(tmp_path: Path) -> None:
     assert first == second > 0
 
 
-class Sticky(Grain):
-    """A grain with a property of its contact that no deck knows yet."""
-
-    cohesion: float = 0.0
-
-
 def test_grains_of_two_contact_laws_share_no_deck() -> None:
-    (parsed,) = study.parse("grain = { diameter = 1e-3 }", name="cells", where="test").scenes
-    scene = parsed.model_copy(update={"grain": Sticky(diameter=1e-3)})
-    for name in set(Sticky.model_fields) - {"sizes"}:
+    (scene,) = study.parse("grain = { diameter = 1e-3 }", name="cells", where="test").scenes
+    for name in set(Grain.model_fields) - {"sizes"}:
         value = 1.1 * getattr(scene.grain, name) + 0.1
         other = scene.model_copy(update={"grain": scene.grain.model_copy(update={name: value})})
         decks = len(list(batches([scene, other])))
