@@ -39,18 +39,11 @@ SHIFT = 0.02
 class Steps:
     """The n drawn grains of a pile at K + 1 stops of the slider, lengths in d.
 
-    Attributes
-    ----------
-    grains : ndarray of int, shape (n,)
-        The drawn grains, as the packing numbers them.
-    places : ndarray, shape (K + 1, n, 2)
-        x and z, first as packed; NaN of a grain that has left the box.
-    level : ndarray of int, shape (n,)
-        Stop by which a grain has moved; 0 if it never does, or is not counted.
-    flow, totals : ndarray, shape (K + 1,)
-        Undisturbed friction velocity, m/s; how many counted grains, drawn or not, have moved.
-    lines : tuple of (int, BedLine)
-        The bed lines, each with the first stop under its flow; one, on a frozen bed.
+    `grains` (n,) are their numbers in the packing; `places` (K + 1, n, 2) are x and z, first as
+    packed, NaN of a grain that has left the box; `level` (n,) is the stop by which a grain has
+    moved, 0 if it never does or is not counted. `flow` (K + 1,) is the undisturbed friction
+    velocity, m/s, `totals` (K + 1,) how many counted grains, drawn or not, have moved. `lines` are
+    the bed lines, each with the first stop under its flow; one, on a frozen bed.
     """
 
     pile: Pile
@@ -60,10 +53,6 @@ class Steps:
     flow: FloatArray
     totals: IntArray
     lines: tuple[tuple[int, BedLine], ...]
-
-    def moved(self, stop: int) -> int:
-        """How many of the counted grains have moved at a stop."""
-        return int(self.totals[stop])
 
     def first(self, fraction: float) -> int:
         """The first stop at which a fraction of the counted grains has moved, or the last."""
@@ -78,7 +67,7 @@ def read(pile: Pile, cases: Path) -> Steps:
     grains of a long bed at all load steps would need many gigabytes.
     """
     packing, moved = pile.packing, pile.motion(cases)
-    (left, right, bottom, _), (x, z) = window(pile), packing.centres.T
+    ((left, right, bottom, _), _), (x, z) = window(pile), packing.centres.T
     inside = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
     rolling = packing.mobile if isinstance(pile.method, piles.Dem) else False
     grains = np.flatnonzero(inside | rolling)
@@ -129,18 +118,13 @@ def draw(results: Results) -> Iterator[Figure]:
     for number, (row, pile) in enumerate(chosen(results)):
         steps = read(pile, results.cases)
         shown = steps.first(FRACTION)
-        share = steps.moved(shown) / pile.packing.count
+        share = steps.totals[shown] / pile.packing.count
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
-        yield Figure(
-            f"bed-alpha{pile.bed.slope_deg:g}",
-            f"The bed when {share:.0%} of its grains have moved, {told}",
-            words(results, pile),
-            tuple(item.name for item in reversed(pile.runs)),
-            None,
-            _svg(steps, shown, results.cases).encode(),
-            data(steps, shown),
-            fold=number > 0,
-        )
+        name = f"bed-alpha{pile.bed.slope_deg:g}"
+        title = f"The bed when {share:.0%} of its grains have moved, {told}"
+        image = _svg(steps, shown, results.cases).encode()
+        cases, text = tuple(run.name for run in reversed(pile.runs)), words(results, pile)
+        yield Figure(name, title, text, cases, None, image, data(steps, shown), fold=number > 0)
 
 
 def words(results: Results, pile: Pile) -> str:
@@ -150,14 +134,10 @@ def words(results: Results, pile: Pile) -> str:
     used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
     return caption(
         "bed",
-        width=pile.bed.width,
-        by_dem=pile.by_dem,
+        **{"width": pile.bed.width, "by_dem": pile.by_dem, "flow": bool(pile.model.cases)},
+        **{"method": rules.method, "update": rules.update, "part": window(pile)[1]},
         criterion=labels.value("displacement_criterion", rules.displacement_criterion),
-        method=rules.method,
-        flow=bool(pile.model.cases),
-        update=rules.update,
         properties=", ".join(labels.plain(c, v) for c, v in used.items() if v is not None),
-        part=_view(pile)[1],
     )
 
 
@@ -193,22 +173,20 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
 
 def _paths(steps: Steps) -> list[list[Any]]:
     """Each bed line as a path of the picture, after the stop from which on it is there."""
-    left, right, *_ = window(steps.pile)
-    return [[stop, "M" + _path(line, left, right)[1:]] for stop, line in steps.lines]
+    (left, right, *_), _ = window(steps.pile)
+    paths = []
+    for stop, line in steps.lines:
+        x = np.unique([left, *np.clip(line.x, left, right), right])
+        points = (f"{a:.2f} {-b:.2f}" for a, b in zip(x, line.height(x), strict=True))
+        paths.append([stop, f"M{' L'.join(points)}"])
+    return paths
 
 
-def _path(line: BedLine, left: float, right: float) -> str:
-    x = np.unique([left, *np.clip(line.x, left, right), right])
-    return " ".join(f"L{a:.2f} {-b:.2f}" for a, b in zip(x, line.height(x), strict=True))
+def window(pile: Pile) -> tuple[flows.Window, str]:
+    """Left, right, bottom and top of the picture, d, and which part of the bed it shows if not all.
 
-
-def window(pile: Pile) -> flows.Window:
-    """Left, right, bottom and top of the picture, d: the whole pile, or the end of a long face."""
-    return _view(pile)[0]
-
-
-def _view(pile: Pile) -> tuple[flows.Window, str]:
-    """The window of the picture, and which part of the bed it shows, if not all."""
+    It shows the whole pile, or the upper end of a long face.
+    """
     (x, z), toe = pile.line.crest.tolist(), float(pile.line.toe[0])
     if z <= 0:  # a level bed has no crest
         left, right = pile.line.x[1] - 2, pile.line.x[-2] + 2
@@ -222,30 +200,29 @@ def _view(pile: Pile) -> tuple[flows.Window, str]:
 
 
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
-    pile, (left, right, bottom, top) = steps.pile, window(steps.pile)
-    packing, places = pile.packing, steps.places[shown]
-    centres, sizes = packing.centres[steps.grains], packing.sizes[steps.grains]
-    mobile, counted = packing.mobile[steps.grains], packing.windward[steps.grains]
+    pile, places = steps.pile, steps.places[shown]
+    frame = left, right, bottom, top = window(pile)[0]
+    packing, grains = pile.packing, steps.grains
+    centres, mobile = packing.centres[grains], packing.mobile[grains]
     here = np.where(np.isnan(places), centres, places)
-    base = np.where(counted, "e", "m")
+    base = np.where(packing.windward[grains], "e", "m")
     moved = (steps.level > 0) & (steps.level <= shown)
     look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
     length = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n > (right - left) / 25)
 
     def circles(places: FloatArray, chosen: BoolArray) -> list[tuple[str, str, str]]:
-        rows = np.column_stack([places * [1, -1], sizes / 2])[chosen]
+        rows = np.column_stack([places * [1, -1], packing.sizes[grains] / 2])[chosen]
         return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
 
-    colours = _flow(pile, cases, (left, right, bottom, top)) if pile.model.cases else ""
-    edge, path = f"{-bottom:.2f}", _path(pile.line, left, right)
+    paths = _paths(steps)
     return fill(
         "bed.svg.j2",
         **{"left": left, "right": right, "top": top, "bottom": bottom, "bar": length},
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
-        ground=f"M{left:.2f} {edge} {path} L{right:.2f} {edge}Z",
-        line=[path for stop, path in _paths(steps) if stop <= shown][-1],
-        wears=len(steps.lines) > 1,
-        flow=colours,
+        ground=f"M{left:.2f} {-bottom:.2f} L{paths[0][1][1:]} L{right:.2f} {-bottom:.2f}Z",
+        line=[path for stop, path in paths if stop <= shown][-1],
+        wears=len(paths) > 1,
+        flow=_flow(pile, cases, frame) if pile.model.cases else "",
         fixed=circles(centres, ~mobile),
         mobile=zip(circles(here, mobile), look[mobile], base[mobile], strict=True),
         size=f"{(right - left) / 75:.3g}",
@@ -255,9 +232,9 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     )
 
 
-def _flow(pile: Pile, cases: Path, window: flows.Window) -> str:
+def _flow(pile: Pile, cases: Path, frame: flows.Window) -> str:
     """The flow's speed as a pale picture, PNG in base64."""
-    velocity = flows.over_u_e(pile, cases, window, pile.scene.grain.diameter)
+    velocity = flows.over_u_e(pile, cases, frame, pile.scene.grain.diameter)
     speed = np.linalg.norm(velocity, axis=-1)[::-1]
     colours = colormaps["Blues"](0.6 * np.clip(np.nan_to_num(speed), 0, 1), bytes=True)
     colours[np.isnan(speed), 3] = 0

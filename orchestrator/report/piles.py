@@ -11,18 +11,9 @@ from matplotlib.colors import LogNorm
 
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import measured
-from orchestrator.report import labels, style
+from orchestrator.report import labels, shields, style
 from orchestrator.report.page import caption
 from orchestrator.report.results import Results, case_names, drawable, split
-from orchestrator.report.shields import (
-    LABEL,
-    SHAPE,
-    SHOWN,
-    about,
-    colour_entries,
-    parted,
-    sheets,
-)
 from orchestrator.report.style import Figure, Look
 
 SHOWN_UP_TO = 0.9
@@ -49,30 +40,37 @@ def fractions(results: Results) -> Iterator[Figure]:
     # of the piles alone: single grains have more diameters than there are colours
     colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
     for (alpha,), rows in split(scenes, "alpha_deg"):
-        choices, rows = parted(rows, *SHOWN)
-        for sheet in sheets(rows, ["z0_over_d", *choices], 2.3, labels.TAU_AXIS, "$n/N$"):
+        choices, rows = shields.parted(rows, *shields.SHOWN)
+        for sheet in shields.sheets(rows, ["z0_over_d", *choices], 2.3, labels.TAU_AXIS, "$n/N$"):
             for ax, part in zip(sheet.axes, sheet.parts, strict=True):
                 for _, pile in part.iterrows():
                     line, colour = curves[pile["scene_id"]], colours[float(pile["d_m"])]
-                    look: Look = {"marker": str(pile[SHAPE]), "ms": 3, "mew": 0.7, "lw": 0.8}
+                    look: Look = {
+                        "marker": str(pile[shields.SHAPE]),
+                        "ms": 3,
+                        "mew": 0.7,
+                        "lw": 0.8,
+                    }
                     look |= {"markevery": -(-len(line) // MARKERS), "gid": str(pile["scene_id"])}
-                    look |= {"color": colour, "label": pile[LABEL]}
+                    look |= {"color": colour, "label": pile[shields.LABEL]}
                     if not pile["law_holds"]:
                         look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
                     ax.plot(line["shields"], line["fraction_moved"], **look)
             # the last grains of a pile may wait for a hundred times the stress of the others
             stress = pd.concat([curves[item] for item in sheet.rows["scene_id"]])
-            early = stress[stress["fraction_moved"] <= SHOWN_UP_TO]["shields"]
-            early = early if len(early) else stress["shields"]
+            last = max(SHOWN_UP_TO, stress["fraction_moved"].min())
+            early = stress[stress["fraction_moved"] <= last]["shields"]
             reach = early.min() / 1.2, 1.2 * early.max()
             sheet.axes[0].set(xscale="log", xlim=reach, ylim=(0, 1))  # the panels share them
             for ax in sheet.axes:
                 style.plain_ticks(ax.xaxis)
-            shown = colour_entries("d_m", colours, sheet.rows)
-            style.legends(sheet.canvas, shown, style.samples(sheet.axes))
+            shields.legends(sheet, "d_m", colours)
             name, where = f"fractions-alpha{alpha:g}{sheet.name}", labels.plain("alpha_deg", alpha)
             title = f"Fraction of moving grains, {where}{sheet.title}"
-            text, cases = caption("fractions", about=about(sheet.rows)), case_names(sheet.rows)
+            text, cases = (
+                caption("fractions", about=shields.about(sheet.rows)),
+                case_names(sheet.rows),
+            )
             fold = bool(sheet.name) or alpha != scenes["alpha_deg"].min()
             yield Figure(name, title, text, cases, sheet.canvas, fold=fold)
 
@@ -87,7 +85,7 @@ def wear(results: Results) -> Iterator[Figure]:
     worn: Look = {"lw": 1.3, "label": "flow of the bed as it is"}
     apart: Look = {"ls": "", "marker": "o", "ms": 4, "label": "first 5 % apart"}
     keys, axes = ["alpha_deg", "packing", "method"], ("$n/N$", "Shields number $θ$")
-    for sheet in sheets(rows, keys, 2.1, *axes):
+    for sheet in shields.sheets(rows, keys, 2.1, *axes):
         for ax, part in zip(sheet.axes, sheet.parts, strict=True):
             for (d, _), group in split(part, "d_m", "scene_id"):
                 x, colour = group["fraction_moved"], colours[float(str(d))]
@@ -96,8 +94,7 @@ def wear(results: Results) -> Iterator[Figure]:
                 end = group[x == group["holds_until"]]
                 ax.plot(end["fraction_moved"], end["shields"], color=colour, **apart)
         sheet.axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
-        top = colour_entries("d_m", colours, rows)
-        style.legends(sheet.canvas, top, style.samples(sheet.axes))
+        shields.legends(sheet, "d_m", colours)
         cases = tuple(results.plan.piles[i].runs[-1].name for i in sheet.rows["scene_id"].unique())
         title = f"Frozen bed and bed that changes{sheet.title}"
         yield Figure(f"wear{sheet.name}", title, caption("wear"), cases, sheet.canvas)
@@ -181,7 +178,7 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
 def _hiding(rows: pd.DataFrame) -> Figure:
     """Thresholds of size classes over that of the median size, a panel for each method."""
     axes = "$d_i/d_{50}$", r"$\theta_i/\theta_{50}$"
-    (sheet,) = sheets(rows, ["answered_method"], 2.7, *axes, columns=3)
+    (sheet,) = shields.sheets(rows, ["answered_method"], 2.7, *axes, columns=3)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
     for ax, part in zip(sheet.axes, sheet.parts, strict=True):
         part = part[part["hiding"] > 0]
@@ -200,7 +197,6 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         ax.set(xscale="log", yscale="log")
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-    top = colour_entries("fraction", colours, rows)
-    style.legends(sheet.canvas, top, style.samples(sheet.axes))
+    shields.legends(sheet, "fraction", colours)
     title = "Hiding and exposure of sizes"
     return Figure("hiding", title, caption("hiding"), case_names(rows), sheet.canvas)

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
@@ -18,7 +17,7 @@ from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import MEASURED_SOURCE
 from orchestrator.report import labels, style, theory
 from orchestrator.report.page import caption
-from orchestrator.report.results import Results, by_dem, case_names, drawable, held, split, valid
+from orchestrator.report.results import Results, case_names, drawable, held, split, valid
 from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
@@ -40,8 +39,6 @@ TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")
 """Columns that a point tells of its scene."""
 FEW = 8
 """Piles of which every fraction is drawn in the one diagram."""
-BED = ("beta_deg", "z0_over_d", "alpha_s")
-"""Columns of all that a line depends on beside its law, on a flat bed."""
 LINES = 3
 """Laws beyond which only those near the measurements are drawn."""
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
@@ -89,54 +86,46 @@ def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
     columns = labels.varying(table, *shown)
     panels = [column for column in columns if fields.COLUMNS[column].info.about == "question"]
     looks = [column for column in columns if column not in panels]
-    # without variants there is a marker for every law, the same in all figures
-    laws = [item for item in LAWS if item in {*theory.PAIR, *table["force_law"]} or not looks]
-    while looks and len(table[looks].drop_duplicates()) * len(laws) > len(SHAPES):
+    while looks and table.groupby([*looks, "force_law"], dropna=False).ngroups > len(SHAPES):
         panels.append(looks.pop(0))
-    variant = pd.Series(0, index=table.index)
-    if looks:  # the most frequent variant is the first
-        number = table.groupby(looks, dropna=False).ngroup()
-        variant = number.map({old: new for new, old in enumerate(number.value_counts().index)})
-    shape = (variant * len(laws) + table["force_law"].map(laws.index)) % len(SHAPES)
+    # without variants a law has the same marker in all figures
+    shape = table["force_law"].map(list(LAWS).index)
+    if looks:
+        shape = table.groupby([*looks, "force_law"], dropna=False).ngroup()
     names = {}
     for number, group in table.groupby(shape):
         law = labels.value("force_law", group["force_law"].iloc[0])
         told = (labels.methods(group), law, *labels.told(group.iloc[0], looks))
         names[number] = ", ".join(dict.fromkeys(told))
-    return panels, table.assign(
-        **{SHAPE: shape.map(dict(enumerate(SHAPES))), LABEL: shape.map(names)}
-    )
+    added = {SHAPE: shape.map(dict(enumerate(SHAPES))), LABEL: shape.map(names)}
+    return panels, table.assign(**added)
 
 
 def about(rows: pd.DataFrame) -> dict[str, Any]:
     """The values of the captions of a figure that follow from its rows."""
     if rows.empty:
         return {}
-    dem, air = rows["answered_method"] == "dem", theory.air_lines(rows)
+    dem = rows["answered_method"] == "dem"
 
     def used(column: str, scale: float = 1.0) -> str:
         values = sorted(set(rows.loc[dem, f"answered_{column}"] * scale))
         return ", ".join(f"{value:.6g}" for value in values)
 
-    drawn = theory.drawn(rows["force_law"])
+    drawn, others = theory.drawn(rows["force_law"]), labels.methods(rows[~dem])
     return {
         "laws": "; ".join(labels.value("force_law", name) for name in drawn),
         "pair": theory.PAIR[0] in drawn,
         "hollow": not valid(rows).all(),
         "viscosities": rows["nu_m2_s"].nunique(),
-        "methods": labels.methods(rows),
-        "others": labels.methods(rows[~dem]),
-        "dem": dem.any(),
-        "increment": used("load_increment", 100.0),
+        **{"methods": labels.methods(rows), "others": others, "dem": dem.any()},
+        **{"increment": used("load_increment", 100.0), "waiting": used("waiting_time")},
         "criterion": used("displacement_criterion"),
-        "waiting": used("waiting_time"),
-        # of the published curves beside them
-        "air": ", ".join(air),
+        # of the lines beside them
+        "air": ", ".join(theory.air_lines(rows)),
         "wet": not theory.in_gas(rows).all(),
         "sloped": SLOPED if (rows["alpha_deg"] > 0).any() else "",
         "curves": "; ".join(curve.name for curve in curves.WATER),
-        "measured": MEASURED_SOURCE,
-        "bagnold_from": f"{theory.BAGNOLD_FROM:g}",
+        **{"measured": MEASURED_SOURCE, "bagnold_from": f"{theory.BAGNOLD_FROM:g}"},
     }
 
 
@@ -189,7 +178,8 @@ def draw_points(
     # as one line with gaps: bars and caps by themselves take three times as long
     ends = np.column_stack([low, high, np.full_like(low, np.nan)]).ravel()
     look: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "gid": "intervals"}
-    ax.plot(np.repeat(x, 3), ends, marker="_", ms=size + 0.8, mew=0.7, zorder=2.5, **look)
+    look |= {"marker": "_", "ms": size + 0.8, "mew": 0.7, "alpha": 0.5}
+    ax.plot(np.repeat(x, 3), ends, zorder=2.5, **look)
     drawn, usable = [], valid(rows).to_numpy()
     for (marker, label), _ in split(rows, SHAPE, LABEL):
         for solid in (True, False):
@@ -248,10 +238,11 @@ def draw_published(
     ax.plot(x, y, "s", ms=3.5, label="measured in water: median, 10 to 90 %", **look)
 
 
-def colour_entries(column: str, colours: Mapping[Any, str], rows: pd.DataFrame) -> list[Artist]:
-    """Legend of the colours that some rows have."""
-    used = set(rows[column])
-    return [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
+def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> None:
+    """Legends of the colours of a column above the panels, and of all labels below them."""
+    used = set(sheet.rows[column])
+    top = [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
+    style.legends(sheet.canvas, top, style.samples(sheet.axes))
 
 
 def single_grains(results: Results) -> pd.DataFrame:
@@ -259,7 +250,7 @@ def single_grains(results: Results) -> pd.DataFrame:
 
     Ramps of the flow are left out: they give no threshold.
     """
-    scenes, answers = results.beds("grain"), by_dem(results.joined("single_grain"))
+    scenes, answers = results.beds("grain"), results.joined("single_grain")
     if answers.empty:
         answers = pd.DataFrame(columns=["scene_id", *DEM, "ustar_m_s"])
     extra = [column for column in answers if column not in scenes or column == "scene_id"]
@@ -278,7 +269,7 @@ def draw(results: Results) -> Iterator[Figure]:
     sheet = Sheet("", "", *style.grid(1, 3.5, *AXES), [scenes], scenes)
     (ax,) = sheet.axes
     draw_published(ax, scenes.assign(alpha_deg=0.0))
-    shades = style.palette("alpha_deg", results.values("alpha_deg"))
+    shades: dict[Any, str] = style.palette("alpha_deg", results.values("alpha_deg"))
     points: dict[str, list[list[str]]] = {}
     kinds = ((grains, "single grain", DEM, "o", 2.4), (piles, "pile", PILE, "s", 3.6))
     for rows, name, columns, shape, size in kinds:
@@ -288,7 +279,7 @@ def draw(results: Results) -> Iterator[Figure]:
         for (alpha,), part in split(rows, "alpha_deg"):
             label = f"{name}, {labels.plain('alpha_deg', alpha)}"
             marked = part.assign(**{SHAPE: shape, LABEL: label})
-            for line, group in draw_points(ax, marked, shades[float(str(alpha))], columns, size):
+            for line, group in draw_points(ax, marked, shades[alpha], columns, size):
                 line.set_gid(f"{NAME}-{len(points)}")  # by which the page's script finds the points
                 texts = [_texts(row, columns, telling) for _, row in group.iterrows()]
                 points[f"{NAME}-{len(points)}"] = texts
@@ -298,7 +289,7 @@ def draw(results: Results) -> Iterator[Figure]:
         draw_line(ax, closed, closed.name, *theory.look(closed.law), width)
     reach = [rows["reynolds"] for rows in (piles, grains) if len(rows)]
     prepare(sheet, [*theory.span(scenes), *np.concatenate([[], *reach])])
-    style.legends(sheet.canvas, [], style.samples([ax]))
+    legends(sheet, "alpha_deg", {})
     text = caption(
         "overview",
         piles=about(piles),
@@ -327,8 +318,9 @@ def _lines(results: Results) -> list[Line]:
     for the least and the largest. Other laws have one line, on the bed that fits the measurements
     best. The two laws of the paper are one model: both have the same bed.
     """
-    beds = [group for _, group in split(results.beds("pile").assign(alpha_deg=0.0), *BED)]
-    lines = [line for group in (*beds[:1], *beds[1:][-1:]) for line in theory.lines(group)]
+    flat = theory.lines(results.beds("pile").assign(alpha_deg=0.0))
+    beds = [line.bed for line in flat]
+    lines = [line for line in flat if line.bed in (beds[0], beds[-1])]
     drawn = {line.law for line in lines}
     others = [line for line in theory.best(theory.ranked(results)) if line.law not in drawn]
     near = [line for line in others if line.decades > 0] if len(others) > LINES else []
@@ -354,6 +346,8 @@ def singles(results: Results) -> Iterator[Figure]:
     grains = single_grains(results)
     flat = grains[grains["alpha_deg"] == 0]
     colours: dict[Any, str] = style.palette("beta_deg", results.values("beta_deg"))
+    dem = bool(grains["shields_dem"].notna().any())
+    kind, ending = "dem" if dem else "closed-form", ": closed form" + " and DEM" * dem
     if len(set(theory.dashes(flat["force_law"]).values())) > theory.MANY:
         colours = {name: theory.look(name)[0] for name in theory.drawn(flat["force_law"])}
         for (ratio,), group in split(flat, "z0_over_d"):
@@ -361,12 +355,15 @@ def singles(results: Results) -> Iterator[Figure]:
             title = f"Force laws on a horizontal bed, z₀ = {written}"
             yield from _diagrams(group, "force_law", colours, f"shields-{written}", title)
     elif len(flat):
-        title = "One grain on a horizontal bed"
-        yield from _diagrams(flat, "beta_deg", colours, "horizontal", title)
+        title = f"One grain on a horizontal bed{ending}"
+        yield from _diagrams(flat, "beta_deg", colours, f"{kind}-horizontal", title)
     colours = style.palette("alpha_deg", results.values("alpha_deg"))
     for (beta,), group in split(grains, "beta_deg"):
         if (group["alpha_deg"] > 0).any():
-            name, title = f"slope-beta{beta:g}", f"One grain on a slope, β = {beta:g}°"
+            name, title = (
+                f"{kind}-slope-beta{beta:g}",
+                f"One grain on a slope, β = {beta:g}°{ending}",
+            )
             yield from _diagrams(group, "alpha_deg", colours, name, title)
 
 
@@ -400,16 +397,13 @@ def _diagrams(
         shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
         for ax, part in zip(sheet.axes, sheet.parts, strict=True):
             draw_published(ax, part, colours if by == "alpha_deg" else None)
-            for _, group in split(part, "alpha_deg", "beta_deg"):
-                for line in theory.lines(group):
-                    label = labels.value("force_law", line.law)
-                    if by_law:
-                        look = theory.look(line.law)
-                    else:
-                        label = "Eqs. 3, 5" if line.law in theory.PAIR else label
-                        colour = "0.2" if piles else colours[group[by].iloc[0]]
-                        look = colour, dashes[line.law]
-                    draw_line(ax, line, f"closed form: {label}", *look)
+            for line in theory.lines(part):
+                label, look = labels.value("force_law", line.law), theory.look(line.law)
+                if not by_law:
+                    label = "Eqs. 3, 5" if line.law in theory.PAIR else label
+                    shade = colours.get(dict(zip(theory.BED, line.bed, strict=True)).get(by), "0.2")
+                    look = shade, dashes[line.law]
+                draw_line(ax, line, f"closed form: {label}", *look)
             here = shown[shown["scene_id"].isin(part["scene_id"])]
             for (value,), group in split(here, by):
                 for _, series in split(group, "nu_m2_s", "force_law", "regime", SHAPE):
@@ -420,15 +414,11 @@ def _diagrams(
                         ax.plot(ordered["reynolds"], ordered["shields"], **thin)
                 draw_points(ax, group, colours[value], columns)
         prepare(sheet, [*theory.span(sheet.rows), *shown["reynolds"]])
-        top = [] if by_law else colour_entries(by, colours, sheet.rows)
-        style.legends(sheet.canvas, top, style.samples(sheet.axes))
-        stem = name.replace("/", "").replace(" ", "") + sheet.name
-        heading, fold = title + sheet.title, bool(sheet.name) or by == "alpha_deg"
-        if by in ("beta_deg", "alpha_deg"):
-            stem = ("dem-" if len(shown) else "closed-form-") + stem
-            heading += ": closed form" + " and DEM" * bool(len(shown))
+        legends(sheet, by, {} if by_law else colours)
+        stem, fold = name.replace("/", "").replace(" ", ""), bool(sheet.name) or by == "alpha_deg"
         text = caption("diagram", by=by, about=about(sheet.rows), answers=about(shown))
-        yield Figure(stem, heading, text, case_names(shown), sheet.canvas, fold=fold)
+        names = stem + sheet.name, title + sheet.title
+        yield Figure(*names, text, case_names(shown), sheet.canvas, fold=fold)
 
 
 def accuracy(results: Results) -> Iterator[Figure]:
@@ -441,24 +431,20 @@ def accuracy(results: Results) -> Iterator[Figure]:
     names = {"value": "ustar_m_s", "low": "ustar_low_m_s", "high": "ustar_high_m_s"}
     rows = dem.assign(**{name: dem[column] / exact for name, column in names.items()})
     choices, rows = parted(rows, *SHOWN, "beta_deg", "load_increment")
-    colours = style.palette("alpha_deg", results.values("alpha_deg"))
+    colours: dict[Any, str] = style.palette("alpha_deg", results.values("alpha_deg"))
     axes = labels.RE_AXIS, r"$u^\star_{DEM}/u^\star_{closed\;form}$"
     keys = ["load_increment", *choices]
     for sheet in sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
         for ax, part in zip(sheet.axes, sheet.parts, strict=True):
             ax.axhline(1, color="0.3", lw=0.8, zorder=1)
             for (alpha,), group in split(part, "alpha_deg"):
-                columns = ("reynolds", "value", "low", "high")
-                draw_points(ax, group, colours[float(str(alpha))], columns)
-            for bars in (line for line in ax.lines if line.get_gid() == "intervals"):
-                bars.set_alpha(0.3)  # of hundreds of points the bars would hide the markers
+                draw_points(ax, group, colours[alpha], ("reynolds", "value", "low", "high"))
             reach = 1.6 * float(np.nanmax(np.abs(part[["value", "low", "high"]] - 1)))
             ax.set(xscale="log", ylim=(1 - reach, 1 + reach))
         for ax in sheet.axes:
             style.plain_ticks(ax.xaxis)
             shade_transition(ax, rows)
-        top = colour_entries("alpha_deg", colours, sheet.rows)
-        style.legends(sheet.canvas, top, style.samples(sheet.axes))
+        legends(sheet, "alpha_deg", colours)
         far, holds = (sheet.rows["value"] - 1).abs(), valid(sheet.rows)
         named = ((holds, "where its law holds"), (~holds, "where it does not"))
         deviations = ", ".join(f"{far[at].max():.2%} {where}" for at, where in named if at.any())

@@ -48,6 +48,8 @@ GRAIN = [
     *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2"),
 ]
 """Columns of all that the closed form depends on, in the order of `SingleGrain`."""
+BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
+"""Columns of all that a line depends on beside its law, in the order of `Bed`."""
 LEAST_CURVES = 2
 """The band for water is drawn only where at least this many curves were published for."""
 BAGNOLD_FROM = 3.5
@@ -174,19 +176,12 @@ class Line:
 
 
 def lines(scenes: pd.DataFrame) -> list[Line]:
-    """The lines through scenes of one slope, one entrainment angle and one z0/d."""
+    """The lines through some scenes, by rising slope, entrainment angle, z0/d and lift."""
     listed = []
-    for lift in scenes["alpha_s"].unique():
-        group = scenes[scenes["alpha_s"] == lift]
+    for key, group in split(scenes[[*GRAIN, "z0_over_d", "force_law"]], *BED):
         for law in drawn(group["force_law"]):
-            listed.append(Line(law, bed_of(group), *span(group[group["force_law"] == law])))
+            listed.append(Line(law, Bed._make(key), *span(group[group["force_law"] == law])))
     return listed
-
-
-def bed_of(scenes: pd.DataFrame) -> Bed:
-    """The bed of scenes that share it."""
-    item = scenes.iloc[0]
-    return Bed(*(float(item[c]) for c in ("alpha_deg", "beta_deg", "z0_over_d", "alpha_s")))
 
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
@@ -249,12 +244,8 @@ def ranked(results: Results) -> list[Line]:
     Equally wide ones go by their factor from the medians. Unverified force laws take no part.
     """
     grains = results.beds("grain")
-    verified = grains["force_law"].map({name: not law.unverified for name, law in LAWS.items()})
-    flat = grains[(grains["alpha_deg"] == 0) & verified.astype(bool)]
-    listed = [
-        Line(str(law), bed_of(group), *span(group))
-        for (law, *_), group in split(flat, "force_law", "beta_deg", "z0_over_d", "alpha_s")
-    ]
+    every = lines(grains[grains["alpha_deg"] == 0])
+    listed = [line for line in every if line.last and not LAWS[line.law].unverified]
     return sorted(listed, key=lambda line: (-round(line.decades, 2), line.median_factor))
 
 
@@ -324,10 +315,9 @@ def _sentences(grains: pd.DataFrame, listed: Sequence[Line]) -> Iterator[str]:
     if above[grid < 1].any():
         start = int(above.argmax())
         ends = [start, start + int((~np.append(above[start:], False)).argmax()) - 1]
-        numbers, begin = [_number(end) for end in grid[ends]], BINS[0].low
-        yield caption(
-            "small_reynolds", ends=numbers, curve=low[ends], law=highest[ends], begin=begin
-        )
+        lowest, law, begin = low[ends], highest[ends], BINS[0].low
+        numbers = [_number(end) for end in grid[ends]]
+        yield caption("small_reynolds", ends=numbers, curve=lowest, law=law, begin=begin)
     # published curves for air over the medians for water at the same Re*
     outside, logs = {"left": np.nan, "right": np.nan}, np.log(MIDDLES)
     air = [np.interp(logs, *np.log(line), **outside) for line in air_lines(grains).values()]

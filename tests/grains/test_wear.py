@@ -99,7 +99,7 @@ def test_a_bed_changes_after_each_part_of_its_grains(results: Results, method: s
     steps, frozen = (bed.read(_pile(results, method, frozen=f), cases) for f in (False, True))
     starts = [step for step, _ in steps.lines]
     assert (starts[0], len(starts)) == (0, 3)
-    assert all(steps.moved(step - 1) < steps.moved(step) for step in starts[1:])
+    assert all(steps.totals[step - 1] < steps.totals[step] for step in starts[1:])
     assert [step for step, _ in bed.data(steps, steps.first(0.5))["lines"]] == starts
     assert "lines" not in bed.data(frozen, 0)
 

@@ -182,7 +182,7 @@ def test_curves_and_points_of_two_layers_are_told_apart(results: Results) -> Non
     for figure in pile_figures(two):
         (ax,) = axes_of(figure)
         lines = marked(ax, *two.scenes["scene_id"], SOLID, HOLLOW)
-        assert {line.get_marker() for line in lines} == {"s", "D"}
+        assert {line.get_marker() for line in lines} == {"o", "s"}
         for layers in ("mobile layers = 1", "mobile layers = 2"):
             assert any(text.endswith(layers) for text in legend_of(figure))
 

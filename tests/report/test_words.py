@@ -51,7 +51,7 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     asked = table.assign(stiffness=1e3, packing=["aligned", "aligned", "horizontal", "aligned"])
     panels, rows = shields.parted(asked.assign(answered_method="dem"), *SHOWN)
     assert panels == ["packing"]
-    assert rows[SHAPE].tolist() == ["s", "D", "s", "s"]
+    assert rows[SHAPE].tolist() == ["o", "s", "o", "o"]
     names = [text.rpartition(", ")[2] for text in rows[LABEL]]
     assert names == ["mobile layers = 1", "mobile layers = 2", *["mobile layers = 1"] * 2]
 
