@@ -8,11 +8,9 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.experiments import budget
-from orchestrator.experiments.budget import BASE, CHOICES
+from orchestrator.experiments.budget import CHOICES
 from orchestrator.fidelity.levels import changed
 from orchestrator.study import study
-from orchestrator.study.closed_form import law_holds
-from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
 SMALL = """
@@ -25,7 +23,7 @@ height = 0.007
 roughness = "d/30"
 packing = "poured"
 """
-OF_LATTICES = "entrainment angle"
+LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "flat"}
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +58,8 @@ def test_an_alternative_changes_one_part_and_is_not_the_scene_itself(
         ("entrainment angle", {"bed.entrainment_angle_deg": 52.0}, {"-5°", "+5°"}),
         ("entrainment angle", {"bed.packing": "poured"}, set()),
         ("exposure", {}, set()),
+        ("first cell", LEVEL, set()),
+        ("friction angle", LEVEL, {"-5°", "+5°"}),
         ("exposure", {"bed.packing": "poured"}, {"protrusion"}),
         ("packing", {"bed.packing": "poured"}, {f"poured, seed {seed}" for seed in (1, 2, 3)}),
     ],
@@ -68,12 +68,6 @@ def test_the_alternatives_are_those_that_a_scene_can_have(
     choice: str, bed: dict[str, object], others: set[str], scene: Scene
 ) -> None:
     assert set(_others(choice, changed(scene, bed))) == others
-
-
-def test_force_laws_are_those_that_hold(scene: Scene) -> None:
-    others = _others("force law", scene)
-    assert others
-    assert all(law_holds(other) and other.forces.law != "low" for other in others.values())
 
 
 def _moved(*changes: tuple[str, str, float], scene: str = "a") -> pd.DataFrame:
@@ -107,7 +101,7 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     experiment = budget.experiment(asked, tmp_path / "out")
     assert not experiment.run(tmp_path / "out", workers=2).failures
     shared = pd.read_csv(tmp_path / "out" / "tables" / "shares.csv")
-    names = {one.name for one in CHOICES} - {OF_LATTICES}
+    names = {one.name for one in CHOICES} - {"entrainment angle"}
     assert set(shared["choice"]) == names
     ends = shared.groupby("choice")[["shields_low", "shields_high"]].max()
     largest = ends.sum(axis=1).to_dict()
@@ -119,18 +113,6 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     page = (tmp_path / "out" / "report.html").read_text()
     assert all(name in page for name in names)
     assert experiment.run(tmp_path / "out", workers=2).started == 0
-
-
-def test_a_flow_that_is_not_solved_has_no_choices_of_its_own() -> None:
-    text = SMALL.replace('"solve"', '"flat"').replace("slope_deg = 25.0", 'shape = "flat"')
-    listed, asked = budget.changes(study.parse(text, name="level", where="level"))
-    assert all(one.scene.flow.model == "flat" for one in asked.values())
-    assert {change.choice.name for change in listed} == {
-        one.name for one in CHOICES if not one.of_solved_flow and one.name != OF_LATTICES
-    }
-    seeds = {one.scene.bed.seed for one in asked.values() if isinstance(one.scene.bed, PileBed)}
-    assert seeds == {0, 1, 2, 3}
-    assert all(change.base.endswith(BASE) for change in listed)
 
 
 def test_a_study_without_piles(tmp_path: Path) -> None:

@@ -13,14 +13,9 @@ MakePile = Callable[..., Scene]
 
 @pytest.fixture(scope="session")
 def pile() -> MakePile:
-    """A pile as it is asked for by DEM on a solved flow, with some fields changed.
-
-    Fields of its bed are keywords; other fields, as a study file names them, are in a dictionary.
-    """
-    text = """
-        grain = { diameter = 1e-3 }
-        bed = { kind = "pile", slope_deg = 15.0, roughness = "d/30" }
-    """
+    """A pile by DEM on a solved flow, with some fields changed; those of its bed are keywords."""
+    bed = 'kind = "pile", slope_deg = 15.0, roughness = "d/30"'
+    text = f"grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}"
     (scene,) = study.parse(text, name="one", where="test").scenes
 
     def make(fields: dict[str, object] | None = None, **bed: object) -> Scene:

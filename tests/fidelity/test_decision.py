@@ -1,19 +1,15 @@
 """The decision how a scene is answered: the levels, what is known of them, and the reason."""
 
 import itertools
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from orchestrator import plan
 from orchestrator.fidelity import decision, levels
-from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision, as_asked
+from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision
 from orchestrator.fidelity.levels import (
-    AS_ASKED,
     FLAT,
     FLOW,
     GRAINS,
@@ -21,12 +17,9 @@ from orchestrator.fidelity.levels import (
     LEVELS,
     Pair,
     floors,
-    level,
     model_class,
 )
-from orchestrator.grains.pile import Pile
 from orchestrator.study import study
-from orchestrator.study.closed_form import closed_form
 from orchestrator.study.scene import Scene
 from tests.fidelity.conftest import MakePile
 
@@ -34,20 +27,8 @@ LEVEL: Mapping[str, Any] = {"packing": "poured", "shape": "flat", "slope_deg": 0
 CHANGING = {"protocol.update": 0.1, "flow.first_cell_height": 5e-4}
 
 
-def decide(scene: Scene, tolerance: float, above: Bound = NO_BOUND) -> Decision:
+def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> Decision:
     return decision.decide([scene], tolerance, {scene.id: above})[scene.id]
-
-
-def time_s(scene: Scene, pair: Pair) -> float:
-    pile = Pile(pair.answer(scene))
-    return sum(run.cost_s for run in (*pile.model.cases, *pile.method.cases))
-
-
-def test_a_looser_tolerance_is_never_dearer(pile: MakePile) -> None:
-    chosen = [decide(pile(), tolerance) for tolerance in np.geomspace(0.03, 0.9, 60)]
-    times = [time_s(pile(), one.levels) for one in chosen if one.levels and "none" not in one.why]
-    assert len(times) > 50
-    assert (np.diff(times) <= 0).all()
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered", "poured"])
@@ -73,42 +54,34 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
     else:
         assert chosen.known.total <= tolerance
         cost = chosen.known
-        for one in known.values():  # none within is cheaper in both parts
-            assert one.total > tolerance or not (
-                one.flow_s < cost.flow_s and one.grains_s < cost.grains_s
-            )
+        within = [one for one in known.values() if one.total <= tolerance]
+        assert all(one.flow_s >= cost.flow_s or one.grains_s >= cost.grains_s for one in within)
 
 
 def test_a_flow_that_many_piles_share_counts_once(
     pile: MakePile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By DEM a pile is dear; by pivots on the best flow it needs that flow, or its nodes."""
-    column = np.ones(4)
-    known = {
+    errors_and_times = {
         ("flow", "coarse", "wall"): (0.04, 1.0),
         ("flow", "fine", "wall"): (0.0, 5.0),
         ("flow", "fine at nodes", "wall"): (0.0, 20.0),
         ("grains", "1 layer, slow", "aligned"): (0.0, 9.0),
         ("grains", "pivot", "aligned"): (0.04, 0.01),
     }
-    made = {
-        key: np.array([error * column, 0 * column, time * column])
-        for key, (error, time) in known.items()
-    }
+    made = {key: np.tile([[e], [0], [s]], 4) for key, (e, s) in errors_and_times.items()}
     monkeypatch.setattr(levels, "measured", lambda: made)
     for module, name in ((levels, "known_of_classes"), (decision, "_good_enough")):
         monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
     scenes = [pile({"grain.diameter": 1e-4}, roughness=z0) for z0 in np.geomspace(4e-6, 3e-5, 9)]
-    names = {
-        count: {
-            one.levels.text for one in decision.decide(scenes[:count], 0.05).values() if one.levels
-        }
-        for count in (1, 9)
-    }
-    assert names == {1: {"fine | pivot"}, 9: {"fine at nodes | pivot"}}
-    (small,) = decision.decide([pile({"grain.diameter": 2e-3})], 0.05).values()
-    assert small.levels
-    assert small.levels.text == "coarse | 1 layer, slow"
+    small = [pile({"grain.diameter": 2e-3})]
+    for asked, text in (
+        (scenes[:1], "fine | pivot"),
+        (scenes, "fine at nodes | pivot"),
+        (small, "coarse | 1 layer, slow"),
+    ):
+        chosen = decision.decide(asked, 0.05).values()
+        assert {one.levels.text for one in chosen if one.levels} == {text}
 
 
 @pytest.mark.parametrize(
@@ -130,46 +103,10 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
     chosen = decide(pile(fields), 0.3)
     assert chosen.is_as_asked
     assert word in chosen.why
-    if word == "lift":
-        lift = closed_form(chosen.scene, "low").lift
-        assert lift > chosen.scene.weight
-        assert chosen.error_estimate is None
 
 
-def test_open_water_is_answered_at_any_tolerance(pile: MakePile) -> None:
-    """With a tolerance of 0.3 a theory was chosen that knows no water."""
-    water = {"flow.top": "open water", "flow.depth": 0.1, "flow.speed": 1.0, "flow.viscosity": 1e-6}
-    chosen = decide(pile(water), 0.3)
-    assert chosen.levels
-    assert chosen.scene.flow.model == "solve"
-    assert plan.of({"a": chosen}).cases
-
-
-@pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
-def test_small_grains_are_never_stiffer_than_a_file_allows(packing: str, pile: MakePile) -> None:
-    for slope_deg in (15.0, 30.0):
-        small = pile({"grain.diameter": 1e-4}, packing=packing, slope_deg=slope_deg)
-        for tolerance in (0.01, 0.05, 0.2):
-            levels = decide(small, tolerance).levels
-            assert levels
-            assert levels.grains is not level("grains", "paper's K, fast")
-
-
-def test_without_a_tolerance_the_error_of_the_own_levels_is_given(pile: MakePile) -> None:
-    fast = level("grains", "1 layer, fast")
-    chosen = decide(fast.answer(pile()), 0)
-    assert chosen.is_as_asked
-    assert chosen.levels == (level("flow", "standard"), fast)
-    on_levels = decision.on_levels(pile(), chosen.levels, "")
-    assert chosen.error_estimate == on_levels.error_estimate
-    assert decide(pile(), 0).levels == (level("flow", "standard"), AS_ASKED)
-
-
-@pytest.mark.parametrize("model", ["flat", "solve"])
-def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(
-    model: str, pile: MakePile
-) -> None:
-    asked = pile({"flow.model": model}, **LEVEL)
+def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(pile: MakePile) -> None:
+    asked = pile({"flow.model": "flat"}, **LEVEL)
     assert levels.classes("flow", asked) == (LEVEL_BED,)
     for tolerance in (0.9, 0.7, 0.1):
         chosen = decide(asked, tolerance)
@@ -205,30 +142,29 @@ def test_a_single_grain_needs_no_levels(slope: float, angle: float, method: str)
     chosen = decide(scene, 0.05)
     assert chosen.scene.protocol.method == method
     assert (chosen.levels, chosen.error_estimate) == (None, None)
-    assert math.isinf(as_asked(scene).known.error)
 
 
-def _asked(bed: str = "", protocol: str = "", diameter: float = 1e-3) -> study.Study:
+def _asked(bed: str = "", protocol: str = "", diameter: float = 1e-3) -> Scene:
     text = f"""
         grain = {{ diameter = {diameter} }}
         bed = {{ kind = "pile", slope_deg = 15.0{bed} }}
         protocol = {{ {protocol} }}
     """
-    return study.parse(text, name="own", where="own")
+    (scene,) = study.parse(text, name="own", where="own").scenes
+    return scene
 
 
 @pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
 @pytest.mark.parametrize("diameter", [2e-4, 1e-3])
 def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: float) -> None:
-    (scene,) = _asked(f', packing = "{packing}"', diameter=diameter).scenes
-    (chosen,) = decision.decide([scene], None).values()
+    scene = _asked(f', packing = "{packing}", height = 0.01', "fractions = [0.3]", diameter)
+    chosen = decide(scene, None)
     assert chosen.by_default
     assert chosen.scene.protocol.method != "dem"
     assert chosen.scene.flow.model == "solve"
     assert chosen.known.total <= min(floors().values()) <= floors()[model_class(scene)]
     assert chosen.levels
-    above = {scene.id: Bound(*chosen.levels, "a run failed")}
-    (again,) = decision.decide([scene], None, above).values()
+    again = decide(scene, None, Bound(*chosen.levels, "a run failed"))
     assert again.known.cost_core_s > chosen.known.cost_core_s
     assert "a run failed" in again.why
 
@@ -245,14 +181,6 @@ def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: f
     ],
 )
 def test_what_a_file_says_stays(bed: str, protocol: str, tolerance: float | None) -> None:
-    asked = replace(_asked(bed, protocol), tolerance=tolerance)
-    (chosen,) = plan.make(asked).decisions.values()
+    chosen = decide(_asked(bed, protocol), tolerance)
     assert chosen.is_as_asked
     assert not chosen.by_default
-    assert chosen.scene.protocol.method == "dem"
-
-
-def test_what_is_asked_of_nature_does_not_count_as_said() -> None:
-    asked = _asked(", height = 0.01", "fractions = [0.3]")
-    (chosen,) = plan.make(asked).decisions.values()
-    assert chosen.by_default
