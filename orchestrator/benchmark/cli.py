@@ -40,8 +40,7 @@ def add(commands: Any) -> None:
     command = part("compare", _judge, "the same for answers that are there already")
     text = "holds SCENE/answer.csv; its name is the solver's"
     command.add_argument("results", type=Path, nargs="+", metavar="RESULTS", help=text)
-    text = "directory of the page; default: the only RESULTS, if run wrote them, or"
-    text += " results/benchmark-NAME of the pack"
+    text = "default: the only RESULTS, if run wrote them, or results/benchmark-NAME of the pack"
     command.add_argument("--out", type=Path, metavar="DIR", help=text)
 
 

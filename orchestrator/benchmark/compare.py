@@ -31,14 +31,9 @@ TIMES = ["seconds", "cpu_s", "peak_mib"]
 MIB = 2**20
 ANSWER_BYTES, LOG_BYTES, FILE_BYTES = 4 * MIB, 64 * MIB, 4096 * MIB
 """Largest answer, largest output, and largest file of a solver, bytes."""
-ROUND = 1e-8
-"""Relative rounding of a pack's tables."""
-LISTED = 10
-"""Number of failures that the terminal lists."""
-NAMES = ("closed form", "contact and one grain", "flow", "grains of a pile", "flow and grains")
-"""Names of the levels, 1 to 5."""
-OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")
-"""Words that are operators of a shell."""
+ROUND = 1e-8  # relative rounding of a pack's tables
+LISTED = 10  # failures on the terminal
+OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")  # of a shell
 MEASURE = """
 import json, resource, subprocess, sys, time
 report, memory, *command = sys.argv[1:]
@@ -137,8 +132,6 @@ def _place(out: Path | None, chosen: Pack) -> Path:
     out = out or Path("results") / f"benchmark-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
-    if out.name == OURS:
-        raise InputError("two solvers have the name ours", str(out), "use --out")
     return out.absolute()
 
 
@@ -183,18 +176,17 @@ def _solve(words: Sequence[str], scene: Path, options: Options, folder: Folder, 
             output_limit=LOG_BYTES,
             file_limit=FILE_BYTES,
         )
-        over = {
-            "time": f"it did not end within {options.seconds:g} s and was killed",
-            "output": f"it printed more than {LOG_BYTES // MIB} MiB",
-        }
-        printed = process.last_words(log)
-        error = over.get(ended.over) or f"it ended with {ended.returncode}: {printed}".rstrip(": ")
+        error = f"it ended with {ended.returncode}: {process.last_words(log)}".rstrip(": ")
+        if ended.over == "time":
+            error = f"it did not end within {options.seconds:g} s and was killed"
+        elif ended.over:
+            error = f"it printed more than {LOG_BYTES // MIB} MiB"
         folder.path(f"{name}/{ANSWER}").unlink(missing_ok=True)
         with contextlib.suppress(OSError), opened(out) as stream:
             folder.note(f"{name}/{ANSWER}", stream.read(ANSWER_BYTES + 1))
-        used = {"seconds": ended.seconds, **(read_json(report) or {})}
-        fails = ended.over or ended.returncode
-        folder.note(f"{name}/{USED}", text_of({**used, "error": error if fails else ""}))
+        used = read_json(report) or {"seconds": ended.seconds}
+        used["error"] = error if ended.over or ended.returncode else ""
+        folder.note(f"{name}/{USED}", text_of(used))
         with log.open("rb") as stream:
             folder.note(f"{name}/{LOG}", stream.read(LOG_BYTES))
 
@@ -262,15 +254,9 @@ def judge(
     """Compare the answers of solvers with the expected ones.
 
     For each solver `results` has the directory with its ``SCENE/answer.csv``, and with
-    ``ours/SCENE/answer.csv`` if ours ran in turn with it.
-
-    Returns
-    -------
-    numbers : DataFrame
-        A row for each solver, `OURS` the last, and each expectation: ``solver``, the columns of the
-        expected answers, ``answer``, ``error`` (relative) and ``within``.
-    verdicts : DataFrame
-        A row for each solver and scene: ``passed``, ``message``, errors and times.
+    ``ours/SCENE/answer.csv`` if ours ran in turn with it. The first table has a row for each
+    solver, `OURS` the last, and each expectation: ``answer``, ``error`` (relative), ``within``; the
+    second one for each solver and scene: ``passed``, ``message``, errors and times.
     """
     expected = chosen.expected[chosen.expected["scene"].isin(names)]
     parts = (expected["scene"], expected["quantity"], expected["at"].map(place_of))
@@ -296,12 +282,10 @@ def judge(
             for name, rows in ((str(name), rows) for name, rows in table.groupby("scene"))
         }
         off = {name: _off(rows) for name, rows in judged[~judged["within"]].groupby("scene")}
-        heads = [
-            (solver, name, given["level"], given["kind"], faults[name] or off.get(name, ""))
-            for name, given in ((name, chosen.scenes[name]) for name in names)
-        ]
-        columns = ["solver", "scene", "level", "kind", "message"]
-        verdict = pd.DataFrame(heads, index=list(names), columns=columns)
+        messages = {name: faults[name] or off.get(name, "") for name in names}
+        heads = {"solver": solver, "scene": list(names)}
+        heads |= {key: [chosen.scenes[name][key] for name in names] for key in ("level", "kind")}
+        verdict = pd.DataFrame({**heads, "message": messages}, index=list(names))
         verdict = verdict.join(used.drop(columns="message"))
         verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
         answered = pd.Series({name: not faults[name] for name in names})
@@ -368,7 +352,6 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     }
     groups = verdicts.groupby(["level", "kind", "solver"], sort=False)
     table = groups.agg(**columns).reset_index()
-    table["level"] = [f"{level} {NAMES[level - 1]}" for level in table["level"]]
     percent = [name for name in columns if name.endswith("%")]
     return table.assign(**(100 * table[percent]))
 

@@ -4,7 +4,7 @@ import re
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ from orchestrator.benchmark.pack import KINDS, STUDY, Pack, Problem
 from orchestrator.errors import InputError, SolverError
 from orchestrator.plan import Plan
 from orchestrator.runs import case, engine, process
-from orchestrator.runs.case import Case
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
 from orchestrator.study import fields, study
@@ -31,8 +30,7 @@ FORMULAS = (1, 2)
 """Levels that need no finished study."""
 DEFAULT = "first-look"
 """The study whose single grains are exported if none is named."""
-LIMIT_S = 3600.0
-"""Time limit of our own runs, s."""
+LIMIT_S = 3600.0  # of our own runs
 CHECKS = ("collision", "incline", "sliding", "passing")
 """Kinds that have a deck of their own: they need no scene of the study."""
 PRINTED = {
@@ -44,25 +42,19 @@ PRINTED = {
     "time of passing": ("passing_time_over_t", ""),
 }
 """What the check decks print, and the quantities of a pack."""
-NAMED: dict[str, Callable[[Any], str]] = {
-    "alpha_deg": "{:g}deg".format,
-    "beta_deg": "beta{:g}".format,
-    "h_m": lambda h: f"h{1e3 * h:g}mm",
-    "d_m": lambda d: f"d{1e3 * d:g}mm",
-    "z0_over_d": "z{:.3g}d".format,
-    "nu_m2_s": "nu{:g}".format,
-    **dict.fromkeys(("packing", "force_law", "stress"), str),
-    "seed": "seed{:g}".format,
+NAMED = {
+    **{"alpha_deg": "{:g}deg", "beta_deg": "beta{:g}", "h_m": "h{:g}mm", "d_m": "d{:g}mm"},
+    **{"z0_over_d": "z{:.3g}d", "nu_m2_s": "nu{:g}", "packing": "{}", "force_law": "{}"},
+    **{"stress": "{}", "seed": "seed{:g}"},
 }
-"""Columns that name a scene where they differ between the scenes of a study."""
+"""Columns that name a scene where they differ between the scenes of a study; of lengths in mm."""
 
 
 def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     """Write a pack, and return how many scenes it has.
 
     `source` is the directory of a finished study; without one the answers are formulas, of levels
-    1 and 2 alone. Raises InputError if a level needs a study, or the study is not finished, not
-    answered as it asks, or asks for beds that change or lie in space.
+    1 and 2 alone. Raises InputError if a level needs a study, or a pack cannot hold this one.
     """
     levels = levels or (FORMULAS if source is None else {*KINDS.values()})
     kinds = [name for name, level in KINDS.items() if level in levels]
@@ -71,7 +63,8 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
             what = f"level {lacking[0]} needs the answers of a finished study"
             raise InputError(what, where="--level", remedy="name its directory with --from")
         asked = study.load(DEFAULT)
-        programs = {"liggghts": liggghts.version()} if 2 in levels and _has_decks() else {}
+        has_decks = 2 in levels and shutil.which(liggghts.PROGRAM) is not None
+        programs = {"liggghts": liggghts.version()} if has_decks else {}
         listed = problems(asked, plan.make(asked), {}, Path(), kinds)
         return pack.write(root, listed, (asked.name, asked.text), programs)
     space = Workspace(source.absolute())
@@ -109,7 +102,8 @@ def problems(
     The study's tables are `results`, empty for formulas alone, and its runs lie in `cases`.
     """
     if "collision" in kinds:
-        yield from map(_with_ours, scenes.checks())
+        has_decks = shutil.which(liggghts.PROGRAM) is not None
+        yield from map(_with_ours, scenes.checks()) if has_decks else scenes.checks()
     names, piles = scene_names(planned, asked), planned.piles
     cell_of = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
     thresholds = results.get("single_grain")
@@ -151,22 +145,18 @@ def scene_names(planned: Plan, asked: Study) -> dict[str, str]:
         if kind == "flow":
             columns = [name for name in columns if name in of_flow]
         counts: Counter[str] = Counter()
-        for digest, row in values.iterrows():
-            words = [NAMED[column](row[column]) for column in columns if pd.notna(row[column])]
+        for length in {"h_m", "d_m"} & {*columns}:
+            values[length] *= 1e3
+        for digest, row in values[columns].iterrows():
+            words = [NAMED[str(column)].format(x) for column, x in row.items() if pd.notna(x)]
             name = re.sub("[^a-z0-9.+]+", "-", "-".join([kind, *words]).lower())
             counts[name] += 1
             names[str(digest)] = name if counts[name] == 1 else f"{name}-{counts[name]}"
     return names
 
 
-def _has_decks() -> bool:
-    return shutil.which(liggghts.PROGRAM) is not None
-
-
 def _with_ours(check: Problem) -> Problem:
-    """A check of the contact law with the answer of our deck, if LIGGGHTS is installed."""
-    if not _has_decks():
-        return check
+    """A check of the contact law with the answer of our deck."""
     with tempfile.TemporaryDirectory() as folder:
         answer, times = run_check(check.kind, check.parameters, Path(folder) / "deck")
     ours = answer.set_index(["quantity", "at"])["value"]
@@ -182,10 +172,7 @@ class Ours:
 
     def __init__(self, chosen: Pack, names: Sequence[str], root: Path) -> None:
         path = chosen.root / STUDY
-        try:
-            text = path.read_text(encoding="utf-8")
-        except ValueError as error:
-            raise InputError(f"it cannot be read: {error}", where=str(path)) from None
+        text = path.read_text(encoding="utf-8", errors="replace")
         self.pack, self.root = chosen, root
         self.study = study.parse(text, name="benchmark", where=str(path))
         if self.study.text != text:
@@ -209,11 +196,10 @@ class Ours:
         group = Group("benchmark", (self.scenes[name[2:]],), str(self.pack.root / STUDY))
         asked = replace(self.study, groups=(group,))
         planned = plan.make(asked, cases=self.root)
-        runs: Sequence[Case] = [*planned.cases.values()]
-        flows = [run for run in runs if run.kind == "flow"]
-        runs = {"closed-form": [], "flow": flows}.get(given["kind"], runs)
-        for run in runs:  # several scenes share a flow, a poured bed or a pile
-            if not case.done_state(run, self.root):
+        kinds = {"closed-form": (), "flow": ("flow",)}.get(given["kind"])
+        for run in planned.cases.values():  # several scenes share a flow, a poured bed or a pile
+            is_asked = kinds is None or run.kind in kinds
+            if is_asked and not case.done_state(run, self.root):
                 engine.execute(run, self.root, LIMIT_S)
         states = planned.done(self.root)
         results = tables.make(asked, planned, self.root, states) if states else {}
@@ -223,17 +209,14 @@ class Ours:
             steps = pd.read_csv(self.root / problem.runs[0] / "samples.csv")["step"].iloc[-1]
             row = pd.DataFrame({"quantity": ["steps"], "at": [""], "value": [float(steps)]})
             answer = pd.concat([answer, row])
-        sums = {"seconds": "solver_s", "cpu_s": "cpu_s"} if problem.runs else {}
-        return answer, {
-            name: sum(states[run][key] for run in problem.runs) for name, key in sums.items()
-        }
+        pairs = (("seconds", "solver_s"), ("cpu_s", "cpu_s")) if problem.runs else ()
+        return answer, {name: sum(states[run][key] for run in problem.runs) for name, key in pairs}
 
 
 def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.DataFrame, Times]:
-    """Run one of the decks for the contact law, a kind of `CHECKS`, with the entries of its scene.
+    """Run the deck of a kind of `CHECKS` with the entries of a scene, in a folder that is emptied.
 
-    It runs in a folder, whose content is removed. Raises SolverError if it does not come to its
-    end.
+    Raises SolverError if it does not come to its end.
     """
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(case.templates() / "liggghts", folder)
@@ -248,8 +231,7 @@ def run_check(kind: str, given: Mapping[str, Any], folder: Path) -> tuple[pd.Dat
         names = ("displacement_criterion", "stiffness")
         variables |= {"push": float(push), **{name: given[name] for name in names}}
     command = ["stdbuf", "-o0", "liggghts", "-in", f"in.{kind}", "-nocite", "-log", "none"]
-    for name, value in variables.items():
-        command += ["-var", name, repr(value)]
+    command += [word for name, x in variables.items() for word in ("-var", name, repr(x))]
     work, log = folder / "checks", folder / "log.check"
     ended = process.run(command, cwd=work, log=log, limit_s=LIMIT_S, env=liggghts.ENVIRONMENT)
     printed = log.read_text(errors="replace")

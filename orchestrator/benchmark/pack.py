@@ -33,8 +33,7 @@ COLUMNS = ["quantity", "at", "value", "low", "high", "tolerance", "ours"]
 """Columns of the expected answers beside the scene's name."""
 COUNTS = ("moved", "not_moved", "carried_off")
 """Quantities that count grains."""
-NUMBER = "%.9g"
-"""Format of the numbers in all tables of a pack."""
+NUMBER = "%.9g"  # format of the numbers in all tables
 KINDS = {
     **{"closed-form": 1, "collision": 2, "incline": 2, "sliding": 2, "passing": 2, "pivot": 2},
     **{"flow": 3, "pile": 4, "line": 5},
@@ -211,12 +210,11 @@ def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
 def write(
     root: Path, problems: Iterable[Problem], study: tuple[str, str], programs: Mapping[str, str]
 ) -> int:
-    """Write a pack, in place of one that is there, and return how many scenes it has.
+    """Write a pack, in place of one of the same study, and return how many scenes it has.
 
-    Scenes of which no number is judged are left out. `root` is new, empty, or the directory of a
-    pack of the same study. `study` are the name and the text of the study file; `programs` gave
-    the expected answers, with their versions. Raises InputError if the directory holds something
-    else.
+    Scenes of which no number is judged are left out. `study` are the name and the text of the study
+    file; `programs` gave the expected answers, with their versions. Raises InputError if the
+    directory holds something else.
     """
     name, text = study
     with workspace.claimed(root, workspace.PACK, name) as folder:

@@ -19,31 +19,24 @@ from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
 
-FLOOR = 1e-6
-"""Least error of a logarithmic axis: exact formulas and reruns have less."""
-EXPECTED = "0.25"
-"""Colour of the expected answer, and of ours."""
+FLOOR, EXPECTED = 1e-6, "0.25"
+"""Least error of a logarithmic axis; colour of the expected answer, and of ours."""
 MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
 """Markers of the levels."""
 LIMITS = (
     "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs.",
-    "The intervals hold the step between two load steps, the count’s resolution and the scatter "
-    "over packings where it was run; they do not hold the error of the flow model.",
+    "The intervals hold a load step, the resolution of the count and the scatter over packings "
+    "where it was run; they do not hold the error of the flow model.",
     "Scenes of less than a second are mostly start-up of the programs.",
 )
-ERRORS = (
-    "Errors are relative, over the judged numbers of a scene; the bias is their median with its "
-    "sign. Time and CPU time are the solver’s over ours, which ran in turn with it, the median of "
-    "the scenes. Every number is in comparison.csv beside this page, every scene in verdicts.csv."
-)
-THRESHOLDS = (
-    "Threshold Shields numbers, ours and each solver’s. One with a * is outside the interval of "
-    "the expected answer, one with ** also beyond its tolerance: it fails."
-)
-COSTS = (
-    "CPU time of each pile under the given stress, s and over ours. Where a solver states its time "
-    "steps, M/s is millions of them a second of CPU time, times the mobile grains."
-)
+ERRORS = """Errors are relative, over the judged numbers of a scene; the bias is their median with
+its sign. Times are the solver’s over ours, which ran in turn with it, the median of the scenes.
+Every number is in comparison.csv beside this page, every scene in verdicts.csv. The programs below
+gave the expected answers."""
+THRESHOLDS = """Threshold Shields numbers. One with a * is outside the interval of the expected
+answer, one with ** also beyond its tolerance: it fails."""
+COSTS = """CPU time of each pile under the given stress, s and over ours. Where a solver states its
+time steps, M/s is millions of them a second of CPU time, times the mobile grains."""
 SHOWN = {
     **{name: name for name in ("solver", "scene", "kind", "passed")},
     **{"error": "error, %", "worst": "largest, %", "seconds": "s", "ours_seconds": "ours, s"},
@@ -67,12 +60,7 @@ RE = r"$Re^\star = u^\star d/\nu$"
 def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
     """Put the page and its figures into a directory; the tables are those of `compare.judge`."""
     theirs = verdicts[verdicts["solver"] != OURS]
-    machine, names = chosen.manifest.machine, theirs["solver"].unique().tolist()
-    where = f" on {machine['processor']} with {machine['cores']} cores" if machine else ""
-    text = (
-        f"{theirs['passed'].sum()} of {len(theirs)} scenes passed. The pack was exported"
-        f"{where}; the programs below gave its expected answers.\n\n{ERRORS}"
-    )
+    text = f"{theirs['passed'].sum()} of {len(theirs)} scenes passed.\n\n{ERRORS}"
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
     with style.settings(), warnings.catch_warnings():
@@ -88,7 +76,8 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
             Section("Time and error", COSTS, _speed(verdicts), (costs(chosen, verdicts),)),
             Section("Scenes", tables=(scenes.rename(columns=SHOWN),)),
         ]
-        title = f"Against the pack “{printable(chosen.root.name)}”: {', '.join(names)}"
+        names = ", ".join(theirs["solver"].unique())
+        title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
         shown = [part for part in sections if part.figures or any(map(len, part.tables))]
         page.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
 
@@ -168,10 +157,7 @@ def _panels(
         ax.set_title(scene, size=6.5)
         ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
-    caption = (
-        f"{len(drawn)} of {len(scenes)} scenes. The line and its band are the expected answer and"
-        " its interval, the rings are the solvers’."
-    )
+    caption = f"{len(drawn)} of {len(scenes)} scenes: expected answers, and rings of the solvers."
     return Figure(name, title, caption, (), canvas)
 
 
@@ -220,8 +206,7 @@ def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
     _legends(canvas, looks, timed["level"].unique())
     caption = (
-        "Each point is a scene: CPU time, and largest relative error of its judged numbers; ours is"
-        f" filled. Errors below {FLOOR:g} are drawn there: at levels 3 to 5 the expected answer is"
-        " our own run."
+        "Each point is a scene: CPU time, and largest error of its judged numbers; ours is filled. "
+        f"Errors below {FLOOR:g} are drawn there: at levels 3 to 5 our own run is expected."
     )
     return [Figure("speed-accuracy", "Speed and accuracy", caption, (), canvas)]

@@ -1,6 +1,6 @@
 """The scenes of a pack: levels 1 and 2 are formulas, levels 3 to 5 the results of a study."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,26 +49,19 @@ STIFFNESS, PASSING_STIFFNESS = 1e4, 1e5
 """K d/W of the check decks' grain; springs of 1e4 would start the one that passes 1 % early."""
 UNIT = float(np.sqrt(DIAMETER * GRAVITY))
 """sqrt(d g') of the check decks' grain, m/s."""
-LEAST_QUIET = 5.0
-"""Load steps shorter than this, sqrt(d/g'), are ramps: their threshold is not the closed form's."""
-_GRAIN = (
-    *("rho_f_kg_m3", "nu_m2_s", "g_m_s2", "d_m", "rho_sol_kg_m3", "alpha_deg", "beta_deg", "z0_m"),
-    *("force_law", "alpha_s", "regime", "mass_kg", "reduced_gravity_m_s2", "weight_n"),
-)
-_DEM = (
-    *("phi_deg", "stiffness", "damping", "spring_n_m", "time_unit_s", "time_step"),
-    *("displacement_criterion", "waiting_time", "load_increment"),
-)
-_BED = ("h_m", "packing", "disorder", "seed", "flow_model", "stress", "update", "final_fraction")
-_FLOW = (
-    *("mobile_layers", "averaging_length", "loaded_grains", "solve_z0_m", "solve_nu_m2_s"),
-    *("first_cell_m", "cells_per_face", "turbulence_model"),
-)
-ENTRIES: Mapping[str, Sequence[str]] = {
-    "closed-form": (*_GRAIN, "relative_size"),
-    "pivot": (*_GRAIN, "relative_size", *_DEM),
-    "pile": (*_GRAIN, *_DEM, *_BED),
-    "line": (*_GRAIN, *_DEM, *_BED, *_FLOW),
+LEAST_QUIET = 5.0  # load steps shorter than this, sqrt(d/g'), are ramps with other thresholds
+_GRAIN = """rho_f_kg_m3 nu_m2_s g_m_s2 d_m rho_sol_kg_m3 alpha_deg beta_deg z0_m force_law alpha_s
+regime mass_kg reduced_gravity_m_s2 weight_n"""
+_DEM = """phi_deg stiffness damping spring_n_m time_unit_s time_step displacement_criterion
+waiting_time load_increment"""
+_BED = "h_m packing disorder seed flow_model stress update final_fraction"
+_FLOW = """mobile_layers averaging_length loaded_grains solve_z0_m solve_nu_m2_s first_cell_m
+cells_per_face turbulence_model"""
+ENTRIES = {
+    "closed-form": f"{_GRAIN} relative_size",
+    "pivot": f"{_GRAIN} relative_size {_DEM}",
+    "pile": f"{_GRAIN} {_DEM} {_BED}",
+    "line": f"{_GRAIN} {_DEM} {_BED} {_FLOW}",
 }
 """Entries of the kinds whose scenes are those of a study: what has an effect on the answer."""
 
@@ -78,7 +71,7 @@ def parameters(scene: Scene, kind: str) -> Row:
     g, weight = scene.reduced_gravity, scene.weight
     grain = mechanics(scene.grain.diameter, scene.grain.density, g, weight, scene.grain.stiffness)
     values = fields.used(scene) | grain
-    return {key: values[key] for key in ENTRIES[kind] if values.get(key) is not None}
+    return {key: values[key] for key in ENTRIES[kind].split() if values.get(key) is not None}
 
 
 def mechanics(d: float, density: float, gravity: float, weight: float, stiffness: float) -> Row:
