@@ -28,8 +28,6 @@ Times = dict[str, float]
 """Wall time and processor time of runs, s, ``seconds`` and ``cpu_s``; empty for formulas."""
 FORMULAS = (1, 2)
 """Levels that need no finished study."""
-DEFAULT = "first-look"
-"""The study whose single grains are exported if none is named."""
 LIMIT_S = 3600.0  # of our own runs
 CHECKS = ("collision", "incline", "sliding", "passing")
 """Kinds that have a deck of their own: they need no scene of the study."""
@@ -62,7 +60,7 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
         if lacking := sorted({*levels} - {*FORMULAS}):
             what = f"level {lacking[0]} needs the answers of a finished study"
             raise InputError(what, where="--level", remedy="name its directory with --from")
-        asked = study.load(DEFAULT)
+        asked = study.load("first-look")
         has_decks = 2 in levels and shutil.which(liggghts.PROGRAM) is not None
         programs = {"liggghts": liggghts.version()} if has_decks else {}
         listed = problems(asked, plan.make(asked), {}, Path(), kinds)

@@ -39,8 +39,7 @@ KINDS = {
     **{"flow": 3, "pile": 4, "line": 5},
 }
 """Kinds of scenes, and the level of each."""
-_NAME, _MEMBER = r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*", r"[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)"
-_IN_SCENES = re.compile(f"{_NAME}/{_MEMBER}")
+_IN_SCENES = re.compile(r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)")
 
 
 class Manifest(BaseModel):

@@ -21,8 +21,7 @@ from orchestrator.runs.files import Folder
 
 FLOOR, EXPECTED = 1e-6, "0.25"
 """Least error of a logarithmic axis; colour of the expected answer, and of ours."""
-MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}
-"""Markers of the levels."""
+MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}  # of the levels
 LIMITS = (
     "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs.",
     "The intervals hold a load step, the resolution of the count and the scatter over packings "
@@ -54,7 +53,6 @@ AXES: dict[str, tuple[str, str, Look]] = {
     "moved": ("load step", "n/N", {"ylim": (0, 1)}),
 }
 """Labels of a quantity's axes, and their limits."""
-RE = r"$Re^\star = u^\star d/\nu$"
 
 
 def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
@@ -183,7 +181,8 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     groups: Any = table[table["solver"] != OURS].groupby(["solver", "level"])
     for (solver, level), rows in groups:
         ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
-    ax.set(xscale="log", yscale="log", xlabel=RE, ylabel="Shields number")
+    ax.set(xscale="log", yscale="log", ylabel="Shields number")
+    ax.set_xlabel(r"$Re^\star = u^\star d/\nu$")
     ax.set_xlim(x.min() / 3, x.max() * 3)
     ax.set_ylim(max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
     samples = {"curves for water": WATER, "expected, interval": EXPECTED}

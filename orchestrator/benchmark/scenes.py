@@ -92,9 +92,9 @@ def closed_form(name: str, scene: Scene) -> Problem:
     drag, lift = forces(scene)
     rows = [expectation("drag_n", float(drag(u)), FORMULA, u) for u in flows]
     rows += [expectation("lift_n", float(lift(u)), FORMULA, u) for u in flows]
-    rows += [expectation("ustar_m_s", float(exact.friction_velocity), FORMULA)]
-    rows += [expectation("reynolds", float(exact.reynolds), FORMULA)]
-    rows += [expectation("shields", float(exact.shields), FORMULA)]
+    ends = {"ustar_m_s": exact.friction_velocity, "reynolds": exact.reynolds}
+    ends["shields"] = exact.shields
+    rows += [expectation(quantity, float(value), FORMULA) for quantity, value in ends.items()]
     return Problem(name, "closed-form", parameters(scene, "closed-form"), {}, rows)
 
 

@@ -3,6 +3,7 @@
 import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -68,46 +69,29 @@ model = "hill"
 """A poured hump of grains of many sizes."""
 
 
-def _pack(shared: Shared, name: str, text: str = "", levels: tuple[int, ...] = ()) -> Path:
-    """A pack of a study, which lies beside it; without a text one of formulas."""
-    with shared(f"pack-{name}") as folder:
-        root, source = folder / "pack", folder / "study" if text else None
-        if not (root / "manifest.json").exists():
-            if source:
-                asked = study.parse(text, name=name, where=name)
-                assert not pipeline.run(asked, source, workers=2).failures
-            export(root, source, levels)
-        return root
+def _pack(name: str, text: str = "", levels: tuple[int, ...] = ()) -> Any:
+    """The fixture of a pack of a study, which lies beside it; without a text one of formulas."""
+
+    @pytest.fixture(scope="session", name=name)
+    def packed(shared: Shared) -> Path:
+        with shared(f"pack-{name}") as folder:
+            root, source = folder / "pack", folder / "study" if text else None
+            if not (root / "manifest.json").exists():
+                if source:
+                    asked = study.parse(text, name=name, where=name)
+                    assert not pipeline.run(asked, source, workers=2).failures
+                export(root, source, levels)
+            return root
+
+    return packed
 
 
-@pytest.fixture(scope="session")
-def formulas(shared: Shared) -> Path:
-    """A pack of levels 1 and 2."""
-    return _pack(shared, "formulas")
-
-
-@pytest.fixture(scope="session")
-def all_levels(shared: Shared) -> Path:
-    """A pack of all levels."""
-    return _pack(shared, "small", SMALL)
-
-
-@pytest.fixture(scope="session")
-def lift_off(shared: Shared) -> Path:
-    """A pack of one pile whose grains lift carries off: Eq. 2 far above its range."""
-    return _pack(shared, "lift-off", THEORY % ("low", "mobile_layers = 1"), (4,))
-
-
-@pytest.fixture(scope="session")
-def poured(shared: Shared) -> Path:
-    """A pack of one poured bed."""
-    return _pack(shared, "poured", POURED, (4,))
-
-
-@pytest.fixture(scope="session")
-def level_rows(shared: Shared) -> Path:
-    """A pack of one pile of level rows, which empties in chains."""
-    return _pack(shared, "level-rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
+formulas = _pack("formulas")
+all_levels = _pack("all_levels", SMALL)
+poured = _pack("poured", POURED, (4,))
+# Eq. 2 far above its range: grains that lift carries off; and level rows, which empty in chains
+lift_off = _pack("lift_off", THEORY % ("low", "mobile_layers = 1"), (4,))
+level_rows = _pack("level_rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
 
 
 SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=2**29)
@@ -116,6 +100,7 @@ RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{o
 HEAD = """
 import math, os, sys, time
 from pathlib import Path
+from typing import Any
 sys.path.insert(0, {native!r})
 import solver
 case, out = map(Path, sys.argv[1:])

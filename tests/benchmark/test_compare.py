@@ -4,9 +4,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pandas as pd
@@ -16,7 +13,7 @@ from orchestrator.benchmark import compare, pack, page
 from orchestrator.benchmark.compare import Options, split
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import workspace
-from tests.benchmark.conftest import AFTER, RIGHT, ROOT, SCENE, TAIL, program, run, verdicts_in
+from tests.benchmark.conftest import AFTER, RIGHT, SCENE, TAIL, program, run, verdicts_in
 from tests.conftest import Command
 from tests.report.test_page import Page
 
@@ -119,40 +116,12 @@ def test_a_solver_gets_its_scene_alone_and_its_use_is_measured(
         ("no-such-solver {case} {out}", "no program no-such-solver"),
         ("'open {case} {out}", "cannot be read"),
         ("true {case} {out} >log.txt", "no shell reads the command: >log.txt"),
-        ("true {case} {out} && true", "sh -c"),
-        ("true {case} {out}; true", "no shell"),
+        ("true {case} {out}; true", "sh -c"),
     ],
 )
 def test_a_command_that_cannot_work(command: str, words: str) -> None:
     with pytest.raises(InputError, match=re.escape(words)):
         split(command)
-
-
-def _running(text: str) -> bool:
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            if text in (folder / "cmdline").read_text(errors="replace"):
-                return True
-        except OSError:
-            continue
-    return False
-
-
-def test_a_killed_run_leaves_nothing_at_work(formulas: Path, tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "orchestrator", "benchmark", "run", str(formulas)]
-    driver = subprocess.Popen(
-        [*words, "--solver", program(tmp_path, "time.sleep(100)"), "--scene", *SCENE.patterns],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stderr=subprocess.DEVNULL,
-    )
-    path, end = f"{tmp_path / 'my solver.py'}\0/", time.monotonic() + 120
-    for is_at_work in (True, False):
-        while _running(path) != is_at_work and time.monotonic() < end:
-            time.sleep(0.05)
-        assert _running(path) == is_at_work
-        driver.kill()
-        driver.wait()
 
 
 @pytest.mark.parametrize("packed", ["all_levels", "poured"])
@@ -201,10 +170,6 @@ def test_two_solvers_on_one_page(
     assert "wrong_one over ours" in parsed.texts["th"]
     figures = {path.stem for path in (both / "figures").glob("*.png")}
     assert figures == {"moved", "shields", "speed-accuracy"}
-    for name in ("comparison.csv", "verdicts.csv"):
-        table = pd.read_csv(both / name)
-        assert table["solver"].unique().tolist() == ["right", "wrong_one"]
-        assert table.groupby("solver").size().nunique() == 1
     # alone a solver is not named, and the page lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
     assert outcome.failures[0].startswith("4-")
@@ -217,11 +182,8 @@ def test_tables_of_thresholds_and_costs(all_levels: Path, right: Path, wrong: Pa
     table = page.thresholds(numbers)
     names = ["scene", "n/N", "ours", "right", "wrong_one", "interval"]
     assert table.columns.tolist() == names
-    assert not table["ours"].str.contains("*", regex=False).any()
     assert not table["right"].str.contains("**", regex=False).any()
     assert table["wrong_one"].str.endswith(" **").all()
-    right_ones, wrong_ones = (table[s].str.split().str[0].astype(float) for s in names[3:5])
-    assert (wrong_ones / right_ones).to_list() == pytest.approx([HIGH] * len(table), rel=0.02)
     (row,) = page.costs(chosen, verdicts).to_dict("records")
     kinds = pd.read_csv(all_levels / "scenes" / row["scene"] / "grains.csv")["kind"]
     mobile = kinds.isin(["mobile", "counted", "pushed"]).sum()
@@ -235,19 +197,6 @@ def test_tables_of_thresholds_and_costs(all_levels: Path, right: Path, wrong: Pa
     assert ours["steps"] > 1000
 
 
-def test_results_that_cannot_be_compared(all_levels: Path, right: Path, tmp_path: Path) -> None:
-    same = tmp_path / "again" / "right"
-    shutil.copytree(right, same)
-    for results, words in (
-        ([right, same], "two solvers have the name right"),
-        ([right, right / "ours"], "two solvers have the name ours"),
-        ([right, tmp_path / "nowhere"], "no such directory"),
-    ):
-        with pytest.raises(InputError, match=words):
-            compare.compare(all_levels, results, tmp_path / "both", CHOICE)
-    assert not (tmp_path / "both").exists()
-
-
 def _refused(pack_of: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with pytest.raises(OrchestratorError, match=words):
@@ -255,11 +204,11 @@ def _refused(pack_of: Path, out: Path, words: str, command: str = "true {case} {
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
-def test_results_go_nowhere_else(formulas: Path, all_levels: Path, tmp_path: Path) -> None:
-    mine, study, copy = (tmp_path / name for name in ("mine", "study", "copy"))
-    (mine / "2-incline-5").mkdir(parents=True)
-    (mine / "2-incline-5" / "thesis.tex").write_text("mine\n")
-    shutil.copytree(all_levels.parent / "study", study)
+def test_results_go_nowhere_else(all_levels: Path, formulas: Path, tmp_path: Path) -> None:
+    mine, same, copy = (tmp_path / name for name in ("mine", "again/mine", "copy"))
+    for folder in (mine, same):
+        (folder / "2-incline-5").mkdir(parents=True)
+        (folder / "2-incline-5" / "thesis.tex").write_text("mine\n")
     shutil.copytree(formulas, copy)
     (tmp_path / "link").symlink_to(formulas)
     _refused(formulas, copy, "holds the benchmark pack")
@@ -267,32 +216,35 @@ def test_results_go_nowhere_else(formulas: Path, all_levels: Path, tmp_path: Pat
         (formulas / "results", "may not lie in the pack"),
         (tmp_path / "link" / "results", "may not lie in the pack"),
         (mine, "something that is not a (benchmark|comparison).*2-incline-5"),
-        (study, r"holds .*(study|cases)"),
+        (all_levels.parent / "study", r"holds .*(study|cases)"),
     ):
         _refused(formulas, out, words)
         with pytest.raises(InputError, match=words):
             compare.compare(formulas, [mine], out, SCENE)
+    for results, words in (
+        ([mine, same], "two solvers have the name mine"),
+        ([mine, tmp_path / "nowhere"], "no such directory"),
+    ):
+        with pytest.raises(InputError, match=words):
+            compare.compare(formulas, results, tmp_path / "both", SCENE)
+    assert not (tmp_path / "both").exists()
 
 
 def test_results_of_another_solver_or_pack_stay(
     formulas: Path, all_levels: Path, tmp_path: Path
 ) -> None:
-    run(formulas, tmp_path, TAIL)
-    results = tmp_path / "results"
-    _refused(formulas, results, "holds the benchmark of the solver .*, not")
+    root, results = tmp_path / "pack", tmp_path / "results"
+    shutil.copytree(formulas, root)
+    run(root, tmp_path, TAIL)
+    _refused(root, results, "holds the benchmark of the solver .*, not")
     _refused(all_levels, results, "answers to another pack", program(tmp_path, TAIL))
     with workspace.claimed(results, workspace.RESULTS, program(tmp_path, TAIL)):
-        _refused(formulas, results, "it is in use by", program(tmp_path, TAIL))
-
-
-def test_a_changed_pack_is_not_used_further(formulas: Path, tmp_path: Path) -> None:
-    root = tmp_path / "pack"
-    shutil.copytree(formulas, root)
+        _refused(root, results, "it is in use by", program(tmp_path, TAIL))
+    # a solver that changes the pack
     body = f"Path({str(root / 'expected.csv')!r}).open('a').write('x')" + TAIL
+    shutil.rmtree(results)
     with pytest.raises(InputError, match=r"expected\.csv is not what was exported"):
         run(root, tmp_path, body)
-    with pytest.raises(InputError, match=r"expected\.csv is not what was exported"):
-        compare.compare(root, [tmp_path / "results"], None, Options())
 
 
 @pytest.mark.parametrize(

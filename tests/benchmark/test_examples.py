@@ -61,7 +61,6 @@ def test_the_example_passes(all_levels: Path, tmp_path: Path) -> None:
     assert _run(all_levels, tmp_path, RIGHT, "[124]-*").failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
     assert set(verdicts["level"]) == {1, 2, 4}
-    assert (verdicts["seconds"] > 0).all()
     assert verdicts.loc[verdicts["level"] > 1, "ratio"].gt(0).all()
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     assert numbers.loc[numbers["scene"].str.startswith("2-incline"), "ours"].notna().all()
@@ -85,18 +84,15 @@ def test_the_native_starts_know_the_pivots_of_a_poured_bed(
         assert count == (alone <= flows[step]).sum()
 
 
-def test_an_engine_agrees(all_levels: Path, tmp_path: Path, engine: str) -> None:
+def test_an_engine_agrees(
+    all_levels: Path, lift_off: Path, poured: Path, tmp_path: Path, engine: str
+) -> None:
     assert _run(all_levels, tmp_path, engine, *CHECKS, "2-grain*", "4-*").failures == []
     verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
     assert set(verdicts["kind"]) == {"collision", "incline", "sliding", "passing", "pivot", "pile"}
     assert (verdicts.loc[verdicts["kind"] == "incline", "worst"] < 1e-3).all()
-
-
-@pytest.mark.parametrize("packed", ["lift_off", "poured"])
-def test_an_engine_agrees_on_other_beds(
-    packed: str, request: pytest.FixtureRequest, tmp_path: Path, engine: str
-) -> None:
-    assert _run(request.getfixturevalue(packed), tmp_path, engine, "4-*").failures == []
+    for other in (lift_off, poured):
+        assert _run(other, tmp_path / other.parent.name, engine, "4-*").failures == []
 
 
 def test_the_bed_of_lammps_runs_by_hand(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """A pack says all that a solver needs, and is refused when it is not what was exported."""
 
 import functools
-import hashlib
 import json
 import os
 import re
@@ -19,6 +18,7 @@ from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import export
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
+from orchestrator.runs.files import digest_files
 from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
@@ -26,19 +26,15 @@ from tests.benchmark.conftest import ROOT
 
 
 def _documented() -> set[tuple[str, str]]:
-    """Entry and kind, by the table of docs/benchmark.md."""
-
-    def kinds(text: str) -> set[str]:
-        listed = {kind for kind in pack.KINDS if re.search(rf"\b{kind}\b", text)}
-        return set(pack.KINDS) - listed if text.startswith("all") else listed
-
+    """Entry and kind, by the list of docs/benchmark.md."""
     text = (ROOT / "docs" / "benchmark.md").read_text().partition("## Scenes\n")[2]
-    rows = re.findall(
-        r"^\| (`.*?) \| (.*?) \|", text.partition("**The contact.**")[0], re.MULTILINE
-    )
-    return {
-        (name, k) for names, of in rows for name in re.findall(r"`(\w+)`", names) for k in kinds(of)
-    }
+    entries = set()
+    for item in text.partition("**The contact.**")[0].split("\n- ")[1:]:
+        words, _, names = item.partition(":")
+        kinds = {kind for kind in pack.KINDS if re.search(rf"\b{kind}\b", words)}
+        kinds = set(pack.KINDS) - kinds if words.startswith("all") else kinds
+        entries |= {(name, kind) for name in re.findall(r"`(\w+)`", names) for kind in kinds}
+    return entries
 
 
 def _scene(text: str) -> Scene:
@@ -62,12 +58,11 @@ def test_every_entry_of_a_scene_is_documented_and_the_others_are_absent(
     formulas: Path, all_levels: Path, lift_off: Path, poured: Path
 ) -> None:
     packs = [pack.read(root) for root in (formulas, all_levels, lift_off, poured)]
-    entries = [one for read in packs for one in read.scenes.values()]
-    present = {(name, str(one["kind"])) for one in entries for name in one}
+    entries = [given for read in packs for given in read.scenes.values()]
+    present = {(name, str(given["kind"])) for given in entries for name in given}
     for kind in ("pile", "line"):  # no pack here has these
-        present |= {
-            (name, kind) for name in (*scenes.parameters(_scene(DISORDERED), kind), "lift_off")
-        }
+        names = (*scenes.parameters(_scene(DISORDERED), kind), "lift_off")
+        present |= {(name, kind) for name in names}
     assert present == _documented()
 
 
@@ -119,26 +114,23 @@ def test_levels_times_and_our_answers(all_levels: Path) -> None:
         weight = entries["mass_kg"] * entries["reduced_gravity_m_s2"]
         assert entries["weight_n"] == pytest.approx(weight, rel=1e-12)
         if entries["kind"] != "closed-form":
-            assert entries["spring_n_m"] == pytest.approx(
-                entries["stiffness"] * weight / entries["d_m"]
-            )
+            spring = entries["stiffness"] * weight / entries["d_m"]
+            assert entries["spring_n_m"] == pytest.approx(spring)
             unit = entries["d_m"] / entries["reduced_gravity_m_s2"]
             assert entries["time_unit_s"] ** 2 == pytest.approx(unit)
 
 
-def _deck(case: Path) -> pd.DataFrame:
-    rows = (case / "grains.data").read_text().partition("Atoms\n\n")[2].split("\n")
-    return pd.DataFrame([row.split() for row in rows if row]).astype(float)
+def _scene_and_case(root: Path, scene: str, case: str) -> tuple[Any, pd.DataFrame, Path, Any]:
+    """The entries and grains of a scene, and the case of its answer with the grains of its deck."""
+    (folder,), (run,) = root.glob(f"scenes/{scene}"), root.parent.glob(f"study/cases/{case}-*")
+    rows = (run / "grains.data").read_text().partition("Atoms\n\n")[2].split("\n")
+    deck = pd.DataFrame([row.split() for row in rows if row]).astype(float)
+    given = json.loads((folder / "scene.json").read_text())
+    return given, pd.read_csv(folder / "grains.csv"), run, deck
 
 
 def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path) -> None:
-    folder = next(all_levels.glob("scenes/4-*"))
-    given, grains = (
-        json.loads((folder / "scene.json").read_text()),
-        pd.read_csv(folder / "grains.csv"),
-    )
-    (case,) = (all_levels.parent / "study" / "cases").glob("pile-*")
-    deck = _deck(case)
+    given, grains, _, deck = _scene_and_case(all_levels, "4-*", "pile")
     kinds = grains["kind"].map({"fixed": 1, "mobile": 2, "counted": 3, "pushed": 4})
     assert kinds.tolist() == deck[1].tolist()
     for column, name in ((4, "x_m"), (6, "z_m")):
@@ -150,17 +142,11 @@ def test_the_grains_of_a_pile_are_those_of_its_case(all_levels: Path) -> None:
 
 
 def test_a_pivot_is_the_cell_of_its_case(all_levels: Path) -> None:
-    folder = next(all_levels.glob("scenes/2-grain*"))
-    given, grains = (
-        json.loads((folder / "scene.json").read_text()),
-        pd.read_csv(folder / "grains.csv"),
-    )
-    load_steps = pd.read_csv(folder / "load_steps.csv")
-    (case,) = (all_levels.parent / "study" / "cases").glob("cells-*")
-    deck = _deck(case)
+    given, grains, case, deck = _scene_and_case(all_levels, "2-grain*", "cells")
+    load_steps = pd.read_csv(min(all_levels.glob("scenes/2-grain*/load_steps.csv")))
     for axis, place in (("x", 4), ("z", 6)):
-        own, of_deck = grains[f"{axis}_m"] / given["d_m"], deck[place] / cells.DIAMETER
-        assert (own - own[2]).to_numpy() == pytest.approx(of_deck - of_deck[2])
+        centres, of_deck = grains[f"{axis}_m"] / given["d_m"], deck[place] / cells.DIAMETER
+        assert (centres - centres[2]).to_numpy() == pytest.approx(of_deck - of_deck[2])
         rows = (case / f"force.{axis}.txt").read_text().split("\n")[1::2]
         force = np.array([row.split()[1] for row in rows if row], float)
         ratio = load_steps[f"f{axis}_n"] / given["weight_n"]
@@ -183,10 +169,8 @@ def test_a_pivot_is_the_cell_of_its_case(all_levels: Path) -> None:
 )
 def test_pivots_are_of_every_law_that_holds_and_rolls_its_grain(forces: str, has_one: bool) -> None:
     group = "[[group]]\nname = 'a'\nbed.slope_deg = 25.0"
-    assert (
-        scenes.has_pivot(_scene(f"[grain]\ndiameter = 3e-4\n[forces]\n{forces}\n{group}"))
-        is has_one
-    )
+    scene = _scene(f"[grain]\ndiameter = 3e-4\n[forces]\n{forces}\n{group}")
+    assert scenes.has_pivot(scene) is has_one
 
 
 def test_where_details_decide_only_what_they_do_not_is_judged(
@@ -254,25 +238,11 @@ def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> Non
         export(tmp_path, None, ())
 
 
-@pytest.fixture
-def copy(all_levels: Path, tmp_path: Path) -> Path:
-    """A pack of all levels to be harmed."""
-    root = tmp_path / "pack"
-    shutil.copytree(all_levels, root)
-    return root
-
-
 def _seal(root: Path) -> None:
     """Make the digests those of the files, as whoever means harm does."""
-    manifest = json.loads((root / pack.MANIFEST).read_text())
-    paths = [root / name for name in pack.FILES]
-    paths += [Path(folder, file) for folder, _, files in os.walk(root / "scenes") for file in files]
-    manifest["sha256"] = {
-        path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in paths
-        if path.is_file()
-    }
-    (root / pack.MANIFEST).write_text(json.dumps(manifest))
+    files = [*(root / name for name in pack.FILES), *root.glob("scenes/**/*")]
+    digests = digest_files([path for path in files if path.is_file()], root=root)
+    _edit(root / pack.MANIFEST, sha256=digests)
 
 
 def _edit(path: Path, **changed: Any) -> None:
@@ -292,23 +262,9 @@ def _rename(root: Path, name: str) -> None:
         old.rename(goal)
 
 
-def _line(root: Path, column: int, cell: str) -> None:
-    """Change a cell of the first expectation."""
-    path = root / "expected.csv"
-    head, first, *rest = path.read_text().splitlines()
-    cells = first.split(",")
-    cells[column] = cell
-    path.write_text("\n".join([head, ",".join(cells), *rest, ""]))
-
-
 def _replace(path: Path, make: Callable[[Path], object]) -> None:
     path.unlink(missing_ok=True)
     make(path)
-
-
-def _study(root: Path, text: str) -> None:
-    path = root / "study.toml"
-    path.write_text(text + path.read_text())
 
 
 INCLINE = "scenes/2-incline-20"
@@ -316,22 +272,19 @@ TOUCHED = ("changed", "removed", "added")
 HARMS: dict[str, Callable[[Path], object]] = {
     **{
         f"a scene {name!r}": functools.partial(_rename, name=name)
-        for name in ("../../evil", "/tmp/evil", "2-a/b", "2-é", "2-$\\frac$", "2-a\n")
+        for name in ("../../evil", "/tmp/evil", "2-a/b", "2-$\\frac$", "2-a\n")
     },
     "changed": lambda root: _edit(root / INCLINE / "scene.json", d_m=2e-3),
     "removed": lambda root: (root / INCLINE / "ask.csv").unlink(),
     "added": lambda root: (root / INCLINE / "more.csv").write_text("1\n"),
     "no JSON": lambda root: (root / INCLINE / "scene.json").write_bytes(b"\xff\xfe{"),
     "another level": lambda root: _edit(root / INCLINE / "scene.json", level=3),
-    "NaN": lambda root: _edit(root / INCLINE / "scene.json", d_m=float("nan")),
     "no at": lambda root: (root / "expected.csv").write_text("scene,quantity\n"),
-    "a value of 1e999": lambda root: _line(root, 3, "1e999"),
-    # files and links
+    "no number": lambda root: (root / "expected.csv").write_text(
+        (root / "expected.csv").read_text().replace(",1e-06,", ",1e999,").replace("0.01,", "x,")
+    ),
     "a table that is a link": lambda root: _replace(
         root / "expected.csv", lambda path: path.symlink_to("/dev/zero")
-    ),
-    "a scene's file that is a link": lambda root: _replace(
-        root / INCLINE / "ask.csv", lambda path: path.symlink_to("/etc/passwd")
     ),
     "a scene that is a link": lambda root: (root / INCLINE).symlink_to(
         (root / INCLINE).rename(root.parent / "away")
@@ -339,30 +292,32 @@ HARMS: dict[str, Callable[[Path], object]] = {
     "a pipe": lambda root: _replace(root / INCLINE / "ask.csv", os.mkfifo),
     "a program": lambda root: (root / INCLINE / "solver.py").write_text("1\n"),
     "a scene that is not listed": lambda root: shutil.copytree(root / INCLINE, root / "scenes/2-b"),
-    "a scene that is not there": lambda root: shutil.rmtree(root / INCLINE),
-    "more in the manifest": lambda root: _edit(root / pack.MANIFEST, more=1),
     "another schema": lambda root: _edit(root / pack.MANIFEST, schema=1),
-    # files outside of the pack
     "bytes for a study": lambda root: (root / "study.toml").write_bytes(b"\xff\xfe\x00"),
-    "a study of a file": lambda root: _study(root, 'bed = { profile = "/etc/passwd" }\n'),
-    "a study of a sieve": lambda root: _study(root, 'group = [{ grain.sizes = "/etc/passwd" }]\n'),
+    "a study of a file": lambda root: (root / "study.toml").write_text(
+        'bed = { profile = "/etc/passwd" }\n' + (root / "study.toml").read_text()
+    ),
 }
 
 
 @pytest.mark.parametrize("name", HARMS)
 def test_a_hostile_pack_is_refused_by_one_line(
-    copy: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    formulas: Path,
+    tmp_path: Path,
+    name: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.chdir(copy.parent)
+    copy = Path(shutil.copytree(formulas, tmp_path / "pack"))
+    monkeypatch.chdir(tmp_path)
     HARMS[name](copy)
     if name not in TOUCHED:
         _seal(copy)
-    before = {path for path in copy.parent.rglob("*") if "results" not in path.parts}
+    before = {path for path in tmp_path.rglob("*") if "results" not in path.parts}
     code = cli.main(["benchmark", "run", "pack", "--scene", "2-*", "--solver", "true {case} {out}"])
     printed = capsys.readouterr().err
     assert code == 2, printed
     (line,) = (line for line in printed.splitlines() if line.startswith("orchestrator: "))
     assert "pack" in line
-    assert len(line) < 1500
     assert "root:" not in line
-    assert {p for p in copy.parent.rglob("*") if "results" not in p.parts} == before
+    assert {p for p in tmp_path.rglob("*") if "results" not in p.parts} == before
