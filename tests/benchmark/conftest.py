@@ -45,26 +45,20 @@ name = "pile"
 bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", %s }}
 """
 """A pile under the stress of a theory, which needs no OpenFOAM."""
-POURED = f"""{PROTOCOL}
-final_fraction = 0.4
-fractions = [0.1, 0.3]
-[fluid]
-density = 1000.0
-viscosity = 1e-6
-[grain]
-diameter = 1e-3
-density = 2650.0
-sizes = {{ sigma_g = 1.3 }}
-stiffness = 1e3
+POURED = f"""
+fluid = {{ density = 1000.0, viscosity = 1e-6 }}
+grain = {{ diameter = 1e-3, density = 2650.0, sizes = {{ sigma_g = 1.3 }}, stiffness = 1e3 }}
+flow.model = "hill"
 [bed]
 kind = "pile"
 shape = "gaussian"
+packing = "poured"
 slope_deg = 15.0
 height = 0.005
 poured_depth = 4.0
-packing = "poured"
-[flow]
-model = "hill"
+{PROTOCOL}
+final_fraction = 0.4
+fractions = [0.1, 0.3]
 """
 """A poured hump of grains of many sizes."""
 

