@@ -99,13 +99,10 @@ def test_a_solver_gets_its_scene_alone_and_its_use_is_measured(
     log = (tmp_path / "results" / "2-incline-5" / "log.txt").read_text()
     words, cwd, files, beside, variables = json.loads(log.splitlines()[0])
     assert words == [f"{cwd}/case", f"{cwd}/answer.csv"]
-    assert files == ["ask.csv", "scene.json"]
-    assert beside == ["log.txt", "work"]
-    assert variables == []
+    assert (files, beside, variables) == (["ask.csv", "scene.json"], ["log.txt", "work"], [])
     used = verdicts_in(tmp_path).loc["2-incline-5"]
     assert 100 < used["peak_mib"] < 160
-    assert used["seconds"] > 0.5
-    assert used["cpu_s"] > 0.5
+    assert min(used["seconds"], used["cpu_s"]) > 0.5
     assert used["ratio"] == pytest.approx(used["seconds"] / used["ours_seconds"], rel=1e-4)
 
 
