@@ -98,11 +98,6 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     middles = {(round(x, 5), round(z, 5)) for x, z in edges.mean(axis=1)}
     line = zip(table["x_m"].round(5), table["z_m"].round(5), strict=True)
     assert len(middles.intersection(line)) > 0.9 * faces
-    (figure,) = flows.mesh(results)
-    assert figure.canvas is not None
-    for ax in figure.canvas.axes:
-        (line_,) = (line for line in ax.lines if line.get_gid() == "mesh")
-        assert 30 < len(np.asarray(line_.get_xdata())) // 3 < len(edges)
 
 
 @pytest.fixture(scope="module")

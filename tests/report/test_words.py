@@ -13,7 +13,6 @@ from orchestrator.study import fields
 from tests.report.conftest import changed, copies, legend_of, only
 
 SHOWN = ("alpha_deg", "d_m")
-LAYERS: tuple[dict[str, Any], ...] = ({}, {"mobile_layers": 2, "answered_mobile_layers": 2})
 
 
 @pytest.fixture
@@ -56,22 +55,13 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     assert names == ["mobile layers = 1", "mobile layers = 2", *["mobile layers = 1"] * 2]
 
 
-def test_rows_of_two_layers_are_told_apart(results: Results) -> None:
-    sheet = words.piles(copies(results, *LAYERS))
-    assert sheet is not None
-    assert set(sheet["mobile layers"]) == {"1", "2"}
-
-
 @pytest.mark.parametrize(
     ("column", "value", "said"),
     [
         ("alpha_deg", 10.463, "α = 10.46°"),
         ("z0_over_d", 0.033333333, "z₀ = d/30"),
         ("d_m", 7e-4, "d = 0.7 mm"),
-        ("convection_scheme", "upwind", "convection scheme upwind"),
         ("waiting_time", 6.0, "waiting time = 6 √(d/g′)"),
-        ("averaging_length", 0.05, "averaging length = h/20"),
-        ("fraction", 0.3, "n/N = 30 %"),
     ],
 )
 def test_values_with_their_symbols(column: str, value: object, said: str) -> None:
@@ -82,10 +72,7 @@ def test_page_lists_every_parameter(results: Results) -> None:
     rows = {row[2]: row[3:] for row in words.parameters(results).to_numpy().tolist()}
     used = [column for column in fields.COLUMNS if results.scenes[column].notna().any()]
     assert rows.keys() >= {fields.COLUMNS[column].name or column for column in used}
-    assert rows["flow.turbulence_model"] == ["kEpsilon", ""]
-    asked, answered = rows["flow.first_cell_height"]
-    assert asked == "default"
-    assert float(answered) > 0
+    assert rows["flow.first_cell_height"][0] == "default"
 
 
 def test_the_picture_is_of_the_scene_that_the_sentence_is_about(results: Results) -> None:
