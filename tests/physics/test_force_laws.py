@@ -1,13 +1,16 @@
 """Every force law: limits, units, order, range; and the values that their authors printed."""
 
+from itertools import product
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.errors import InputError
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, SCHILLER_NAUMANN, Exposure, law, reasons
+from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, SCHILLER_NAUMANN, Exposure, reasons
+from orchestrator.physics.threshold import shields_at
 
 FORCES = ("drag", "lift", "torque")
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -17,12 +20,6 @@ ratios = st.floats(1 / 60, 1 / 5)
 def unit(ratio: float = 1 / 30) -> Exposure:
     """A grain of d = rho = nu = 1, so that ustar is Re*."""
     return Exposure(1.0, ratio, 1.0, 1.0)
-
-
-def test_an_unknown_name_is_answered_with_the_names_of_the_laws() -> None:
-    with pytest.raises(InputError, match=r"did you mean bridged\?") as caught:
-        law("brigded")
-    assert all(name in str(caught.value) for name in LAWS)
 
 
 @pytest.mark.parametrize("part", [5, 20, 60])
@@ -42,24 +39,16 @@ def test_the_forces_of_eqs_2_and_4(part: int) -> None:
     np.testing.assert_allclose(high.lift(u, at), lift)
 
 
-@pytest.mark.parametrize("ratio", [1 / 30, 1 / 10])
-@pytest.mark.parametrize(
-    ("name", "limit", "reynolds", "within"),
-    [
-        # the difference is the drag's own inertia, 0.15 (V d/nu)^0.687, and falls as Re*^1.37
-        *((name, "low", 1e-3, 1e-5) for name in ("bridged", "bridged-gravel", "profile")),
-        *((name, "low", 1e-6, 1e-9) for name in ("bridged", "bridged-gravel", "profile")),
-        # and here it falls as 4 to 11 over Re*
-        ("bridged", "high", 1e4, 11e-4),
-        ("bridged", "high", 1e6, 11e-6),
-    ],
-)
-def test_laws_of_every_reynolds_number_tend_to_eqs_2_and_4(
-    name: str, limit: str, reynolds: float, within: float, ratio: float
-) -> None:
-    for force in ("drag", "lift"):
-        value, exact = (getattr(LAWS[n], force)(reynolds, unit(ratio)) for n in (name, limit))
-        assert float(value) == pytest.approx(float(exact), rel=within)
+def test_laws_of_every_reynolds_number_tend_to_eqs_2_and_4() -> None:
+    every = ("bridged", "bridged-gravel", "profile")
+    # the difference is the drag's own inertia, 0.15 (V d/nu)^0.687, and falls as Re*^1.37
+    ends = [(name, "low", *end) for name in every for end in ((1e-3, 1e-5), (1e-6, 1e-9))]
+    # and here it falls as 4 to 11 over Re*
+    ends += [("bridged", "high", 1e4, 11e-4), ("bridged", "high", 1e6, 11e-6)]
+    for name, limit, reynolds, within in ends:
+        for force, ratio in product(("drag", "lift"), (1 / 30, 1 / 10)):
+            value, exact = (getattr(LAWS[n], force)(reynolds, unit(ratio)) for n in (name, limit))
+            assert float(value) == pytest.approx(float(exact), rel=within)
 
 
 @every_law
@@ -108,27 +97,21 @@ def test_the_higher_a_grain_stands_the_more_it_feels(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "ratio", "reynolds", "why"),
     [
-        ("low", 1 / 30, 2.99, ""),
         ("low", 1 / 30, 3.0, "Re* 3 is not below 3"),
         ("high", 1 / 30, 30.0, ""),
         ("high", 1 / 30, 29.9, "Re* 29.9 is below 30"),
         # the end of Schiller and Naumann's drag: V d/nu = 1000
         ("high", 1 / 30, 156.9, ""),
         ("high", 1 / 30, 157.1, "particle Reynolds number (Schiller and Naumann)"),
-        ("high", 1 / 10, 244.1, ""),
-        ("high", 1 / 10, 244.4, "particle Reynolds number"),
-        ("bridged", 1 / 30, 1e-6, ""),
         ("bridged", 1 / 30, 162.7, ""),
         ("bridged", 1 / 30, 163.0, "not below 1000"),
         ("bridged", 1e-9, 50.0, "speed over that above a smooth wall"),
-        ("bridged", 1e-3, 50.0, ""),
         ("bridged-gravel", 1 / 30, 4e4, ""),
         ("bridged-gravel", 1 / 30, 5e4, "particle Reynolds number (Clift and Gauvin)"),
         ("profile", 1 / 10, 197.0, ""),
         ("profile", 1 / 10, 1000.0, "roughness ks u*/nu (Cebeci and Chang) 3000"),
         ("zeng", 1 / 30, 34.7, ""),
         ("zeng", 1 / 30, 34.8, "not below 200"),
-        ("claudin-andreotti", 1 / 30, 1e5, ""),
         ("bridged", 1 / 30, np.nan, "Re* is not a number"),
     ],
 )
@@ -145,10 +128,7 @@ def test_the_range_is_judged_for_each_grain() -> None:
     at = np.array([1.0, 100.0, 1000.0])
     np.testing.assert_array_equal(LAWS["high"].valid(at, unit()), [False, True, False])
     below, within, beyond = reasons(LAWS["profile"].ranges(3000.0 * at / 100, unit()), 3)
-    assert not below
-    assert "Schiller" in within
-    assert "Cebeci" in within
-    assert "Cebeci" in beyond
+    assert (below, "Schiller" in within, "Cebeci" in within, "Cebeci" in beyond) == ("", 1, 1, 1)
 
 
 def test_clift_and_gauvin_go_on_where_schiller_and_naumann_end() -> None:
@@ -177,16 +157,12 @@ def test_zeng_touching_the_wall_in_creeping_flow() -> None:
     assert lift == pytest.approx(5.87, abs=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("reynolds", "simulated", "within"), [(2, 2.653, 0.012), (10, 1.305, 0.02), (200, 0.338, 0.06)]
-)
-def test_zeng_fits_the_lift_that_was_simulated_and_saffman_is_above(
-    reynolds: float, simulated: float, within: float
-) -> None:
-    assert _coefficients(reynolds, 1e-9)[1] == pytest.approx(simulated, rel=within)
-    # Saffman's lift in the same linear shear: the speed at the centre is G d/2
-    saffman = LIFT_COEFFICIENT * reynolds * np.sqrt(2 * reynolds) / (np.pi / 8 * reynolds**2)
-    assert 1.21 < saffman / simulated < 1.56
+def test_zeng_fits_the_lift_that_was_simulated_and_saffman_is_above() -> None:
+    for reynolds, simulated, within in ((2, 2.653, 0.012), (10, 1.305, 0.02), (200, 0.338, 0.06)):
+        assert _coefficients(reynolds, 1e-9)[1] == pytest.approx(simulated, rel=within)
+        # Saffman's lift in the same linear shear: the speed at the centre is G d/2
+        saffman = LIFT_COEFFICIENT * reynolds * np.sqrt(2 * reynolds) / (np.pi / 8 * reynolds**2)
+        assert 1.21 < saffman / simulated < 1.56
 
 
 def test_the_torque_acts_as_a_drag_above_the_centre() -> None:
@@ -204,3 +180,21 @@ def test_claudin_and_andreotti_in_both_limits() -> None:
     # rough: C_D = 1 at the speed of the logarithm at d/2
     fast = LAWS["claudin-andreotti"].drag(1e5, unit())
     assert float(fast) == pytest.approx(np.pi / 8 * (1e5 * np.log(16) / 0.4) ** 2, rel=0.02)
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "model.md"
+
+
+@every_law
+def test_the_table_of_the_model_page_has_what_a_law_gives(name: str) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    section = text.split("### The laws side by side")[1]
+    cells = [line.strip("|\n ").split(" | ") for line in section.splitlines() if "| `" in line]
+    rows = {law.strip("`"): numbers for law, *numbers in cells}
+    assert set(rows) == set(LAWS)
+    assert any(line.startswith("### ") and f"`{name}`" in line for line in text.splitlines())
+    reynolds = np.array([0.1, 1, 3, 10, 30, 100])
+    theta = shields_at(LAWS[name], reynolds, roughness_ratio=1 / 30, entrainment_angle_deg=60)
+    assert [f"{value:.4f}" for value in theta] == [cell.strip("()") for cell in rows[name]]
+    holds = LAWS[name].valid(reynolds, unit())
+    assert [not cell.startswith("(") for cell in rows[name]] == holds.tolist()

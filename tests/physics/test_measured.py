@@ -35,17 +35,13 @@ def test_grains_of_the_mean_size_neither_hide_nor_stand_out() -> None:
     # b = 0.67/(1 + e^0.5) at half the mean, tends to 0.67 for the largest
     assert float(wilcock_crowe_hiding(0.5)) == pytest.approx(0.5 ** (0.67 / 3.718281828459045))
     assert float(wilcock_crowe_hiding(20.0)) == pytest.approx(20**0.67, rel=1e-6)
+    assert np.all(np.isnan(egiazaroff_hiding([0.01, 1 / 19.01])))
     assert float(egiazaroff_hiding(2.0)) == pytest.approx((2.944438979 / 3.637586160) ** 2)
 
 
-def test_egiazaroff_means_nothing_below_a_nineteenth() -> None:
-    assert np.all(np.isnan(egiazaroff_hiding([0.01, 1 / 19.01])))
-
-
-@pytest.mark.parametrize(
-    ("formula", "x", "theta"),
-    [
-        # each worked out by hand from the published formula
+def test_curves_at_points() -> None:
+    # each worked out by hand from the published formula
+    for formula, x, theta in (
         (curves.soulsby_whitehouse, 1.0, 0.30 / 2.2 + 0.055 * 0.019801326693),
         (curves.paphitis, 1.0, 0.094 + 0.0475 * (1 - 0.699 * 0.985111939603)),
         (curves.mantz, 0.1, 0.199526231497),
@@ -55,10 +51,8 @@ def test_egiazaroff_means_nothing_below_a_nineteenth() -> None:
         (curves.yalin_karahan, 0.5, 0.123114441334),
         (curves.yalin_karahan, 100.0, 0.045),
         (curves.brownlie, 1.0, 0.22 + 0.06 * 10**-7.7),
-    ],
-)
-def test_curve_at_a_point(formula: curves.Formula, x: float, theta: float) -> None:
-    assert float(formula(np.array([x]))[0]) == pytest.approx(theta, rel=1e-6)
+    ):
+        assert float(formula(np.array([x]))[0]) == pytest.approx(theta, rel=1e-6)
 
 
 def test_iversen_white_solves_its_implicit_equation_on_both_branches() -> None:

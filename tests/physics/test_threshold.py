@@ -4,21 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from orchestrator.physics import curves
+from orchestrator.physics import threshold as physics
 from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.threshold import (
-    LAWS_OF,
-    Threshold,
-    friction_velocity_at,
-    pivot_resistance,
-    regime,
-    shields_at,
-    standing_out,
-    threshold,
-    weight,
-    why_not,
-)
+from orchestrator.physics.threshold import Threshold, friction_velocity_at, shields_at, threshold
 
 few = settings(max_examples=30, deadline=None)
 every_law = pytest.mark.parametrize("name", LAWS)
@@ -38,8 +29,10 @@ INDEPENDENT = [
 ]
 
 
-def of_air(name: str, d: float, ratio: float, alpha: float, beta: float, nu: float) -> Threshold:
-    where = Exposure(d, ratio * d, 1.0, nu)
+def of_air(
+    name: str, d: ArrayLike, ratio: float, alpha: float, beta: float, nu: ArrayLike
+) -> Threshold:
+    where = Exposure(d, np.multiply(ratio, d), 1.0, nu)
     angles = {"slope_deg": alpha, "entrainment_angle_deg": beta}
     return threshold(LAWS[name], where, density=2500.0, **angles)
 
@@ -57,23 +50,17 @@ def test_threshold_is_the_root_of_the_printed_equations(
     assert float(found.friction_velocity) == pytest.approx(ustar, rel=1e-12)
 
 
-# computed for the specification, by another program
-@pytest.mark.parametrize(
-    ("d", "theta", "curve"),
-    [(1e-4, 0.0701, 0.0771), (5e-4, 0.0348, 0.0308), (2e-3, 0.0410, 0.0399)],
-)
-def test_bridged_thresholds_in_water(d: float, theta: float, curve: float) -> None:
-    assert float(water(d).shields) == pytest.approx(theta, abs=5e-5)
-    dstar = np.array(d * (1.65 * 9.81 / 1e-12) ** (1 / 3))
-    assert float(curves.soulsby_whitehouse(dstar)) == pytest.approx(curve, abs=5e-5)
-
-
-@pytest.mark.parametrize(("d", "theta", "reynolds"), [(1e-4, 0.0499, 3.5), (5e-4, 0.0362, 33.3)])
-def test_bridged_thresholds_in_air(d: float, theta: float, reynolds: float) -> None:
-    found = of_air("bridged", d, 1 / 30, 15, 60, 1e-5)
-    assert float(found.shields) == pytest.approx(theta, abs=5e-5)
-    assert float(found.reynolds) == pytest.approx(reynolds, abs=0.05)
-    assert bool(found.valid)
+def test_bridged_thresholds_in_water_and_air() -> None:
+    # computed for the specification, by another program
+    for d, theta, curve in ((1e-4, 0.0701, 0.0771), (5e-4, 0.0348, 0.0308), (2e-3, 0.0410, 0.0399)):
+        assert float(water(d).shields) == pytest.approx(theta, abs=5e-5)
+        dstar = np.array(d * (1.65 * 9.81 / 1e-12) ** (1 / 3))
+        assert float(curves.soulsby_whitehouse(dstar)) == pytest.approx(curve, abs=5e-5)
+    for d, theta, reynolds in ((1e-4, 0.0499, 3.5), (5e-4, 0.0362, 33.3)):
+        found = of_air("bridged", d, 1 / 30, 15, 60, 1e-5)
+        assert float(found.shields) == pytest.approx(theta, abs=5e-5)
+        assert float(found.reynolds) == pytest.approx(reynolds, abs=0.05)
+        assert bool(found.valid)
 
 
 def test_the_bridged_curve_dips_between_the_regimes_and_leaves_soulsby_below_one() -> None:
@@ -97,8 +84,8 @@ def test_moments_balance_at_the_threshold(
     found = of_air(name, d, ratio, slope, beta, nu)
     b, u = np.radians(beta), found.friction_velocity
     moment = found.drag * np.sin(b) + found.lift * np.cos(b) + 2 * law.torque(u, where) / d
-    submerged = weight(diameter=d, density=2500.0, fluid_density=1.0)
-    resistance = submerged * pivot_resistance(slope, beta)
+    submerged = physics.weight(diameter=d, density=2500.0, fluid_density=1.0)
+    resistance = submerged * physics.pivot_resistance(slope, beta)
     assert float(moment) == pytest.approx(float(resistance), rel=1e-12)
     angles = {"entrainment_angle_deg": beta, "slope_deg": slope}
     curve = shields_at(law, found.reynolds, roughness_ratio=ratio, **angles)
@@ -142,33 +129,30 @@ def test_without_resistance_there_is_no_threshold() -> None:
     )
     np.testing.assert_array_equal(np.isnan(found.shields), [True, True, False, True])
     np.testing.assert_array_equal(found.valid, [False, False, True, False])
-
-
-def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
     # a law without lift, in a pocket that is bottomless for a drag
     found = water(1e-3, beta=0, law="claudin-andreotti")
     assert float(found.friction_velocity) == float(found.shields) == np.inf
     assert not bool(found.valid)
 
 
-@pytest.mark.parametrize(("lift", "reason"), [(10.0, "lift over the weight"), (1.615, "")])
-def test_a_lift_beyond_the_weight_ends_the_pivot(lift: float, reason: str) -> None:
+def test_a_lift_beyond_the_weight_ends_the_pivot() -> None:
     """Up a slope the lift can pass the weight before the drag turns the grain."""
-    where = Exposure(5e-4, 5e-4 / 30, 1.2, 1.5e-5, lift)
     grain = {"density": 2650.0, "slope_deg": 20}
-    found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
-    assert bool(found.valid) == (not reason)
-    (text,) = why_not(LAWS["bridged"], found.friction_velocity, where, **grain)
-    assert reason in text
-    assert bool(text) == bool(reason)
+    for lift, reason in ((10.0, "lift over the weight"), (1.615, "")):
+        where = Exposure(5e-4, 5e-4 / 30, 1.2, 1.5e-5, lift)
+        found = threshold(LAWS["bridged"], where, entrainment_angle_deg=50, **grain)
+        assert bool(found.valid) == (not reason)
+        (text,) = physics.why_not(LAWS["bridged"], found.friction_velocity, where, **grain)
+        assert reason in text
+        assert bool(text) == bool(reason)
 
 
 def test_a_small_grain_hides_between_its_neighbours() -> None:
     # between neighbours that touch the top of a grain of d/4 is level with theirs
-    assert float(standing_out(0.25, 60.0)) == pytest.approx(0, abs=1e-12)
-    assert float(standing_out(1.0, 60.0)) == pytest.approx(np.sqrt(0.75))
+    assert float(physics.standing_out(0.25, 60.0)) == pytest.approx(0, abs=1e-12)
+    assert float(physics.standing_out(1.0, 60.0)) == pytest.approx(np.sqrt(0.75))
     sizes = np.array([0.1, 0.2, 0.5, 1.0, 3.0, 10.0])
-    assert np.all(np.diff(standing_out(sizes, 60.0)) > 0)
+    assert np.all(np.diff(physics.standing_out(sizes, 60.0)) > 0)
 
 
 class TestFrictionVelocityAt:
@@ -206,12 +190,8 @@ class TestFrictionVelocityAt:
 
 def test_the_regime_is_that_of_the_ranges_of_eqs_2_and_4_and_gravel_is_high() -> None:
     d, nu = np.geomspace(3e-5, 2e-2, 60), np.array([[1e-6], [1e-5], [1e-3]])
-    grain = {"density": 2500.0, "slope_deg": 5.0, "entrainment_angle_deg": 60.0}
-    where = Exposure(d, d / 30, 1.0, nu)
-    low, high = (threshold(LAWS[name], where, **grain) for name in ("low", "high"))
-    found = regime(low, high)
+    low, high = (of_air(name, d, 1 / 30, 5.0, 60.0, nu) for name in ("low", "high"))
+    found = physics.regime(low, high)
     np.testing.assert_array_equal(found == "low", low.reynolds < 3)
     np.testing.assert_array_equal(found == "high", high.reynolds >= 30)
-    assert set(np.unique(found)) == set(LAWS_OF)
-    assert found[1, -1] == "high"
-    assert not high.valid[1, -1]
+    assert (found[1, -1], bool(high.valid[1, -1])) == ("high", False)

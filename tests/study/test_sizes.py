@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator import plan
 from orchestrator.bed import poured
 from orchestrator.errors import InputError
 from orchestrator.grains.loads import Geometry
@@ -112,13 +111,6 @@ def test_a_sieve_table_may_be_a_file_beside_the_study(tmp_path: Path) -> None:
     # the study's own text is whole without the file
     again = study.parse(asked.text, name="m", where=str(tmp_path / "elsewhere" / "m.toml"))
     assert again.scenes[0].id == asked.scenes[0].id
-
-
-def test_more_grains_than_a_machine_bears_are_refused() -> None:
-    bed = 'bed = { kind = "pile", shape = "flat", length = 50.0, packing = "poured" }'
-    text = f'{bed}\ngrain = {{ diameter = 1e-3 }}\nflow = {{ model = "flat" }}'
-    with pytest.raises(InputError, match=r"bed.packing: about 4.5e\+05 grains"):
-        plan.make(study.parse(text, name="m", where="m"))
 
 
 def test_beds_that_differ_in_their_scale_alone_are_poured_once() -> None:

