@@ -1,61 +1,104 @@
 """A study on a real Slurm of two nodes: the same bytes, whatever happens to its jobs."""
 
+import importlib.util
+import os
 import re
-import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.cluster.conftest import Start
+from tests.cluster import slurm
 from tests.cluster.slurm import Slurm, until
-from tests.conftest import Command
-from tests.faults.bench import processes_in, tables
+from tests.conftest import Command, Shared
+from tests.faults.bench import Bench, begun, ended, processes_in, tables, undisturbed
 
-Bytes = dict[str, bytes]
-ON_SLURM = ("study", "small.toml", "--out", "out", "--cluster", "slurm", "--workers", "2")
+STUDY = """
+time_limit = 100
+[protocol]
+load_increment = 0.006
+waiting_time = 3.0
+[grain]
+diameter = 1e-3
+stiffness = 1e3
+[bed]
+kind = "pile"
+height = 0.01
+slope_deg = 15.0
+mobile_layers = 1
+packing = "disordered"
+[flow]
+cells_per_face = 20
+[axes]
+"bed.seed" = [1, 2, 3]
+[cluster]
+cores = 1
+memory = "500MB"
+interface = "lo"
+"""
 
 
-def _at_work(cases: Path) -> set[str]:
+@pytest.fixture(scope="session")
+def queue(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slurm]:
+    """Two nodes of one core."""
+    lacking = slurm.missing()
+    if importlib.util.find_spec("dask_jobqueue") is None:
+        lacking.append("dask-jobqueue")
+    if lacking:
+        stop = pytest.fail if os.environ.get("SKIP_NOTHING") else pytest.skip
+        stop(f"without {', '.join(lacking)}; `sh tools/setup.sh test` installs all")
+    with slurm.running(tmp_path_factory.mktemp("slurm") / "root", nodes=2, cores=1) as started:
+        yield started
+
+
+@pytest.fixture
+def bench(tmp_path: Path, queue: Slurm, shared: Shared) -> Iterator[Bench]:
+    """The study, not begun, for the queue; its undisturbed run is one of this machine alone."""
+    with shared("local") as folder:
+        local = undisturbed(folder, STUDY)
+    options = ("--cluster", "slurm", "--workers", "2")
+    with begun(tmp_path, STUDY, local, queue.environment, options) as bench:
+        yield bench
+
+
+def _at_work(bench: Bench) -> set[str]:
     """Cases that a solver of LIGGGHTS is in the middle of."""
-    begun = {path.parent.name for path in cases.glob("pile-*/samples.csv")}
-    return begun - {path.parent.name for path in cases.glob("*/done.json")}
+    starts = {path.parent.name for path in bench.out.glob("cases/pile-*/samples.csv")}
+    return starts - {path.parent.name for path in bench.out.glob("cases/*/done.json")}
 
 
-def _end(driver: "subprocess.Popen[str]") -> None:
-    _, said = driver.communicate(timeout=400)
-    assert driver.returncode == 0, said
-    assert "Traceback" not in said, said
-
-
-def test_two_nodes(start: Start, queue: Slurm, tmp_path: Path, local_tables: Bytes) -> None:
-    _end(start(*ON_SLURM))
-    assert tables(tmp_path / "out") == local_tables
-    logs = "".join(path.read_text() for path in (tmp_path / "out" / "jobs").glob("*.err"))
+def test_two_nodes(bench: Bench, queue: Slurm) -> None:
+    code, printed = bench.study()
+    assert code == 0, printed
+    assert tables(bench.out) == tables(bench.undisturbed)
+    logs = "".join(path.read_text() for path in (bench.out / "jobs").glob("*.err"))
     assert "ON n1" in logs
     assert "ON n2" in logs
-    assert not list((tmp_path / "out" / "cases").glob(".*"))
+    assert not list((bench.out / "cases").glob(".*"))
     until(lambda: not queue.jobs(), "the end of the jobs")
 
 
-def test_a_cancelled_job(start: Start, queue: Slurm, tmp_path: Path, local_tables: Bytes) -> None:
-    cases, driver = tmp_path / "out" / "cases", start(*ON_SLURM)
-    until(lambda: _at_work(cases), "a solver")
+def test_a_cancelled_job(bench: Bench, queue: Slurm) -> None:
+    driver = bench.start()
+    until(lambda: _at_work(bench), "a solver")
     queue.says("scancel", *queue.jobs())
-    _end(driver)
-    assert tables(tmp_path / "out") == local_tables
-    assert not processes_in(cases)
+    code, printed = ended(driver)
+    assert code == 0, printed
+    assert tables(bench.out) == tables(bench.undisturbed)
+    assert not processes_in(bench.out / "cases")
 
 
-def test_a_killed_driver(start: Start, tmp_path: Path, local_tables: Bytes) -> None:
-    cases, driver = tmp_path / "out" / "cases", start(*ON_SLURM)
-    until(lambda: list(cases.glob("pile-*/done.json")) and _at_work(cases), "a second solver")
-    before = {path: path.stat().st_mtime_ns for path in cases.glob("*/done.json")}
+def test_a_killed_driver(bench: Bench) -> None:
+    driver = bench.start()
+    until(lambda: [*bench.out.glob("cases/pile-*/done.json")] and _at_work(bench), "a second one")
+    before = {path: path.stat().st_mtime_ns for path in bench.out.glob("cases/*/done.json")}
     driver.kill()
     driver.communicate()
-    _end(start(*ON_SLURM))
-    assert tables(tmp_path / "out") == local_tables
+    code, printed = bench.study()
+    assert code == 0, printed
+    assert tables(bench.out) == tables(bench.undisturbed)
     assert {path: path.stat().st_mtime_ns for path in before} == before
-    assert not processes_in(cases)
+    assert not processes_in(bench.out / "cases")
 
 
 REFUSED = {
@@ -66,17 +109,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("settings", REFUSED)
-def test_settings_without_jobs(start: Start, tmp_path: Path, settings: str) -> None:
-    path = tmp_path / "small.toml"
-    text = path.read_text().replace('interface = "lo"', "")
-    path.write_text(text + ("" if "interface" in settings else 'interface = "lo"\n') + settings)
-    driver = start(*ON_SLURM)
-    _, printed = driver.communicate(timeout=300)
-    assert driver.returncode not in (0, None)
+def test_settings_without_jobs(bench: Bench, settings: str) -> None:
+    text = STUDY.replace('interface = "lo"\n', "") if "interface" in settings else STUDY
+    bench.source.write_text(text + settings)
+    code, printed = bench.study()
+    assert code in (1, 2), printed
     (line,) = (line for line in printed.splitlines() if line.startswith("orchestrator"))
     assert re.search(REFUSED[settings], line)
     assert "[cluster]" in line
-    assert "Traceback" not in printed
 
 
 def test_without_the_extra_one_line_says_what_to_install(

@@ -7,9 +7,10 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import psutil
 
@@ -50,6 +51,8 @@ class Bench:
 
     folder: Path
     undisturbed: Path
+    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
+    options: Sequence[str] = ()
     drivers: list[Driver] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -62,10 +65,11 @@ class Bench:
     def start(self, *, programs: Path | None = None, under: Sequence[str] = ()) -> Driver:
         """Start the study's driver, with programs before the real ones, under a command."""
         paths = [*([str(programs)] if programs else []), os.environ["PATH"]]
+        variables = {"PYTHONPATH": str(ROOT), "PATH": os.pathsep.join(paths)}
         driver = subprocess.Popen(
-            [*under, *ORCHESTRATOR, "study", "small.toml", "--out", str(self.out)],
+            [*under, *ORCHESTRATOR, "study", "small.toml", "--out", str(self.out), *self.options],
             cwd=self.folder,
-            env={**ENVIRONMENT, "PATH": os.pathsep.join(paths)},
+            env={**self.environment, **variables},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -94,6 +98,17 @@ class Bench:
         assert tables(self.out) == tables(self.undisturbed)
         assert none_left_in(self.folder)
         assert not list(self.out.rglob("*.tmp"))
+
+
+@contextlib.contextmanager
+def begun(folder: Path, text: str, *about: Any) -> Iterator[Bench]:
+    """A study that is not begun; drivers that a failed test has left are ended."""
+    bench = Bench(folder, *about)
+    bench.source.write_text(text)
+    yield bench
+    for driver in bench.drivers:
+        with driver:
+            driver.kill()
 
 
 def undisturbed(folder: Path, text: str) -> Path:

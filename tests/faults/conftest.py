@@ -1,6 +1,5 @@
 """The studies that faults are injected into."""
 
-import contextlib
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,24 +7,13 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import Shared
-from tests.faults.bench import CELLS, HEAD, PILE, Bench, undisturbed
-
-
-@contextlib.contextmanager
-def _bench(folder: Path, text: str, undisturbed: Path) -> Iterator[Bench]:
-    """A study that is not begun; drivers that a failed test has left are ended."""
-    bench = Bench(folder, undisturbed)
-    bench.source.write_text(text)
-    yield bench
-    for driver in bench.drivers:
-        with driver:
-            driver.kill()
+from tests.faults.bench import CELLS, HEAD, PILE, Bench, begun, undisturbed
 
 
 @pytest.fixture
 def pile(tmp_path: Path, finished_pile: Path) -> Iterator[Bench]:
     """The study of a pile and two cells, not begun."""
-    with _bench(tmp_path, HEAD + CELLS + PILE, finished_pile) as bench:
+    with begun(tmp_path, HEAD + CELLS + PILE, finished_pile) as bench:
         yield bench
 
 
@@ -34,7 +22,7 @@ def cells(tmp_path: Path, shared: Shared) -> Iterator[Bench]:
     """The study of two cells, not begun."""
     with shared("cells") as folder:
         finished = undisturbed(folder, HEAD + CELLS)
-    with _bench(tmp_path, HEAD + CELLS, finished) as bench:
+    with begun(tmp_path, HEAD + CELLS, finished) as bench:
         yield bench
 
 

@@ -96,18 +96,6 @@ def test_an_ended_driver(
     pile.check_finished()
 
 
-def test_a_hang_up_under_nohup_at_each_stage_ends_nothing(pile: Bench) -> None:
-    (pile.folder / SINCE).touch()
-    driver = pile.start(under=NOHUP)
-    for stage in STAGES:
-        assert wait_for(partial(_is_in, pile, stage), driver), stage
-        driver.send_signal(HUP)
-    code, printed = ended(driver)
-    assert code == 0, printed
-    assert "stopped" not in printed
-    assert bench.tables(pile.out) == bench.tables(pile.undisturbed)
-
-
 @pytest.mark.parametrize("under", [(), NOHUP])
 def test_a_terminal_that_is_closed(pile: Bench, under: tuple[str, ...]) -> None:
     master, slave = os.openpty()

@@ -8,16 +8,8 @@ import time
 import pytest
 
 from tests.conftest import Mount
-from tests.faults.bench import (
-    ENVIRONMENT,
-    ORCHESTRATOR,
-    Bench,
-    ended,
-    none_left_in,
-    tables,
-    wait_for,
-    wrapper,
-)
+from tests.faults import bench
+from tests.faults.bench import Bench, ended, none_left_in, wait_for, wrapper
 
 
 @pytest.mark.parametrize("size", ["16k", "300k", "900k"])
@@ -133,14 +125,14 @@ STREAMS = {
 
 @pytest.mark.parametrize("redirection", STREAMS)
 def test_a_study_ends_well_whatever_its_streams(cells: Bench, redirection: str) -> None:
-    driver = f"'{ORCHESTRATOR[0]}' -m orchestrator study small.toml --out out {redirection}"
+    driver = f"'{bench.ORCHESTRATOR[0]}' -m orchestrator study small.toml --out out {redirection}"
     shell = subprocess.run(
         ["bash", "-o", "pipefail", "-c", driver],
         cwd=cells.folder,
-        env=ENVIRONMENT | {"PYTHONIOENCODING": "ascii:strict"},
+        env=bench.ENVIRONMENT | {"PYTHONIOENCODING": "ascii:strict"},
         capture_output=True,
         text=True,
     )
     assert shell.returncode == STREAMS[redirection], shell.stderr
     assert "Traceback" not in shell.stdout + shell.stderr
-    assert tables(cells.out) == tables(cells.undisturbed)
+    assert bench.tables(cells.out) == bench.tables(cells.undisturbed)

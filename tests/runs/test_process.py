@@ -15,7 +15,7 @@ from orchestrator import solvers
 from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import process
 from orchestrator.runs.process import Ended
-from orchestrator.solvers import doctor, liggghts, openfoam
+from orchestrator.solvers import liggghts, openfoam
 
 ROOT = Path(__file__).parents[2]
 Put = Callable[[str], Path]
@@ -166,12 +166,3 @@ def test_the_home_of_another_openfoam(tmp_path: Path, monkeypatch: Patch) -> Non
         VERSIONS["simpleFoam"]()
     monkeypatch.setenv("WM_PROJECT_DIR", "")
     assert VERSIONS["simpleFoam"]() == openfoam.TRIED
-
-
-def test_the_doctor_names_a_solver_that_is_broken(put: Put, name: str) -> None:
-    put("exit 1")
-    openfoam.version.cache_clear()
-    liggghts.version.cache_clear()
-    findings = list(doctor.examine())
-    assert sum(not finding.good for finding in findings) == 1
-    assert len(doctor.text(findings).splitlines()) == len(findings)
