@@ -29,8 +29,8 @@ windward face on which it is judged: toe and crest are points of the mesh."""
 THRESHOLD = {"pile": 0.03, "line": 0.10}
 """Relative tolerances of a pile's thresholds, under the given stress and with one's own flow."""
 SCATTER, POURED_SCATTER = 0.10, 0.15
-"""Part of N, also of poured beds, by which the count of moved grains may differ besides a load step,
-as runs do that differ by round-off: a grain holds up others, a chain goes at once (engines.md)."""
+"""Part of N, also of poured beds, by which the count of moved grains may differ besides one load
+step, as runs do that differ by round-off: grains hold up others, chains go at once (engines.md)."""
 LEVEL_ROWS = 0.35
 """Part of N until which level rows are judged: then a whole step goes at once or not, as the least
 detail decides (docs/engines.md)."""
