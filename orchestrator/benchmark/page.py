@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
-from orchestrator.benchmark import compare, pack
+from orchestrator.benchmark import compare
 from orchestrator.benchmark.compare import OURS
 from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
@@ -34,12 +34,10 @@ Every number is in comparison.csv beside this page, every scene in verdicts.csv.
 gave the expected answers."""
 THRESHOLDS = """Threshold Shields numbers. One with a * is outside the interval of the expected
 answer, one with ** also beyond its tolerance: it fails."""
-COSTS = """CPU time of each pile under the given stress, s and over ours. Where a solver states its
-time steps, M/s is millions of them a second of CPU time, times the mobile grains."""
 SHOWN = {
-    **{name: name for name in ("solver", "scene", "kind", "passed")},
-    **{"error": "error, %", "worst": "largest, %", "seconds": "s", "ours_seconds": "ours, s"},
-    **{"ratio": "ratio", "cpu_ratio": "CPU ratio", "peak_mib": "MiB"},
+    **{"solver": "solver", "scene": "scene", "passed": "passed", "error": "error, %"},
+    **{"worst": "largest, %", "seconds": "s", "ratio": "over ours", "cpu_s": "CPU, s"},
+    **{"cpu_ratio": "CPU over ours", "peak_mib": "MiB", "steps": "time steps"},
 }
 """Columns of the table of scenes."""
 BEDS = (
@@ -71,8 +69,7 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
             Section("Levels", text, (), (compare.summary(theirs),), LIMITS),
             Section("What failed", tables=(compare.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
-            Section("Time and error", COSTS, _speed(verdicts), (costs(chosen, verdicts),)),
-            Section("Scenes", tables=(scenes.rename(columns=SHOWN),)),
+            Section("Time and error", "", _speed(verdicts), (scenes.rename(columns=SHOWN),)),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
@@ -103,24 +100,6 @@ def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
     table = table.pivot(index=["scene", "n/N", "interval"], columns="solver", values="texts")
     table = table.reindex(columns=[*_looks(asked)]).reset_index()
     return table[["scene", "n/N", *_looks(asked), "interval"]]
-
-
-def costs(chosen: Pack, verdicts: pd.DataFrame) -> pd.DataFrame:
-    """CPU time of each pile, ours and each solver's, and the grain-steps of a second of it."""
-    piles = verdicts[verdicts["answered"] & (verdicts["kind"] == "pile")]
-    # of the fixed grains a solver may leave out those that nothing can touch
-    scenes = chosen.root / pack.SCENES
-    kinds = {name: pd.read_csv(scenes / name / "grains.csv")["kind"] for name in piles["scene"]}
-    mobile = piles["scene"].map({name: (kind != "fixed").sum() for name, kind in kinds.items()})
-    values: dict[str, pd.Series] = {
-        ", s": piles["cpu_s"],
-        " over ours": piles["cpu_ratio"].where(piles["solver"] != OURS),
-        ", M/s": mobile * piles["steps"] / piles["cpu_s"] / 1e6,
-    }
-    table = piles.assign(mobile=mobile, **values)
-    table = table.pivot(index=["scene", "mobile"], columns="solver", values=[*values])
-    table.columns = ["".join(pair[::-1]) for pair in table.columns]
-    return table.dropna(axis="columns", how="all").reset_index()
 
 
 def _legends(canvas: Canvas, looks: dict[str, Look], levels: Any, *samples: Line2D) -> None:

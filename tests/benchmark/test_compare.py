@@ -163,7 +163,7 @@ def test_two_solvers_on_one_page(
     parsed = Page((both / "comparison.html").read_text(encoding="utf-8"))
     assert parsed.texts["title"] == "Against the pack “pack”: right, wrong_one"
     assert "33 of 34 scenes passed" in parsed.text
-    assert "wrong_one over ours" in parsed.texts["th"]
+    assert "wrong_one" in parsed.texts["th"]
     assert {*os.listdir(both / "figures")} >= {"moved.png", "shields.png", "speed-accuracy.png"}
     # alone a solver is not named, and the page lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
@@ -171,7 +171,7 @@ def test_two_solvers_on_one_page(
     assert outcome.page == wrong / "comparison.html"
 
 
-def test_tables_of_thresholds_and_costs(all_levels: Path, right: Path, wrong: Path) -> None:
+def test_the_table_of_thresholds(all_levels: Path, right: Path, wrong: Path) -> None:
     chosen = pack.read(all_levels)
     numbers, verdicts = compare.judge(chosen, chosen.chosen((), CHOICE.patterns), [right, wrong])
     table = page.thresholds(numbers)
@@ -179,13 +179,6 @@ def test_tables_of_thresholds_and_costs(all_levels: Path, right: Path, wrong: Pa
     assert table.columns.tolist() == names
     assert not table["right"].str.contains("**", regex=False).any()
     assert table["wrong_one"].str.endswith(" **").all()
-    (row,) = page.costs(chosen, verdicts).to_dict("records")
-    kinds = pd.read_csv(all_levels / "scenes" / row["scene"] / "grains.csv")["kind"]
-    mobile = kinds.isin(["mobile", "counted", "pushed"]).sum()
-    assert row["mobile"] == mobile < len(kinds)
-    assert row["right over ours"] == pytest.approx(row["right, s"] / row["ours, s"])
-    assert row["wrong_one, M/s"] == pytest.approx(mobile * 1e-3 / row["wrong_one, s"])
-    assert "right, M/s" not in row  # it states no time steps
     ours = verdicts[verdicts["solver"] == "ours"].set_index("kind").loc["pile"]
     assert ours["worst"] < 1e-6  # the expected answer is our own run
 
