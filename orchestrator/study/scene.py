@@ -40,7 +40,7 @@ OFF_MEDIAN = 0.01
 a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
-OUT = "leave it out"
+OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
 class Scene(parts.Part):
@@ -74,16 +74,16 @@ class Scene(parts.Part):
         yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
         is_raised = self.forces.exposure == "protrusion"
         blind = is_raised and law in LAWS and not LAWS[law].protrudes
-        yield blind, "forces.exposure", f"{law} knows none", 'choose the law "bridged"'
+        yield blind, "forces.exposure", f"the law {law} has none", 'choose "bridged"'
         width = bed.width if isinstance(bed, PileBed) else 0.0
         poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
         for name, value in poured.items():
-            yield value and not self.is_poured, name, "it is of poured beds", 'packing = "poured"'
+            yield value and not self.is_poured, name, "it is of poured beds", POURED
         stiff = self.is_poured and method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS
         most = f"at most {MOST_POURED_STIFFNESS:g}"
         yield stiff, "grain.stiffness", "such springs throw poured grains apart", most
-        few = 0 < update < LEAST_UPDATE
-        yield few, "protocol.update", "each is a solve of the flow", f"0, or {LEAST_UPDATE:g} on"
+        few, least = 0 < update < LEAST_UPDATE, f"0, or at least {LEAST_UPDATE:g}"
+        yield few, "protocol.update", "each update is a solve of the flow", least
         if isinstance(bed, PileBed):
             yield from self._rules_of_bed(bed)
             yield from self._rules_of_flow(bed)
@@ -100,23 +100,18 @@ class Scene(parts.Part):
             what = f"diameters do not rise, or fractions add up to {fractions.sum():.6g}, not 1"
             yield wrong, "grain.sizes", what, "look at the rows"
         median, (low, high) = parts.percentile(mixture, d, 0.5), parts.extremes(mixture, d)
-        what = f"the d50 of grain.sizes is {median:.6g} m"
-        yield (
-            abs(median / d - 1) > slack,
-            "grain.diameter",
-            what,
-            "write it, or change the cut-offs",
-        )
+        off, what = abs(median / d - 1) > slack, f"the d50 of grain.sizes is {median:.6g} m"
+        yield off, "grain.diameter", what, "write that, or change the cut-offs"
         what = f"the largest grain is {high / low:.3g} times the smallest"
         yield high / low > LARGEST_RATIO, "grain.sizes", what, f"at most {LARGEST_RATIO:g}"
 
     def _rules_of_bed(self, bed: PileBed) -> Iterator[Rule]:
         d, profile, slope, shape = self.grain.diameter, bed.profile, bed.slope_deg, bed.shape
         planar = self.protocol.method == "peeling" or self.protocol.update
-        yield planar and bed.width, "bed.width", "peeling and updates know planar beds alone", OUT
+        yield planar and bed.width, "bed.width", "peeling and updates need a bed in a plane", OUT
         least = LEAST_WIDTH * parts.extremes(self.grain.sizes, d)[1]
         what = f"three of the largest grains are {least:.4g} d"
-        yield 0 < bed.width < least, "bed.width", what, "raise it, or 0: a planar bed"
+        yield 0 < bed.width < least, "bed.width", what, "raise it, or 0: a bed in a plane"
         yield bed.relative_size != 1, "bed.relative_size", "it is of single grains", OUT
         yield bed.spacing and bed.forms == 1, "bed.spacing", "one form has no neighbour", OUT
         yield bed.height < 5 * d, "bed.height", f"less than five grains of {d:g} m", "raise it"
@@ -126,7 +121,7 @@ class Scene(parts.Part):
         if profile is None:
             (low, high), rises = BUILDABLE_DEG, bed.form.rises
             gentle = low <= slope <= high or not rises
-            yield not gentle, "bed.slope_deg", f"not {low:g} ... {high:g} deg", "change it"
+            yield not gentle, "bed.slope_deg", f"{slope:g} deg", f"choose {low:g} to {high:g}"
             yield slope and not rises, "bed.slope_deg", f"the shape {shape} does not rise", OUT
             yield bed.smoothing, "bed.smoothing", "it is of a profile", OUT
             for name, declared in PileBed.model_fields.items():
@@ -135,7 +130,12 @@ class Scene(parts.Part):
                 yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
             return
         count, cell = profile.x[-1] / d, self.first_cell_height
-        yield count > MOST_GRAINS, "bed.profile", f"{count:.0f} grains long", "is it in mm?"
+        yield (
+            count > MOST_GRAINS,
+            "bed.profile",
+            f"{count:.0f} grains long",
+            "is it in mm? Or cut it",
+        )
         steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
         cells = NARROWEST_OVER_CELL * cell if self.flow.model == "solve" else 0.0
         near, least = int(np.argmin(steps)), max(NARROWEST_OVER_D * d, cells)
@@ -159,8 +159,8 @@ class Scene(parts.Part):
         frozen = flow.nodes or not solved or self.protocol.method == "pivot"
         what = 'it needs a flow that is solved, without nodes, and the method "dem"'
         yield update and frozen, "protocol.update", what, OUT
-        coarse = bool(update) and cell > self.grain.diameter
-        yield coarse, "protocol.update", "the first cell is higher than a grain", "lower it"
+        coarse, what = bool(update) and cell > self.grain.diameter, "higher than a grain"
+        yield coarse, "flow.first_cell_height", f"{what}, with protocol.update", "lower it"
 
     @cached_property
     def id(self) -> str:

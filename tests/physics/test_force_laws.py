@@ -124,13 +124,6 @@ def test_a_law_names_the_ranges_that_it_is_beyond(
     assert bool(LAWS[name].valid(reynolds, unit(ratio))) == (not why)
 
 
-def test_the_range_is_judged_for_each_grain() -> None:
-    at = np.array([1.0, 100.0, 1000.0])
-    np.testing.assert_array_equal(LAWS["high"].valid(at, unit()), [False, True, False])
-    below, within, beyond = reasons(LAWS["profile"].ranges(3000.0 * at / 100, unit()), 3)
-    assert (below, "Schiller" in within, "Cebeci" in within, "Cebeci" in beyond) == ("", 1, 1, 1)
-
-
 def test_clift_and_gauvin_go_on_where_schiller_and_naumann_end() -> None:
     ratio = CLIFT_GAUVIN.factor(np.array(800.0)) / SCHILLER_NAUMANN.factor(np.array(800.0))
     assert float(ratio) == pytest.approx(1.046, abs=5e-4)
