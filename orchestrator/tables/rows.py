@@ -16,12 +16,7 @@ from orchestrator.grains.cells import SingleGrainCase
 from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
-from orchestrator.physics.measured import (
-    MeasuredHill,
-    egiazaroff_hiding,
-    rushil_hill,
-    wilcock_crowe_hiding,
-)
+from orchestrator.physics import measured
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
 from orchestrator.plan import Plan
 from orchestrator.study import fields
@@ -32,8 +27,8 @@ from orchestrator.types import BoolArray, Row
 
 POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "regime")
 """Columns by which a scene is found in a figure; tables of results have them too."""
+# u*/u*_0 at equal parts of the way along the bed from the foot to the top
 WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
-"""Columns of u*/u*_0 at equal parts of the way along the bed from the foot to the top."""
 
 
 def point(scene: Scene) -> Row:
@@ -143,12 +138,12 @@ def flow(pile: Pile, cases: Path) -> Row:
     return row
 
 
-def measured_hill(pile: Pile) -> MeasuredHill | None:
+def measured_hill(pile: Pile) -> measured.MeasuredHill | None:
     """The hill of a wind tunnel that a pile is, if any."""
     bed, case = pile.bed, pile.flow
     if bed.shape != "rushil" or bed.profile or bed.forms > 1 or bed.obstacles:
         return None
-    return rushil_hill(bed.slope_deg, case.height_m / case.roughness_m)
+    return measured.rushil_hill(bed.slope_deg, case.height_m / case.roughness_m)
 
 
 class Answer:
@@ -301,8 +296,8 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "shields_own_low": low,
                 "shields_own_high": high,
                 "hiding": value / middle if middle > 0 else np.nan,
-                "hiding_wilcock_crowe": float(wilcock_crowe_hiding(size) / size),
-                "hiding_egiazaroff": float(egiazaroff_hiding(size)),
+                "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(size) / size),
+                "hiding_egiazaroff": float(measured.egiazaroff_hiding(size)),
             }
 
 
@@ -336,10 +331,7 @@ def forms(answer: Answer) -> Iterator[Row]:
 
 
 def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
-    """Columns of thresholds on beds that change beside those on the frozen beds, by grain.
-
-    For each pile that the study asks for on both, up to its last fraction.
-    """
+    """Columns of thresholds, by grain, of the piles asked for on a changing and a frozen bed."""
     frozen = {each.scene_id: each for each in answers if not each.pile.scene.protocol.update}
     for answer in answers:
         scene, count = answer.pile.scene, answer.motion.count
@@ -370,8 +362,8 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
 
 def check(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
     """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
-    compared = decision.compare(plan.piles, plan.checks, tolerance, cases, done)
-    for asked, cheap, dem, agree in compared:
+    both = plan.piles, plan.checks
+    for asked, cheap, dem, agree in decision.compare(*both, tolerance, cases, done):
         scene, pile = plan.piles[asked].scene, plan.checks[asked]
         yield {
             "scene_id": asked,

@@ -11,19 +11,13 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.study import fields
 
+# a bed is hydraulically smooth below u* k_s/nu = 5, k_s = 30 z0 (Nikuradse, VDI Forschungsh. 361)
 SMOOTH_BELOW = 5 / 30
-"""u* z0/nu below which a bed is hydraulically smooth: u* k_s/nu = 5 with k_s = 30 z0 (Nikuradse,
-VDI Forschungsheft 361, 1933)."""
+# speed times depth over nu: of a channel its mean speed, of a boundary layer U_e at 10 h
 TURBULENT_FROM = 2000.0
-"""Speed times depth over nu from which a flow is turbulent: of a channel its mean speed and depth,
-of a boundary layer U_e and the 10 h at which it is given."""
-EXPOSED_FROM = 0.25
-"""Part of a grain over the tops of its neighbours from which it is an exposed one."""
-CARRIED_OFF = 0.1
-"""Share of the moved grains from which a threshold is one of lift-off."""
-ROW_HOLD = 1.05
-"""u*_0 at which the first grain leaves, over that of the first grain by itself, from which a row
-is held by its neighbours."""
+EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
+CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
+ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
 SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these are taken to scatter alike: rows are level, or lie along the slope;
 lift carries grains off, which then collide, or it does not."""
@@ -40,11 +34,8 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
         return thresholds
     of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
     replicas = of_scene.groupby(fields.others(of_scene, "seed"), dropna=False).ngroup()
-    ids = thresholds["scene_id"]
-    level, lifted = (
-        ids.map(of_scene["packing"]) == "horizontal",
-        thresholds["share_carried_off"] > 0,
-    )
+    ids, lifted = thresholds["scene_id"], thresholds["share_carried_off"] > 0
+    level = ids.map(of_scene["packing"]) == "horizontal"
     table = thresholds.assign(level=level, lifted=lifted, replicas=ids.map(replicas))
     groups = table.dropna(subset=["shields"]).groupby([*SIMILAR, "replicas"])["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
