@@ -43,6 +43,9 @@ LINES = 3
 """Laws beyond which only those near the measurements are drawn."""
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
+SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
+"""Columns in which piles agree that a line joins."""
+GAP = np.full((1, 2), np.nan)
 AXES = labels.RE_AXIS, labels.TAU_AXIS
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
 PILE = ("reynolds", "shields", "shields_low", "shields_high")
@@ -224,8 +227,7 @@ def draw_published(
                 ax.plot(*points, label=label, **look)
     if sloped and theory.in_gas(scenes).all():
         return
-    gap = np.full((1, 2), np.nan)
-    lines = [part for item in curves.WATER for part in (np.column_stack(item.points()), gap)]
+    lines = [part for item in curves.WATER for part in (np.column_stack(item.points()), GAP)]
     ax.plot(*np.concatenate(lines).T, color=style.WATER, lw=0.4, zorder=1)
     x, low, high, covered = _band()
     look = {"color": style.WATER, "alpha": 0.45, "lw": 0, "zorder": 1, "gid": "water band"}
@@ -252,7 +254,7 @@ def single_grains(results: Results) -> pd.DataFrame:
     """
     scenes, answers = results.beds("grain"), results.joined("single_grain")
     if answers.empty:
-        answers = pd.DataFrame(columns=["scene_id", *DEM, "ustar_m_s"])
+        answers = pd.DataFrame(columns=["scene_id", *DEM, "ustar_m_s", "usable"])
     extra = [column for column in answers if column not in scenes or column == "scene_id"]
     return scenes[held(scenes)].merge(answers[extra], how="left", on="scene_id")
 
@@ -392,6 +394,8 @@ def _diagrams(
     # the closed form depends on nothing else that a panel does not show
     choices, every = parted(every, *SHOWN, "fraction" if piles else "beta_deg")
     keys = [{"fraction": "alpha_deg", "force_law": "beta_deg"}.get(by, "z0_over_d"), *choices]
+    # to part a hundred columns takes long
+    narrow = [*dict.fromkeys((*SHOWN, *columns, by, "regime", "usable", SHAPE, LABEL))]
     for sheet in sheets(rows, keys, 2.5, *AXES):
         dashes = theory.dashes(sheet.rows["force_law"])
         shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
@@ -404,14 +408,16 @@ def _diagrams(
                     shade = colours.get(dict(zip(theory.BED, line.bed, strict=True)).get(by), "0.2")
                     look = shade, dashes[line.law]
                 draw_line(ax, line, f"closed form: {label}", *look)
-            here = shown[shown["scene_id"].isin(part["scene_id"])]
+            here = shown.loc[shown["scene_id"].isin(part["scene_id"]), narrow]
             for (value,), group in split(here, by):
-                for _, series in split(group, "nu_m2_s", "force_law", "regime", SHAPE):
-                    # piles that differ in more than d are a scatter, not a line
-                    if piles and series["d_m"].is_unique:
-                        ordered = series.sort_values("reynolds")
-                        thin: Look = {"color": colours[value], "lw": 0.6, "zorder": 2}
-                        ax.plot(ordered["reynolds"], ordered["shields"], **thin)
+                # piles that differ in more than d are a scatter, not a line
+                joined = [
+                    np.vstack([series.sort_values("reynolds")[["reynolds", "shields"]], GAP])
+                    for _, series in split(group if piles else here[:0], *SERIES)
+                    if series["d_m"].is_unique
+                ]
+                if joined:
+                    ax.plot(*np.concatenate(joined).T, color=colours[value], lw=0.6, zorder=2)
                 draw_points(ax, group, colours[value], columns)
         prepare(sheet, [*theory.span(sheet.rows), *shown["reynolds"]])
         legends(sheet, by, {} if by_law else colours)
