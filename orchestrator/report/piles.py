@@ -67,12 +67,9 @@ def fractions(results: Results) -> Iterator[Figure]:
             shields.legends(sheet, "d_m", colours)
             name, where = f"fractions-alpha{alpha:g}{sheet.name}", labels.plain("alpha_deg", alpha)
             title = f"Fraction of moving grains, {where}{sheet.title}"
-            text, cases = (
-                caption("fractions", about=shields.about(sheet.rows)),
-                case_names(sheet.rows),
-            )
+            text = caption("fractions", about=shields.about(sheet.rows))
             fold = bool(sheet.name) or alpha != scenes["alpha_deg"].min()
-            yield Figure(name, title, text, cases, sheet.canvas, fold=fold)
+            yield Figure(name, title, text, case_names(sheet.rows), sheet.canvas, fold=fold)
 
 
 def wear(results: Results) -> Iterator[Figure]:
@@ -168,11 +165,11 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
     natural = "Kirchner et al. (1990), $D = D_{50}$"
     ax.plot(measured.kirchner_pivot(percent), percent, color="0.5", ls="--", label=natural)
     ax.axvline(30, color=style.WATER, lw=1, label="lattice, β = 60°")
-    ax.set(xlabel="pivot angle of an exposed grain, degrees", ylabel="percentile")
-    ax.set(xlim=(0, 120), ylim=(0, 100))
+    ax.set(xlabel="pivot angle of an exposed grain, degrees", xlim=(0, 120))
+    ax.set(ylabel="percentile", ylim=(0, 100))
     ax.legend(loc="lower right")
-    title, cases = "Pockets of the exposed grains", case_names(results.scenes)
-    return Figure("pivots", title, caption("pivots"), cases, figure)
+    cases = case_names(results.scenes)
+    return Figure("pivots", "Pockets of the exposed grains", caption("pivots"), cases, figure)
 
 
 def _hiding(rows: pd.DataFrame) -> Figure:
@@ -189,8 +186,8 @@ def _hiding(rows: pd.DataFrame) -> Figure:
             mean, low, high = (np.exp(item) for item in (logs.mean(), logs.min(), logs.max()))
             reach = [mean["hiding"] - low["hiding"], high["hiding"] - mean["hiding"]]
             look: Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
-            colour = colours[float(str(fraction))]
-            ax.errorbar(mean["size_over_d"], mean["hiding"], yerr=reach, color=colour, **look)
+            look["color"] = colours[float(str(fraction))]
+            ax.errorbar(mean["size_over_d"], mean["hiding"], yerr=reach, **look)
         ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
         for label, formula, dash in HIDING:
             ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1, label=label)
@@ -198,5 +195,5 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
     shields.legends(sheet, "fraction", colours)
-    title = "Hiding and exposure of sizes"
-    return Figure("hiding", title, caption("hiding"), case_names(rows), sheet.canvas)
+    title, cases = "Hiding and exposure of sizes", case_names(rows)
+    return Figure("hiding", title, caption("hiding"), cases, sheet.canvas)
