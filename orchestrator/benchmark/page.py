@@ -90,7 +90,8 @@ def _looks(table: pd.DataFrame) -> dict[str, Look]:
 def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
     """The threshold Shields numbers of piles: ours, each solver's, the interval."""
     asked = numbers[numbers["quantity"].eq("shields") & numbers["at"].ne("")]
-    is_inside = asked["answer"].between(asked["low"], asked["high"])
+    margin = compare.ROUND * asked["value"]
+    is_inside = asked["answer"].between(asked["low"] - margin, asked["high"] + margin)
     marks = np.where(asked["within"], np.where(is_inside, "", " *"), " **")
     pairs = zip(asked["answer"], marks, strict=True)
     texts = ["—" if x != x else f"{x:#.3g}{mark}" for x, mark in pairs]
