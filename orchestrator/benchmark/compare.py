@@ -132,6 +132,8 @@ def _place(out: Path | None, chosen: Pack) -> Path:
     out = out or Path("results") / f"benchmark-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
+    if out.name == OURS:
+        raise InputError("two solvers have the name ours", str(out), "use --out")
     return out.absolute()
 
 
