@@ -15,13 +15,7 @@ PICTURES = ("bed-*.svg", "shields.svg")
 
 
 def write(directory: Path) -> Path:
-    """Write the gallery of the studies that a directory holds, and give its path.
-
-    Raises
-    ------
-    InputError
-        If it holds no study with a page.
-    """
+    """Write the gallery of the studies in a directory, an `InputError` if there is none."""
     cards = []
     for study in sorted(path.parent for path in directory.glob(f"*/{PAGE}")):
         if not (study / STUDY.marker).is_file():

@@ -41,9 +41,9 @@ def write(
     faults: list[str] = []
     with style.settings():
         for draw in (
-            *(bed.draw, shields.draw, shields.singles, shields.piles, piles.fractions, piles.wear),
-            *(shields.accuracy, piles.poured, flows.stress, flows.flow, flows.mesh),
-            *(flows.where, flows.hills),
+            *(flows.hills, bed.draw, shields.draw, shields.singles, shields.piles),
+            *(piles.fractions, piles.wear, shields.accuracy, piles.poured),
+            *(flows.stress, flows.flow, flows.mesh, flows.where),
         ):
             try:
                 for figure in draw(results):
@@ -52,7 +52,7 @@ def write(
                 faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
                 print(f"a figure could not be drawn: {faults[-1]}", file=sys.stderr)
             terminal.check()
-    figures.sort(key=lambda figure: (not figure.first, not figure.leads))
+    figures.sort(key=lambda figure: not figure.leads)
     names = [figure.name for figure in figures]
     added = [part for guest in guests if (part := guest(results.study, results.tables, names))]
     for name, text in (item for _, files in added for item in files.items()):

@@ -124,7 +124,8 @@ def draw(results: Results) -> Iterator[Figure]:
         title = f"The bed when {share:.0%} of its grains have moved, {told}"
         image = _svg(steps, shown, results.cases).encode()
         cases, text = tuple(run.name for run in reversed(pile.runs)), words(results, pile)
-        yield Figure(name, title, text, cases, None, image, data(steps, shown), fold=number > 0)
+        look = {"fold": number > 0, "leads": number == 0}
+        yield Figure(name, title, text, cases, None, image, data(steps, shown), **look)
 
 
 def words(results: Results, pile: Pile) -> str:

@@ -34,8 +34,6 @@ REVERSED: Look = {"color": "0.85", "lw": 0, "gid": "reversed flow", "label": "re
 MODELS = dict(zip(get_args(Turbulence), ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), strict=True))
 """Colours of the turbulence models."""
 USTAR = r"$u^\star/u^\star_0$"
-BEDS = 4
-"""Largest number of beds in the map of thresholds."""
 Window = tuple[float, float, float, float]
 """Left, right, bottom, top."""
 
@@ -98,7 +96,8 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
         ax.plot(group["x_m"] / h, group["ustar_over_ustar0"], label=label, **FELT)
     for name, at in marks(pile).items():
         ax.axvline(at / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
-        style.upright_note(ax, at / h - 0.1, name, at="top")
+        look = {"transform": ax.get_xaxis_transform(), "rotation": 90, **style.NOTE}
+        ax.text(at / h - 0.1, 0.97, name, ha="right", va="top", **look)
     ax.margins(y=0.25)
     ax.set_title(_title(results, pile), loc="left")
     below, low, high = ax.twinx(), min(line.z) / h, max(line.z) / h
@@ -159,7 +158,6 @@ def flow(results: Results) -> Iterator[Figure]:
     for name, title, shown in style.pages(drawn(results)):
         toe = max(pile.model.line.x[-2] / pile.bed.height for pile in shown)
         window = left, right, bottom, top = -2.0, toe + 8.0, 0.0, 3.0
-        # as high as to scale, with a title over each panel
         panel = 0.4 + 0.9 * style.WIDTH * (top - bottom) / (right - left)
         figure, axes = style.grid(len(shown), panel, "$x/h$", "$z/h$", 1)
         for ax, pile in zip(axes, shown, strict=True):
@@ -188,11 +186,7 @@ def _draw_bed(ax: Axes, pile: Pile) -> None:
 
 
 def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
-    """Contours of the stream function.
-
-    Outside the region that runs back it is integrated from above, inside it from the bed: each
-    where the flow is smooth and the function small.
-    """
+    """Contours of the stream function, integrated from above; from the bed where flow runs back."""
     rows, columns, _ = velocity.shape
     x, z = np.linspace(*window[:2], columns), np.linspace(*window[2:], rows)
     u, w = velocity[..., 0], velocity[-1, :, 2]
@@ -230,9 +224,8 @@ def mesh(results: Results) -> Iterator[Figure]:
         axes[0].add_patch(box)
         axes[0].set_title(_title(results, pile), loc="left")
         axes[1].set_title("the crest", loc="left")
-        first = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}"
-        cells, lid = pile.flow.settings.cells_per_face, not pile.scene.flow.depth
-        text = caption("mesh", cells=cells, first=first, lid=lid)
+        first, lid = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}", not pile.scene.flow.depth
+        text = caption("mesh", cells=pile.flow.settings.cells_per_face, first=first, lid=lid)
         yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), figure, fold=True)
 
 
@@ -252,7 +245,7 @@ def where(results: Results) -> Iterator[Figure]:
     for scene_id, pile in results.plan.piles.items():
         if scene_id in scenes and not pile.bed.is_triangle and np.ptp(pile.model.line.z) > 0:
             lines.setdefault(pile.model.line, (pile, scenes[scene_id]))
-    beds = list(lines.values())[:BEDS]
+    beds = list(lines.values())[:4]  # more do not fit a page
     if not beds:
         return
     figure = style.canvas(4.4 * len(beds) + 0.9)
@@ -311,4 +304,4 @@ def hills(results: Results) -> Iterator[Figure]:
     colours = [style.entry(labels.value("turbulence_model", name), MODELS[name]) for name in names]
     style.legends(canvas, colours, style.samples(panels))
     cases, title = tuple(flows["flow_case"]), "Hills that others measured"
-    yield Figure("hills", title, caption("hills"), cases, canvas, first=True)
+    yield Figure("hills", title, caption("hills"), cases, canvas, leads=True)

@@ -38,12 +38,8 @@ def caption(name: str, /, **values: Any) -> str:
 
 @cache
 def _templates(folder: Path, autoescape: bool = True) -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(folder),
-        autoescape=autoescape,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-    )
+    strict: dict[str, Any] = {"undefined": StrictUndefined, "trim_blocks": True}
+    environment = Environment(loader=FileSystemLoader(folder), autoescape=autoescape, **strict)
     filters = {"typeset": typeset, "json": _json, "n": format, "address": address}
     environment.filters.update({**filters, "inline": _inline, "cell": _cell})
     return environment
@@ -103,16 +99,13 @@ class Section:
 def write(
     title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
 ) -> None:
-    """Put the page of an experiment into a directory as a file `name`, and its figures beside it.
+    """Put the page of an experiment into a directory, its figures beside it as PNG and SVG.
 
-    The figures are written as PNG and SVG; `solvers` are the programs that ran, with their
-    versions.
+    `name` is its file; `solvers` are the programs that ran, with their versions.
     """
     from orchestrator.report import style, words  # style imports matplotlib
 
-    shown = [
-        replace(part, figures=[style.saved(figure, folder, png=True) for figure in part.figures])
-        for part in sections
-    ]
+    images = ([style.saved(item, folder, png=True) for item in part.figures] for part in sections)
+    shown = [replace(part, figures=each) for part, each in zip(sections, images, strict=True)]
     values = {"sections": shown, "programs": words.versions(solvers), "links": {}}
     folder.put(name, fill("document.html.j2", title=title, **values))

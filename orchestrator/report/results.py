@@ -19,7 +19,7 @@ from orchestrator.tables.rows import measured_hill
 FRACTION = 0.3
 """n/N at which one threshold stands for all of its pile."""
 RAMP_BELOW = 3.0
-"""Quiet time, sqrt(d/g'), below which a sequence of load steps is a ramp."""
+"""Waiting time, sqrt(d/g'), below which load steps are a ramp; 6 are needed near a threshold."""
 MEANS = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
 """Columns of a threshold of which several seeds have the mean."""
 
@@ -147,10 +147,7 @@ def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
 
 
 def held(table: pd.DataFrame) -> "pd.Series[bool]":
-    """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp.
-
-    A grain half a per cent above its threshold takes 6 sqrt(d/g') to pass the criterion.
-    """
+    """Whether each row's scene holds the flow until its grains are quiet; else it is a ramp."""
     return ~(table["waiting_time"] < RAMP_BELOW)
 
 
@@ -160,10 +157,7 @@ def by_dem(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def valid(table: pd.DataFrame) -> "pd.Series[bool]":
-    """Whether each threshold is usable; of scenes, whether their force law holds.
-
-    A scene is judged at its own single-grain threshold.
-    """
+    """Whether each threshold is usable; of scenes, whether their force law holds at their own."""
     return table["usable" if "usable" in table else "law_holds"].astype(bool)
 
 

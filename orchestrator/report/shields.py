@@ -301,7 +301,8 @@ def draw(results: Results) -> Iterator[Figure]:
         about={**about(scenes), "sloped": ""},
     )
     cases = case_names(piles, grains)
-    yield Figure(NAME, "Extended Shields diagram", text, cases, sheet.canvas, data=points)
+    title = "Extended Shields diagram"
+    yield Figure(NAME, title, text, cases, sheet.canvas, data=points, leads=True)
 
 
 def shown_piles(results: Results) -> pd.DataFrame:

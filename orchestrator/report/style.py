@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import dataclass, replace
 from io import BytesIO
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import matplotlib
 import numpy as np
@@ -70,7 +70,7 @@ class Figure:
 
     `image` (SVG or PNG) is what a page shows; until it is made `canvas` holds the drawing. `data`
     are for the page's script, a pointer or a slider; None if there are none. The page shows a
-    figure with `fold` on demand alone, and one with `first` before all others.
+    figure with `fold` on demand alone, and one that `leads` at its head.
     """
 
     name: str
@@ -81,12 +81,7 @@ class Figure:
     image: bytes = b""
     data: Any = None
     fold: bool = False
-    first: bool = False
-
-    @property
-    def leads(self) -> bool:
-        """Whether it stands at the head of the page."""
-        return self.first or (self.data is not None and not self.fold)
+    leads: bool = False
 
 
 def settings() -> AbstractContextManager[None]:
@@ -170,12 +165,6 @@ def samples(axes: Sequence[Axes]) -> list[Artist]:
 def entry(label: str, colour: str) -> Line2D:
     """A legend's sample of a colour."""
     return Line2D([], [], color=colour, lw=2.5, label=label)
-
-
-def upright_note(ax: Axes, x: float, text: str, at: Literal["top", "bottom"]) -> None:
-    """A small text along the left side of a vertical line."""
-    y, place = 0.97 if at == "top" else 0.03, ax.get_xaxis_transform()
-    ax.text(x, y, text, ha="right", va=at, rotation=90, transform=place, **NOTE)
 
 
 def plain_ticks(axis: Axis) -> None:

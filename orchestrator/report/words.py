@@ -37,10 +37,7 @@ FLUID = ("rho_f_kg_m3", "nu_m2_s")
 def text(results: Results) -> str:
     """The short table, then the sentences, for a terminal.
 
-    Raises
-    ------
-    OrchestratorError
-        If the tables lack columns, as those of another version do.
+    An `OrchestratorError` if the tables lack columns, as those of another version do.
     """
     try:
         answer = "\n".join(sentences(results)) or "No case has given a result yet."
@@ -149,9 +146,8 @@ def piles(results: Results) -> pd.DataFrame | None:
     rows = results.joined("pile_threshold")
     if rows.empty:
         return None
-    keys = [*EACH, "z0_over_d", "nu_m2_s"]
-    keys += [*labels.varying(rows, *keys, "fraction"), "seed", "fraction"]
-    keys = [key for key in keys if key != "seed" or rows[key].nunique() > 1]
+    keys, seeds = [*EACH, "z0_over_d", "nu_m2_s"], ["seed"] * (rows["seed"].nunique() > 1)
+    keys += [*labels.varying(rows, *keys, "fraction"), *seeds, "fraction"]
     return _thresholds(rows, keys, more=("count", "case"))
 
 
@@ -218,11 +214,10 @@ def force_laws(results: Results) -> pd.DataFrame:
     rows = []
     for law in (LAWS[name] for name in LAWS if (results.scenes["force_law"] == name).any()):
         low, high = law.reynolds
-        parts = [f"Re* ≥ {low:g}"] if low > 0 else []
-        parts += [f"Re* < {high:g}"] if np.isfinite(high) else []
+        holds = f"{low:g} ≤ Re* < {high:g}".replace("inf", "∞")
         if np.isfinite(law.drag_end):
-            parts.append(f"V d/ν < {law.drag_end:g} (drag: {law.drag_law})")
-        rows.append((law.label, ", ".join(parts) or "every Re*", law.reference))
+            holds += f", V d/ν < {law.drag_end:g} (drag: {law.drag_law})"
+        rows.append((law.label, holds, law.reference))
     return pd.DataFrame(rows, columns=["force law", "holds for", "source"])
 
 
@@ -259,10 +254,9 @@ def times(timings: pd.DataFrame) -> pd.DataFrame | None:
     """Wall time of the finished cases by their kind: in the solver, and outside it."""
     if timings.empty:
         return None
-    rows = timings.assign(wall=timings["solver_s"] + timings["outside_s"])
-    groups = pd.concat([rows, rows.assign(kind="all")]).groupby("kind", sort=False)
-    sums = groups.agg({"case": "size", "solver_s": "sum", "outside_s": "sum", "wall": "max"})
-    head = ["kind of case", "cases", "in the solver, s", "outside it, s", "longest case, s"]
+    groups = pd.concat([timings, timings.assign(kind="all")]).groupby("kind", sort=False)
+    sums = groups.agg({"case": "size", "solver_s": "sum", "outside_s": "sum"})
+    head = ["kind of case", "cases", "in the solver, s", "outside it, s"]
     return sums.reset_index().set_axis(head, axis=1)
 
 
@@ -282,14 +276,10 @@ def checks(results: Results) -> pd.DataFrame | None:
     table = results.tables.get("check", pd.DataFrame())
     if table.empty:
         return None
-    cells = {
-        **labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"]),
-        **{"τ_c": table["shields"], "by DEM": table["shields_dem"]},
-        "interval of DEM": _spans(table["shields_dem_low"], table["shields_dem_high"], ".4g"),
-        "difference, %": 100 * table["difference"],
-        **{name: table[name] for name in ("agree", "case")},
-    }
-    return pd.DataFrame(cells)
+    tau = {name: table[f"shields{name}"] for name in ("", "_dem", "_dem_low", "_dem_high")}
+    asked = labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"])
+    told = {f"τ_c{name.replace('_', ' ')}": values for name, values in tau.items()}
+    return pd.DataFrame({**asked, **told, **table[["difference", "agree", "case"]]})
 
 
 def remarks(results: Results) -> dict[str, Any]:

@@ -17,9 +17,12 @@ from orchestrator.runs.files import Folder
 
 
 @pytest.fixture(scope="session")
-def page(results: Results) -> Path:
-    """Its page, with one failure reported."""
-    return write(results, results.cases.parent, {next(iter(results.plan.cases)): "it <b>died</b>"})
+def page(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its page, with one failure reported, in a directory of the same name."""
+    out = tmp_path_factory.mktemp("page") / results.cases.parent.name
+    out.mkdir()
+    (out / "cases").symlink_to(results.cases)
+    return write(results, out, {next(iter(results.plan.cases)): "it <b>died</b>"})
 
 
 @pytest.fixture(autouse=True)

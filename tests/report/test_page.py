@@ -116,7 +116,7 @@ def test_links_lead_to_what_is_there(page: Path, parsed: Page, results: Results)
         address = urlparse(urljoin(page.as_uri(), href))
         assert address.scheme == "file"
         targets.add(Path(unquote(address.path)))
-    folders = {results.cases / name for name in results.plan.cases}
+    folders = {page.parent / "cases" / name for name in results.plan.cases}
     assert folders <= targets
     assert all(path.is_dir() for path in targets if path.suffix != ".csv")
     tables = {path.stem for path in targets if path.suffix == ".csv"}
