@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.grains.pile import Pile
 from orchestrator.report import bed, flows
 from orchestrator.report.bed import Steps
 from orchestrator.report.results import FRACTION, Results
-from orchestrator.report.style import Figure
 from tests import small_study
+from tests.report.conftest import axes_of
 
 LEVEL = """
 title = "A level bed"
@@ -31,28 +32,17 @@ shape = "dune"
 slope_deg = 15.0
 height = 0.01
 forms = 2
-mobile_layers = 1
 obstacles = [{ kind = "fence", x = -0.03, height = 0.004 }]
 """
-
-
-STEEP = """
+HILLS = """
 title = "A hill"
 grain = { diameter = 4.71e-3 }
 protocol = { method = "pivot" }
-[bed]
-kind = "pile"
-shape = "rushil"
-slope_deg = 26.175
-height = 0.117
-roughness = 1.57e-4
-[flow]
-cells_per_face = 12
+bed = { kind = "pile", shape = "rushil", slope_deg = 26.175, height = 0.117, roughness = 1.57e-4 }
+flow = { cells_per_face = 12 }
 [axes]
 "flow.turbulence_model" = ["kEpsilon", "RNGkEpsilon"]
 """
-
-
 Studies = pytest.TempPathFactory
 
 
@@ -68,12 +58,29 @@ def train(tmp_path_factory: Studies) -> Results:
 
 @pytest.fixture(scope="module")
 def hills(tmp_path_factory: Studies) -> Results:
-    return small_study.run(tmp_path_factory.mktemp("hills"), STEEP)
+    return small_study.run(tmp_path_factory.mktemp("hills"), HILLS)
 
 
-def test_field_is_that_of_the_flow(results: Results) -> None:
+@pytest.fixture(scope="module")
+def pile(results: Results) -> Pile:
+    """The pile of the small study."""
+    return next(iter(results.plan.piles.values()))
+
+
+@pytest.fixture(scope="module")
+def peeled(pile: Pile) -> Pile:
+    """The same pile, whose grains leave by peeling."""
+    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
+    return replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+
+
+@pytest.fixture(scope="module")
+def steps(results: Results, pile: Pile) -> Steps:
+    return bed.read(pile, results.cases)
+
+
+def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
     (figure,) = flows.flow(results)
-    (pile,) = results.plan.piles.values()
     velocity = flows.over_u_e(pile, results.cases, (-0.02, 0.1, 0.0, 0.03), 1.0, 240)
     speed = np.linalg.norm(velocity, axis=-1)
     assert 0.7 < speed[-1].min() < speed[-1].max() < 1.2
@@ -84,10 +91,13 @@ def test_field_is_that_of_the_flow(results: Results) -> None:
     assert figure.canvas is not None
     image = np.ma.masked_invalid(np.asarray(figure.canvas.axes[0].images[0].get_array()))
     assert 0.9 < float(image.max()) < 1.2
+    # |u|/U_e is 1 at 10 h far upstream; at the lid it is a quarter more
+    window = (-60.0, -59.0, 10.0, 10.1)
+    far = np.linalg.norm(flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1)
+    assert np.nanmean(far) == pytest.approx(1, abs=0.02)
 
 
-def test_mesh_is_that_of_the_flow(results: Results) -> None:
-    (pile,) = results.plan.piles.values()
+def test_mesh_is_that_of_the_flow(results: Results, pile: Pile) -> None:
     edges = flows.read_edges(results.cases / pile.flow.name)
     table = results.tables["wall_stress"]
     faces = len(table)
@@ -100,19 +110,6 @@ def test_mesh_is_that_of_the_flow(results: Results) -> None:
     assert len(middles.intersection(line)) > 0.9 * faces
 
 
-@pytest.fixture(scope="module")
-def steps(results: Results) -> Steps:
-    (pile,) = results.plan.piles.values()
-    return bed.read(pile, results.cases)
-
-
-@pytest.fixture(scope="module")
-def figure(results: Results) -> Figure:
-    """The picture of the bed."""
-    (drawn,) = bed.draw(results)
-    return drawn
-
-
 def test_grains_have_moved_as_the_tables_say(results: Results, steps: Steps) -> None:
     curve = results.tables["pile_curve"]
     counts = steps.totals.tolist()
@@ -122,7 +119,8 @@ def test_grains_have_moved_as_the_tables_say(results: Results, steps: Steps) -> 
     assert counts[shown - 1] < 0.3 * steps.pile.packing.count <= counts[shown]
 
 
-def test_the_slider_has_every_place_of_every_load_step(steps: Steps, figure: Figure) -> None:
+def test_the_slider_has_every_place_of_every_load_step(results: Results, steps: Steps) -> None:
+    (figure,) = bed.draw(results)
     data = figure.data
     assert len(data["frames"]) == len(steps.places) - 1
     assert data["moved"][data["shown"]] >= 0.3 * data["count"]
@@ -136,10 +134,7 @@ def test_the_slider_has_every_place_of_every_load_step(steps: Steps, figure: Fig
         assert np.abs(now[known] * [1, -1] - places[known]).max() <= bed.SHIFT + 0.011
 
 
-def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
-    (pile,) = results.plan.piles.values()
-    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
-    peeled = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
+def test_a_pile_without_dem_has_a_picture_too(results: Results, peeled: Pile) -> None:
     steps = bed.read(peeled, results.cases)
     assert (steps.places == peeled.packing.centres[steps.grains]).all()
     assert steps.totals[-1] > 0.7 * peeled.packing.count
@@ -151,49 +146,31 @@ def test_a_pile_without_dem_has_a_picture_too(results: Results) -> None:
     assert found["moved"][found["shown"]] >= 0.3 * found["count"]
 
 
-def test_marks_are_where_the_form_is(results: Results, level: Results) -> None:
-    (pile,) = results.plan.piles.values()
+def test_a_level_bed_has_no_form_and_names_no_program(
+    results: Results, pile: Pile, level: Results
+) -> None:
     half = 0.01 / np.tan(np.radians(15))
     assert flows.marks(pile) == pytest.approx({"toe": 0, "crest": half, "lee toe": 2 * half})
     (flat,) = level.plan.piles.values()
     assert flows.marks(flat) == {}
-
-
-def test_no_program_is_named_that_did_not_run(level: Results, results: Results) -> None:
     (figure,) = bed.draw(level)
     assert "OpenFOAM" not in figure.caption
     assert "blue" not in figure.caption
-    (pile,) = results.plan.piles.values()
     assert "OpenFOAM" in bed.words(results, pile)
 
 
 def test_the_slider_of_a_long_bed_has_few_stops(
-    results: Results, monkeypatch: pytest.MonkeyPatch
+    results: Results, peeled: Pile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (pile,) = results.plan.piles.values()
-    rules = pile.scene.protocol.model_copy(update={"method": "peeling"})
-    pile = replace(pile, scene=pile.scene.model_copy(update={"protocol": rules}))
-    every = bed.read(pile, results.cases)
+    every = bed.read(peeled, results.cases)
     monkeypatch.setattr(bed, "STOPS", 5)
-    few = bed.read(pile, results.cases)
+    few = bed.read(peeled, results.cases)
     assert len(few.places) <= 6 < len(every.places)
     assert few.totals[-1] == every.totals[-1]
-    share = pile.packing.count * FRACTION
+    share = peeled.packing.count * FRACTION
     at = few.first(FRACTION)
     assert few.totals[at] == every.totals[every.first(FRACTION)] >= share
     assert ((few.level > 0) & (few.level <= at)).sum() == few.totals[at]
-
-
-def test_the_speed_of_the_flow_is_that_at_ten_heights(results: Results) -> None:
-    """|u|/U_e is 1 at 10 h far upstream; at the lid it is a quarter more."""
-    (pile,) = results.plan.piles.values()
-    window = (-60.0, -59.0, 10.0, 10.1)
-    speed = np.linalg.norm(flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1)
-    assert np.nanmean(speed) == pytest.approx(1, abs=0.02)
-    (figure,) = flows.flow(results)
-    assert figure.canvas
-    assert "at 10 h" in figure.canvas.axes[-1].get_xlabel()
-    assert "lid" not in figure.canvas.axes[-1].get_xlabel()
 
 
 def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:
@@ -201,22 +178,17 @@ def test_each_form_of_a_train_has_its_thresholds(train: Results) -> None:
     assert list(table["form"].unique()) == [1, 2]
     assert table["count"].sum() / 4 == train.tables["pile_threshold"]["count"].iloc[0]
     first, second = (table[table["form"] == form].set_index("fraction") for form in (1, 2))
+    ratio = second["ustar0_m_s"] / first["ustar0_m_s"]
     assert (first["over_first_form"] == 1).all()
-    np.testing.assert_allclose(
-        second["over_first_form"], second["ustar0_m_s"] / first["ustar0_m_s"]
-    )
+    np.testing.assert_allclose(second["over_first_form"], ratio)
     assert (np.diff(first["ustar0_m_s"]) >= 0).all()
 
 
 def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
     (figure,) = flows.where(train)
     grains = train.tables["pile_grain"]
-    (dots,) = (
-        artist
-        for axes in figure.canvas.axes  # type: ignore[union-attr]
-        for artist in axes.collections
-        if artist.get_gid() == "thresholds"
-    )
+    artists = (artist for axes in axes_of(figure) for artist in axes.collections)
+    (dots,) = (artist for artist in artists if artist.get_gid() == "thresholds")
     shown = np.asarray(dots.get_offsets())
     goes = grains[grains["ustar0_m_s"].notna()]
     np.testing.assert_allclose(shown[:, 0], goes["x_m"] / 0.01)

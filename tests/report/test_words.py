@@ -18,17 +18,14 @@ SHOWN = ("alpha_deg", "d_m")
 @pytest.fixture
 def table() -> pd.DataFrame:
     """Piles of two slopes, by two numbers of layers and two stiffnesses."""
-    return pd.DataFrame(
-        {
-            "alpha_deg": [15.0, 15.0, 15.0, 25.0],
-            "d_m": 1e-3,
-            "force_law": "high",
-            "mobile_layers": [1, 2, 1, 1],
-            "stiffness": [1e3, 1e3, 1e4, 1e3],
-            "load_increment": [0.02, 0.03, 0.02, 0.02],
-            "seed": [1, 2, 3, 4],
-        }
-    )
+    columns = "alpha_deg", "mobile_layers", "stiffness", "load_increment", "seed"
+    rows = [
+        (15, 1, 1e3, 0.02, 1),
+        (15, 2, 1e3, 0.03, 2),
+        (15, 1, 1e4, 0.02, 3),
+        (25, 1, 1e3, 0.02, 4),
+    ]
+    return pd.DataFrame(rows, columns=columns).assign(d_m=1e-3, force_law="high")
 
 
 def test_fields_that_tell_rows_apart(table: pd.DataFrame) -> None:
@@ -53,19 +50,6 @@ def test_what_is_asked_parts_panels_and_what_answers_has_markers(table: pd.DataF
     assert rows[SHAPE].tolist() == ["o", "s", "o", "o"]
     names = [text.rpartition(", ")[2] for text in rows[LABEL]]
     assert names == ["mobile layers = 1", "mobile layers = 2", *["mobile layers = 1"] * 2]
-
-
-@pytest.mark.parametrize(
-    ("column", "value", "said"),
-    [
-        ("alpha_deg", 10.463, "α = 10.46°"),
-        ("z0_over_d", 0.033333333, "z₀ = d/30"),
-        ("d_m", 7e-4, "d = 0.7 mm"),
-        ("waiting_time", 6.0, "waiting time = 6 √(d/g′)"),
-    ],
-)
-def test_values_with_their_symbols(column: str, value: object, said: str) -> None:
-    assert labels.plain(column, value) == said
 
 
 def test_page_lists_every_parameter(results: Results) -> None:
