@@ -14,8 +14,6 @@ RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
 WIDTH = 60
 """Letters of a line over a panel."""
-LISTS = ("obstacles",)
-"""Columns of fields that are lists: an empty cell is an empty list."""
 OTHERS = {
     **{"fraction": Info("fraction", "n/N", "%"), "by": Info("by")},
     "answered_method": fields.ANSWERS["answered_method"].info,
@@ -55,7 +53,8 @@ def cells(rows: pd.DataFrame, columns: Sequence[str]) -> dict[str, list[str]]:
 
 def told(row: pd.Series, columns: Sequence[str]) -> list[str]:
     """The values of a row with their symbols, without those that the row does not have."""
-    return [plain(name, row[name]) for name in columns if pd.notna(row[name]) or name in LISTS]
+    shown = [name for name in columns if pd.notna(row[name]) or name == "obstacles"]  # a list
+    return [plain(name, row[name]) for name in shown]
 
 
 def panel(row: pd.Series, columns: Sequence[str]) -> str:
@@ -74,9 +73,8 @@ def amount(value: float, unit: str) -> str:
 
 def ratio_of(ratio: float, length: str) -> str:
     """A length over another, such as ``d/30``."""
-    part = 1 / ratio
-    whole = round(part)
-    return f"{length}/{whole}" if abs(part - whole) < 1e-3 * part else f"{ratio:.3g} {length}"
+    whole = round(1 / ratio)
+    return f"{length}/{whole}" if abs(1 - whole * ratio) < 1e-3 else f"{ratio:.3g} {length}"
 
 
 def methods(rows: pd.DataFrame) -> str:

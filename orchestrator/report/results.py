@@ -20,8 +20,6 @@ FRACTION = 0.3
 """n/N at which one threshold stands for all of its pile."""
 RAMP_BELOW = 3.0
 """Waiting time, sqrt(d/g'), below which load steps are a ramp; 6 are needed near a threshold."""
-MEANS = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
-"""Columns of a threshold of which several seeds have the mean."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +134,9 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     groups = rows.groupby(keys, dropna=False)
     tau = groups["shields"]
     ends = {"least": tau.transform("min"), "largest": tau.transform("max")}
-    rows = rows.assign(**groups[MEANS].transform("mean"), **ends, seeds=tau.transform("size"))
-    return rows.drop_duplicates(keys)
+    names = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
+    means: pd.DataFrame = groups[names].transform("mean")
+    return rows.assign(**means, **ends, seeds=tau.transform("size")).drop_duplicates(keys)
 
 
 def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":

@@ -53,11 +53,7 @@ SHADES = {
 }
 """Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
 DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
-LONG = 42
-"""Letters of an entry of a legend, of which three columns do not fit into a figure."""
-WATER = "#74aed6"
-AIR = "#8c6d46"
-BED = "#d9c9a3"
+WATER, AIR, BED = "#74aed6", "#8c6d46", "#d9c9a3"
 Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
@@ -138,7 +134,8 @@ def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) 
     if colours:
         figure.legend(handles=colours, loc="outside upper center", ncols=6)
     if looks:
-        columns = 3 if max(len(str(item.get_label())) for item in looks) < LONG else 2
+        # of entries of more letters three columns do not fit
+        columns = 3 if max(len(str(item.get_label())) for item in looks) < 42 else 2
         figure.legend(handles=looks, loc="outside lower center", ncols=columns)
 
 

@@ -24,14 +24,11 @@ from orchestrator.study.closed_form import closed_form
 
 GAS_BELOW = 100.0
 """Density that tells gases from liquids, kg/m3: a gas has a wind."""
-TELLING = 3
-"""Fields beside slope and diameter that a sentence tells of a pile."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
 PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
 EACH, RANGES = ("alpha_deg", "d_m", "force_law"), ("alpha_deg", "force_law")
 """Columns that each row of a table tells, of single piles and of ranges."""
-FLUID = ("rho_f_kg_m3", "nu_m2_s")
 
 
 def text(results: Results) -> str:
@@ -70,7 +67,7 @@ def sentences(results: Results) -> list[str]:
             firsts = wet.drop_duplicates("alpha_deg")
             ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
     ends.sort(key=lambda row: float(row["alpha_deg"]))
-    telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:TELLING]
+    telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:3]
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         warnings.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
@@ -136,9 +133,8 @@ def short(results: Results) -> pd.DataFrame | None:
         return grains(results)
     keys = [*EACH, *labels.varying(here, *EACH)]
     few = len(here[keys].drop_duplicates()) <= FEW
-    return _thresholds(
-        here, keys if few else RANGES, f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
-    )
+    tau = f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
+    return _thresholds(here, keys if few else RANGES, tau)
 
 
 def piles(results: Results) -> pd.DataFrame | None:
@@ -172,13 +168,10 @@ def _single(results: Results) -> pd.DataFrame:
 def _thresholds(
     rows: pd.DataFrame, keys: Sequence[str], tau: str = "τ_c", more: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """A row for all thresholds that agree in some columns: the range of those that are usable.
-
-    A single pile is told even so. `more` are columns at the end.
-    """
+    """A row for all thresholds that agree in some columns, with the range of the usable ones."""
     ranges = "d_m" not in keys
     if ranges:  # fluids are never merged
-        keys = [*keys, *(name for name in FLUID if rows[name].nunique() > 1)]
+        keys = [*keys, *(n for n in ("rho_f_kg_m3", "nu_m2_s") if rows[n].nunique() > 1)]
     rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable, d = (rows[name].groupby(number) for name in ("usable", "d_m"))
