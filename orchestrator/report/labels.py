@@ -12,7 +12,7 @@ from orchestrator.study.parts import Info
 
 RE_AXIS = r"$Re^\star = u^\star d/\nu$"
 TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
-WIDTH = 60
+WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {
     **{"fraction": Info("fraction", "n/N", "%"), "by": Info("by")},

@@ -52,10 +52,7 @@ PILE = ("reynolds", "shields", "shields_low", "shields_high")
 
 
 class Sheet(NamedTuple):
-    """A figure of panels: parts of a table that agree in some columns.
-
-    `name` and `title` are the endings of the figure's name and title, `rows` those of all panels.
-    """
+    """A figure of panels, endings of its name and title, the rows of each panel and of all."""
 
     name: str
     title: str
@@ -214,8 +211,7 @@ def draw_published(
 ) -> None:
     """Curves for air, and unless the bed slopes in a gas those and measurements for water.
 
-    On slopes it is one curve for air times the slope factor, in the slope's colour if there are
-    colours.
+    On slopes one curve for air is drawn, times the slope factor, in the colours of the slopes.
     """
     sloped = bool((scenes["alpha_deg"] > 0).any())
     for alpha in sorted(set(scenes["alpha_deg"])):
@@ -315,11 +311,10 @@ def shown_piles(results: Results) -> pd.DataFrame:
 
 
 def _lines(results: Results) -> list[Line]:
-    """The closed form of a flat bed as lines, of no other roughness than the points beside them.
+    """The closed form on a flat bed: the laws of piles on their least and largest z0/d.
 
-    The laws of piles have lines for the entrainment angle and the z0/d of the piles, of many z0/d
-    for the least and the largest. Other laws have one line, on the bed that fits the measurements
-    best. The two laws of the paper are one model: both have the same bed.
+    Other laws have one line, on the bed that fits the measurements best; the two laws of the paper
+    are one model, on one bed.
     """
     flat = theory.lines(results.beds("pile").assign(alpha_deg=0.0))
     beds = [line.bed for line in flat]
@@ -385,10 +380,7 @@ def piles(results: Results) -> Iterator[Figure]:
 def _diagrams(
     rows: pd.DataFrame, by: str, colours: Mapping[Any, str], name: str, title: str
 ) -> Iterator[Figure]:
-    """The closed form and the thresholds beside it, coloured by a column.
-
-    The rows are scenes of single grains, with or without thresholds by DEM, or thresholds of piles.
-    """
+    """Single grains with or without thresholds by DEM, or piles, beside the closed form."""
     piles, by_law = by == "fraction", by == "force_law"
     columns = PILE if piles else DEM
     every = rows[rows[columns[1]].notna()]
