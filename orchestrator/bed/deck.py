@@ -74,32 +74,26 @@ AWAY = 10.0
 have left before it."""
 
 
-def contact(grain: Grain, protocol: Protocol) -> dict[str, float]:
-    """Variables of the contact law: tan(phi), K d/W, damping ratio, time step over sqrt(m/K)."""
-    return {
-        "friction": math.tan(math.radians(grain.friction_angle_deg)),
-        "stiffness": grain.stiffness,
-        "damping": grain.damping,
-        "time_step": protocol.time_step,
-    }
-
-
-def raising(
-    protocol: Protocol, enough: int, *, smallest: float = 1.0, is_poured: bool = False
+def protocol(
+    grain: Grain, rules: Protocol, enough: int = 0, smallest: float = 1.0, is_poured: bool = False
 ) -> dict[str, float | int]:
-    """Variables by which the deck holds a load step, samples the grains and goes on to the next.
+    """Variables of the contact law, of the settling, and of how the deck holds a load step.
 
     The load steps end early when no more than `enough` counted grains have not moved. `smallest` is
     the diameter of the smallest grain that may move, d. A poured bed was on springs of its own.
     """
     return {
-        "waiting_time": protocol.waiting_time,
+        "friction": math.tan(math.radians(grain.friction_angle_deg)),
+        "stiffness": grain.stiffness,
+        "damping": grain.damping,
+        "time_step": rules.time_step,
+        "waiting_time": rules.waiting_time,
         "rest_energy": REST_ENERGY,
         "sampling_interval": SAMPLING_INTERVAL,
         "settle": SETTLE,
         "settle_drag": POURED_DRAG if is_poured else 0.0,
-        "displacement_criterion": protocol.displacement_criterion,
-        "stir": min(STIR, protocol.displacement_criterion * smallest / 2),
+        "displacement_criterion": rules.displacement_criterion,
+        "stir": min(STIR, rules.displacement_criterion * smallest / 2),
         "away": AWAY,
         "enough": enough,
     }

@@ -59,12 +59,6 @@ class WallStress:
         return np.sign(self.tau_wall) * np.sqrt(np.abs(self.tau_wall))
 
     @cached_property
-    def tau_eq10(self) -> FloatArray:
-        """Stress of Eq. 10's friction velocity: sign(u*) u*^2."""
-        ustar = self.ustar_over_ustar0_eq10
-        return ustar * np.abs(ustar)
-
-    @cached_property
     def edges_m(self) -> FloatArray:
         """Ends of the faces along the bed, m; shape (F + 1,)."""
         first = self.s_m[0] - self.length_m[0] / 2.0
@@ -84,7 +78,8 @@ class WallStress:
         if not (np.all(low < high) and np.all(low >= edges[0]) and np.all(high <= edges[-1])):
             span = f"s = {edges[0]:.4g} ... {edges[-1]:.4g} m"
             raise InputError(f"a mean of the stress needs a length within the bed, {span}")
-        tau = self.tau_wall if measure == "wall" else self.tau_eq10
+        ustar = self.ustar_over_ustar0_eq10
+        tau = self.tau_wall if measure == "wall" else ustar * np.abs(ustar)
         slope, sums = self._slopes(tau), np.concatenate([[0.0], np.cumsum(tau * self.length_m)])
 
         def integral(s: FloatArray) -> FloatArray:

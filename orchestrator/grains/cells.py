@@ -95,8 +95,7 @@ class SingleGrainCase(GrainCase):
         rules = self.scenes[0].protocol
         parameters = {
             **{"diameter": DIAMETER, "smallest": 1.0, "density": DENSITY, "gravity": GRAVITY},
-            **deck.contact(self.grain, rules),
-            **deck.raising(rules, enough=0),
+            **deck.protocol(self.grain, rules),
             # no face, no ceiling, no crest: the planes lie far outside the box
             **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 1e3 * DIAMETER},
             "behind": 1e3 * DIAMETER,

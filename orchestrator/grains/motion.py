@@ -216,14 +216,6 @@ def count(
     return Count(ahead | vanished, back, vanished)
 
 
-def deck_counts(
-    travel: FloatArray, criterion: float, aside: FloatArray | float = 0.0
-) -> tuple[IntArray, IntArray]:
-    """Counts of the deck at each sample, shape (T,): grains that have not moved; fallen ones."""
-    passed = _ever((travel >= criterion) | (aside >= criterion))
-    return (~np.isnan(travel) & ~passed).sum(axis=1), (travel <= -criterion).sum(axis=1)
-
-
 def _ever(happened: BoolArray) -> BoolArray:
     return np.logical_or.accumulate(happened, axis=0)
 
@@ -236,7 +228,10 @@ def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bo
     """
     samples = read_table(directory / SAMPLES)
     track = read_track(directory, grains, samples)
-    lying, fallen = deck_counts(track.travel, criterion, track.aside)
+    # as the deck counts
+    passed = _ever((track.travel >= criterion) | (track.aside >= criterion))
+    lying = (~np.isnan(track.travel) & ~passed).sum(axis=1)
+    fallen = (track.travel <= -criterion).sum(axis=1)
     agree = (samples["lying"] == lying) & (samples["fallen"] == fallen)
     if not agree.all():
         what = f"the counts do not reconcile at sample {int(agree.argmin()) + 1}"

@@ -87,10 +87,6 @@ class Worn:
         """How many counted grains have moved."""
         return int(np.isfinite(self.left).sum())
 
-    def without(self, chosen: BoolArray) -> FloatArray:
-        """The places, shape (n, 2), when some more grains have gone."""
-        return np.where(chosen[:, None], np.nan, self.places)
-
     def to_csv(self, directory: Path) -> None:
         """Write ``grains.csv``."""
         table = pd.DataFrame(self.places, columns=["x_d", "z_d"])
@@ -219,7 +215,8 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     last = np.sort(flows)[least - 1] if least > 0 else 0.0
     leave = np.isfinite(flows) & (flows <= last)
     speed = np.where(worn.present, loads.ratio, worn.speed)
-    return Worn(worn.without(leave), np.where(leave, flows, worn.left), speed)
+    places = np.where(leave[:, None], np.nan, worn.places)
+    return Worn(places, np.where(leave, flows, worn.left), speed)
 
 
 def sunk(geometry: Geometry, worn: Worn) -> BedLine:
@@ -341,8 +338,7 @@ class PileCase(GrainCase):
         behind = grains.position[mobile, 0].max() + deck.AWAY * d
         numbers = {
             **{"diameter": d, "smallest": smallest, "density": density, "gravity": gravity},
-            **deck.contact(self.scene.grain, rules),
-            **deck.raising(rules, enough, smallest=smallest, is_poured=self.scene.is_poured),
+            **deck.protocol(self.scene.grain, rules, enough, smallest, self.scene.is_poured),
             **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
             "behind": behind,
         }

@@ -152,8 +152,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     weight = 2500.0 * np.pi / 6 * d**3 * 9.81
     numbers = {
         **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
-        **deck.contact(grain, rules),
-        **deck.raising(rules, 0),
+        **deck.protocol(grain, rules),
         **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
     }
     copy = tmp_path / "bed"

@@ -65,7 +65,8 @@ def test_the_line_of_any_bed_sinks_with_the_counted_grains_alone(name: str, pack
     line = wear.sunk(bed, whole)
     assert line.height(x) == pytest.approx(bed.line.height(x), abs=1e-9)
     # the gap between rows, over the cosine of at most 40 degrees, and a grain of level rows
-    bared = Worn(whole.without(counted), whole.left, whole.speed)
+    places = np.where(counted[:, None], np.nan, whole.places)
+    bared = Worn(places, whole.left, whole.speed)
     sunk = bed.line.height(x) - wear.sunk(bed, bared).height(x)
     places = np.sort(bed.packing.centres[counted, 0])
     away = np.abs(x[:, None] - places).min(axis=1)
