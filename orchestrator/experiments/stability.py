@@ -175,11 +175,7 @@ def _errors(one: Map, place: Place, runs: Runs, fraction: float | None) -> Itera
 
 
 def draw(maps: Sequence[Map], table: pd.DataFrame) -> Canvas:
-    """Maps as grids of cells, two beside each other; `table` has the rows of `judge` of them all.
-
-    A cell has the colour and the letter of its verdict, and the error. Of several runs in one place
-    the worst is shown.
-    """
+    """Maps as grids of cells: the worst verdict at each place, and its error, of `judge`'s rows."""
     tables = [table[table["map"] == each.name] for each in maps]
     counts = [rows["y"].nunique() for rows in tables]
     columns = min(len(maps), 2)

@@ -165,11 +165,11 @@ def _good_enough(
         why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:
-        cost = known[pair]
+        cost, at_nodes = known[pair], "flow.nodes" in pair.flow.sets
         if not any(
             known[other].flow_s <= cost.flow_s
             and known[other].grains_s <= cost.grains_s
-            and (known[other].flow_s == 0 or other.flow.is_shared == pair.flow.is_shared)
+            and (known[other].flow_s == 0 or ("flow.nodes" in other.flow.sets) == at_nodes)
             for other in kept
         ):
             kept.append(pair)

@@ -8,7 +8,7 @@ model, by `orchestrator budget`, ``maps.csv`` by `orchestrator stability`.
 
 import math
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from operator import attrgetter
@@ -74,11 +74,6 @@ class Level:
     same_model: bool = True
     most_grains: float = math.inf
     not_on: Sequence[str] = ()
-
-    @property
-    def is_shared(self) -> bool:
-        """Whether beds of one form share its flows whatever their roughness."""
-        return bool(self.sets.get("flow.nodes"))
 
     def takes(self, scene: Scene) -> bool:
         """Whether the level can answer a pile.
@@ -186,12 +181,6 @@ def pair_of(scene: Scene) -> Pair:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
     on = ([level for level in levels if level.describes(scene)] for levels in LEVELS.values())
     return Pair(*(levels[-1] if levels else AS_ASKED for levels in on))
-
-
-def meaning(names: Iterable[str]) -> str:
-    """Meanings of some levels, by their names; names of no level are left out."""
-    meanings = {level.name: level.meaning for level in (*FLOW, *GRAINS)}
-    return "; ".join(meanings[name] for name in names if name in meanings)
 
 
 class Known(NamedTuple):

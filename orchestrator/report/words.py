@@ -255,10 +255,11 @@ def times(timings: pd.DataFrame) -> pd.DataFrame | None:
 
 def levels(results: Results) -> pd.DataFrame | None:
     """On which fidelity levels the piles were answered, why, and what is known of them."""
-    rows = []
-    table = results.joined("pile_threshold")
+    rows, table = [], results.joined("pile_threshold")
+    about = {each.name: each.meaning for part in fidelity.LEVELS.values() for each in part}
     for (flow, grain, why), group in split(table, "flow_level", "grain_level", "why"):
-        meaning, error = fidelity.meaning([str(flow), str(grain)]), group["error_estimate"].max()
+        meaning = "; ".join(about[name] for name in (str(flow), str(grain)) if name in about)
+        error = group["error_estimate"].max()
         rows.append((f"{flow} | {grain}", meaning, why, group["scene_id"].nunique(), 100 * error))
     head = ["flow | grains", "description", "reason", "piles", "known error of τ_c, at most, %"]
     return pd.DataFrame(rows, columns=head) if rows else None
