@@ -75,7 +75,9 @@ class FlowModel:
             return theory.flat(self.line)
         if name != "solve":
             return (theory.hill if name == "hill" else theory.waves)(self.line, z0)
-        first, *others = (_read(cases / run.name / WALL_STRESS) for run in self.cases)
+        paths = [cases / run.name / WALL_STRESS for run in self.cases]
+        states = [(path, path.stat()) for path in paths]
+        first, *others = (_read(path, file.st_size, file.st_mtime_ns) for path, file in states)
         if not others:
             return first
         parts = list(zip((first, *others), self.solves.values(), strict=True))
@@ -91,14 +93,8 @@ def _at(scene: Scene, roughness: float) -> Scene:
     return Scene(**{**parts, "flow": scene.flow.model_copy(update=changes)})
 
 
-def _read(path: Path) -> WallStress:
-    """The stress that a finished run left."""
-    file = path.stat()
-    return _read_once(path, file.st_size, file.st_mtime_ns)
-
-
 @lru_cache(maxsize=256)
-def _read_once(path: Path, size: int, changed_ns: int) -> WallStress:
+def _read(path: Path, size: int, changed_ns: int) -> WallStress:
     """The stress in a file as it is now: hundreds of piles share a flow."""
     return WallStress.from_csv(path)
 
