@@ -106,8 +106,8 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     Where the files of that pile were pruned, the next one has its place.
     """
     for _, rows in split(results.exemplars, "alpha_deg"):
-        piles = ((row, results.shown(str(row["scene_id"]))) for _, row in rows.iterrows())
-        yield from itertools.islice((pair for pair in piles if results.has_files(pair[1])), 1)
+        each = ((row, results.shown(str(row["scene_id"]))) for _, row in rows.iterrows())
+        yield from itertools.islice(((row, piles[0]) for row, piles in each if piles), 1)
 
 
 def draw(results: Results) -> Iterator[Figure]:

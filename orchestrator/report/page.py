@@ -1,7 +1,6 @@
 """Pages: templates, captions, values in HTML, and the page of an experiment in sections."""
 
 import base64
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,8 +39,10 @@ def caption(name: str, /, **values: Any) -> str:
 def _templates(folder: Path, autoescape: bool = True) -> Environment:
     strict: dict[str, Any] = {"undefined": StrictUndefined, "trim_blocks": True}
     environment = Environment(loader=FileSystemLoader(folder), autoescape=autoescape, **strict)
-    filters = {"typeset": typeset, "json": _json, "n": format, "address": address}
-    environment.filters.update({**filters, "inline": _inline, "cell": _cell})
+    filters = {"typeset": typeset, "n": format, "address": address, "inline": _inline}
+    environment.filters.update({**filters, "cell": _cell})
+    short = {"separators": (",", ":"), "ensure_ascii": False, "allow_nan": False}
+    environment.policies["json.dumps_kwargs"] = short
     return environment
 
 
@@ -50,12 +51,6 @@ def typeset(text: str) -> Markup:
     index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
     html = re.sub(index, r"\1<sub>\2</sub>", str(escape(text)))
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", html))
-
-
-def _json(data: Any) -> Markup:
-    """JSON that no browser takes for the end of its element."""
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return Markup(text.replace("<", "\\u003c"))
 
 
 def address(image: bytes) -> str:

@@ -85,14 +85,10 @@ class Results:
         by = ["alpha_deg", "usable", "d_m", "dem", "wears", "z0_over_d"]
         return order.sort_values(by, ascending=[True, *[False] * 4, True], kind="stable")
 
-    def shown(self, scene_id: str) -> Pile:
-        """The pile that shows how a scene's grains move: the check by DEM, where one has run."""
-        check = self.plan.checks.get(scene_id)
-        return check if check and self.has_files(check) else self.plan.piles[scene_id]
-
-    def has_files(self, pile: Pile) -> bool:
-        """Whether the runs of a pile still have the files that pictures are drawn from."""
-        return all(is_whole(item, self.cases) for item in pile.runs)
+    def shown(self, scene_id: str) -> list[Pile]:
+        """The piles whose files show how a scene's grains move, a check by DEM first."""
+        piles = filter(None, (self.plan.checks.get(scene_id), self.plan.piles[scene_id]))
+        return [pile for pile in piles if all(is_whole(item, self.cases) for item in pile.runs)]
 
     @cached_property
     def flows(self) -> dict[str, Pile]:
