@@ -271,6 +271,8 @@ def draw(results: Results) -> Iterator[Figure]:
     points: dict[str, list[list[str]]] = {}
     kinds = ((grains, "single grain", DEM, "o", 2.4), (piles, "pile", PILE, "s", 3.6))
     for rows, name, columns, shape, size in kinds:
+        if rows.empty:
+            continue
         telling = [*TOLD, *(labels.varying(rows, *TOLD, *({"fraction"} & set(rows))))]
         if "fraction" in rows and rows["fraction"].nunique() == 1:
             name += f" at n/N = {rows['fraction'].iloc[0]:.0%}"
