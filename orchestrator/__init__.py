@@ -18,9 +18,8 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    # importing the package alone must not take the time of pandas
-    if name in __all__:
-        from orchestrator import face
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from orchestrator import face  # only now: it takes the time of pandas
 
-        return getattr(face, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(face, name)

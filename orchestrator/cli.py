@@ -45,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lost = terminal.lost()
     if lost and not code:
         _say(f"the answer could not be written: {lost.strerror}")
-    return code or int(lost is not None)
+        return 1
+    return code
 
 
 def _say(message: object) -> None:
@@ -76,13 +77,11 @@ def _parser() -> argparse.ArgumentParser:
         if run in (_study, _experiment):
             if name != "stability":
                 default = "first-look" if name == "study" else name
-                text = f"default: {default}"
-                add("source", nargs="?", default=default, metavar="FILE|PRESET", help=text)
+                add("source", nargs="?", default=default, metavar="FILE|PRESET")
             count = os.cpu_count() or 1
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
             add("--workers", type=int, default=count, metavar="N", help="cases at a time")
-            text = "say what would run, how long and how large, and end"
-            add("--plan", action="store_true", help=text)
+            add("--plan", action="store_true", help="say what would run, how long, and end")
         if run == _study:
             text = "error that tau_c may have: the cheapest models within it; 0: as the file asks"
             add("--tolerance", type=float, metavar="X", help=text)
@@ -107,8 +106,7 @@ def _study(options: Namespace) -> int:
     study = load(options.source, options.tolerance)
     out = options.out or Path("results") / study.name
     if options.plan:
-        lines = plan.forecast(study, out.absolute() / "cases", options.workers)
-        print("\n".join(lines))
+        print(*plan.forecast(study, out.absolute() / "cases", options.workers), sep="\n")
         return 0
     queue = Queue(options.cluster, study.cluster) if options.cluster else None
     return _end(pipeline.run(study, out, workers=options.workers, queue=queue))
@@ -124,8 +122,8 @@ def _experiment(options: Namespace) -> int:
     studies = [load(options.source)] if "source" in options else []
     experiment = module.experiment(*studies, out)
     if options.plan:
-        lines = plan.expected(experiment.planned, out.absolute() / "cases", options.workers)
-        print("\n".join(lines))
+        cases = out.absolute() / "cases"
+        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
         return 0
     return _end(experiment.run(out, workers=options.workers))
 

@@ -86,14 +86,10 @@ class Interrupted(OrchestratorError):  # noqa: N818
 
 def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
     """The message of any exception: of the system, of a shortage, of a library, or a `Fault`."""
-    frames = traceback.extract_tb(error.__traceback__)
-    is_at_import = any(frame.name == "<module>" for frame in frames)
     if isinstance(error, OrchestratorError):
         return error
     if isinstance(error, KeyboardInterrupt):
-        # OpenBLAS raises SIGINT where it can start no thread
-        reason = "; or no thread can be started: see ulimit -u" if is_at_import else ""
-        return Interrupted(f"stopped; the same command continues{reason}")
+        return Interrupted("stopped; the same command continues")
     if isinstance(error, OSError):
         # shutil collects the failure of each file: the first one is given
         text = str(error.args[0][0][2]) if isinstance(error, shutil.Error) else error.strerror
@@ -101,13 +97,14 @@ def of_exception(error: BaseException, where: str = "") -> OrchestratorError:
         what = "no space is left on the disk" if number == errno.ENOSPC else text or str(error)
         file = "" if isinstance(error.filename, int | None) else os.fsdecode(error.filename)
         return OrchestratorError(what, file or where, _REMEDIES.get(number, ""))
+    frames = traceback.extract_tb(error.__traceback__)
+    is_at_import = any(frame.name == "<module>" for frame in frames)
     if "can't start new thread" in str(error):
         what, remedy = "no more threads can be started", "fewer --workers, or ulimit -u"
     elif isinstance(error, MemoryError) or (is_at_import and "failed to map" in str(error)):
         what, remedy = "there is not enough memory", "fewer --workers, or ulimit -v"
     elif isinstance(error, ImportError | SyntaxError) or is_at_import:
-        what = f"a library does not load: {error}"
-        remedy = "`orchestrator doctor` says what is missing"
+        what, remedy = f"a library does not load: {error}", "`orchestrator doctor` says which"
     else:
         at = f" at {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
         what = f"a fault of this program: {type(error).__name__}: {error}{at}"
