@@ -9,9 +9,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from orchestrator import pipeline, report, tables
+from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator import table as calculator
 from orchestrator.errors import InputError, OrchestratorError, SolverError
-from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
@@ -21,26 +21,16 @@ if TYPE_CHECKING:
 
 
 def threshold(
-    diameter: ArrayLike,
-    *,
-    density: ArrayLike = 2500.0,
-    fluid_density: ArrayLike = 1.0,
-    viscosity: ArrayLike = 1e-5,
-    slope_deg: ArrayLike = 0.0,
-    entrainment_angle_deg: ArrayLike = 60.0,
-    roughness: ArrayLike = "d/30",
-    lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
-    gravity: ArrayLike = GRAVITY,
-    depth: ArrayLike | None = None,
-    law: str | None = "bridged",
+    diameter: ArrayLike, *, law: str | None = "bridged", **parameters: ArrayLike
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    Arguments are numbers or arrays that broadcast together: diameter, m; densities, kg/m3;
-    kinematic viscosity, m2/s; the slope that the flow goes up, and the angle of the contact that a
-    grain rolls over, degrees; roughness length z0, m, or a part of the diameter such as ``d/10``;
-    coefficient of Saffman's lift; gravity, m/s2; depth of a liquid, m, for its mean velocity. `law`
-    is a force law, ``paper`` for the paper's rule, or None: every law.
+    Arguments are numbers or arrays that broadcast together: `diameter`, m; `density` (2500) and
+    `fluid_density` (1), kg/m3; kinematic `viscosity` (1e-5), m2/s; `slope_deg` (0), which the flow
+    goes up, and `entrainment_angle_deg` (60) of the contact that a grain rolls over; `roughness`,
+    the length z0, m, or a part of the diameter ("d/30"); Saffman's `lift_coefficient` (1.615);
+    `gravity` (9.81), m/s2; `depth` of a liquid, m, for its mean velocity. `law` is a force law,
+    ``paper`` for the paper's rule, or None: every law.
 
     Returns
     -------
@@ -53,11 +43,10 @@ def threshold(
     InputError
         For a point that is no scene, a law that is none, or if no law holds at any point.
     """
-    given: dict[str, Any] = {**locals()}
-    del given["law"]
-    if depth is None:
-        del given["depth"]
+    given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():
+        if name not in PARAMETERS:
+            raise InputError("no such parameter", name, f"there are {', '.join(PARAMETERS)}")
         try:  # a roughness may have texts such as d/30
             given[name] = np.asarray(values, object if name == "roughness" else float)
         except (TypeError, ValueError):

@@ -2,7 +2,6 @@
 
 import os
 import sys
-import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -11,7 +10,6 @@ from typing import Any, NamedTuple
 
 from orchestrator import paper, plan, report, tables
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.fidelity import limits
 from orchestrator.plan import Plan
 from orchestrator.report.results import Results
 from orchestrator.runs import case, cluster, engine, terminal, workspace
@@ -141,15 +139,11 @@ def prune(directory: Path) -> str:
 
 
 def _draw(
-    study: Study,
-    planned: Plan,
-    space: Workspace,
-    states: Mapping[str, Mapping[str, Any]],
-    failures: Failures,
+    study: Study, planned: Plan, space: Workspace, done: Mapping[str, Any], failures: Failures
 ) -> str:
     """Write tables, figures and page, and last the marker of what they are made of; the answer."""
     space.drop(STATE)
-    states = {name: states[name] for name in planned.cases if name in states}
+    states = {name: done[name] for name in planned.cases if name in done}
     made = tables.make(study, planned, space.cases, states)
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
@@ -159,11 +153,7 @@ def _draw(
         tables.write({"timings": times}, space, "timings")
         report.write(results, times, causes, space, (paper.report_card,))
     answer = report.said(results)
+    terminal.check()
     if not failures:
-        terminal.check()
-        with warnings.catch_warnings(record=True) as caught:
-            limits.check_study(study)
-        texts = [str(each.message) for each in caught]
-        marker = {**space.drawn_of(planned.ids), "answer": answer, "warnings": texts}
-        space.note(STATE, text_of(marker))
+        space.note(STATE, text_of({**space.drawn_of(planned.ids), "answer": answer}))
     return answer
