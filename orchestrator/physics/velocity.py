@@ -14,7 +14,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BPoly, PPoly
 
 from orchestrator.physics.constants import INVERSE_KARMAN, KARMAN
 from orchestrator.types import FloatArray
@@ -143,20 +142,31 @@ def _log_above(y: FloatArray) -> FloatArray:
 
 def _speed(y: FloatArray) -> FloatArray:
     """Integral of the shear from the shifted wall."""
-    table = _tables()[0](np.log(np.clip(y, SMOOTHEST, TALLEST)))
-    return np.where(y < SMOOTHEST, y, table + _log_above(y))
+    return np.where(y < SMOOTHEST, y, _read(0, y) + _log_above(y))
 
 
 def _speed_integral(y: FloatArray) -> FloatArray:
     """Integral of the speed from the shifted wall."""
-    table = _tables()[1](np.log(np.clip(y, SMOOTHEST, TALLEST)))
-    above = np.maximum(y - TALLEST, 0) * (_tables()[0](np.log(TALLEST)) - 1 / KARMAN)
-    return np.where(y < SMOOTHEST, y**2 / 2, table + above + y * _log_above(y))
+    above = np.maximum(y - TALLEST, 0) * (_read(0, np.asarray(TALLEST)) - 1 / KARMAN)
+    return np.where(y < SMOOTHEST, y**2 / 2, _read(1, y) + above + y * _log_above(y))
+
+
+def _read(which: int, y: FloatArray) -> FloatArray:
+    """The value of a table at y, between its ends."""
+    place = np.log(np.clip(y, SMOOTHEST, TALLEST) / SMOOTHEST) / STEP
+    node = np.floor(place).astype(int)
+    *rest, value = (coefficient[node] for coefficient in _tables()[which])
+    for coefficient in reversed(rest):
+        value = value * (place - node) + coefficient
+    return np.asarray(value)
 
 
 @cache
-def _tables() -> tuple[PPoly, PPoly]:
-    """Speed and its integral, as polynomials of ln y with two exact derivatives at each node."""
+def _tables() -> tuple[FloatArray, FloatArray]:
+    """Speed and its integral: at equal steps of ln y the six coefficients of a polynomial.
+
+    It has the exact value and two exact derivatives at either node.
+    """
     x = np.arange(np.log(SMOOTHEST), np.log(TALLEST) + 2 * STEP, STEP)
     y, g = np.exp(x), shear(np.exp(x))
     root, weight = np.polynomial.legendre.leggauss(12)
@@ -170,10 +180,15 @@ def _tables() -> tuple[PPoly, PPoly]:
     length = _mixing_length(y)
     slope = -KARMAN * np.expm1(-y / DAMPING) + KARMAN * y / DAMPING * np.exp(-y / DAMPING)
     bend = -2 * length * slope * g**2 / np.sqrt(1 + 4 * length**2)
-    nodes = (
-        np.stack([speed, y * g, y * g + y**2 * bend], axis=1),
-        np.stack([integral, y * speed, y * speed + y**2 * g], axis=1),
-    )
-    # the power basis is evaluated several times faster than Bernstein's
-    first, second = (PPoly.from_bernstein_basis(BPoly.from_derivatives(x, n)) for n in nodes)
-    return first, second
+    tables = []
+    for nodes in (
+        (speed, y * g, y * g + y**2 * bend),
+        (integral, y * speed, y * speed + y**2 * g),
+    ):
+        c0, c1, c2 = (node * STEP**n / max(n, 1) for n, node in enumerate(nodes))
+        # what is left of value and derivatives at the next node
+        d = (c0[1:] - (c0 + c1 + c2)[:-1], c1[1:] - (c1 + 2 * c2)[:-1], (c2[1:] - c2[:-1]) * 2)
+        third = (10 * d[0] - 4 * d[1] + d[2] / 2, -15 * d[0] + 7 * d[1] - d[2])
+        fifth = 6 * d[0] - 3 * d[1] + d[2] / 2
+        tables.append(np.array([c0[:-1], c1[:-1], c2[:-1], *third, fifth]))
+    return tables[0], tables[1]
