@@ -64,17 +64,17 @@ def _parser() -> argparse.ArgumentParser:
         ("report", _on_directory, "draw tables, figures and page of a study again"),
         ("gallery", _on_directory, "one page over the studies that a directory holds"),
         ("prune", _on_directory, "drop the large files of finished cases; a rerun makes them anew"),
-        ("ladder", _experiment, "what each model costs and how far it is off"),
-        ("budget", _experiment, "what the choices are worth that all models share"),
-        ("stability", _experiment, "maps of where each method fails"),
+        ("ladder", _study, "what each model costs and how far it is off"),
+        ("budget", _study, "what the choices are worth that all models share"),
+        ("stability", _study, "maps of where each method fails"),
         ("doctor", _doctor, "are the solvers here, can it draw; what to install"),
     ):
         command = commands.add_parser(name, help=text)
-        command.set_defaults(run=run, command=name)
+        command.set_defaults(run=run, command=name, tolerance=None)
         add = command.add_argument
         if run == _on_directory:
             add("directory", type=Path, metavar="DIR")
-        if run in (_study, _experiment):
+        if run == _study:
             if name != "stability":
                 default = "first-look" if name == "study" else name
                 add("source", nargs="?", default=default, metavar="FILE|PRESET")
@@ -82,7 +82,7 @@ def _parser() -> argparse.ArgumentParser:
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
             add("--workers", type=int, default=count, metavar="N", help="cases at a time")
             add("--plan", action="store_true", help="say what would run, how long, and end")
-        if run == _study:
+        if name == "study":
             text = "error that tau_c may have: the cheapest models within it; 0: as the file asks"
             add("--tolerance", type=float, metavar="X", help=text)
             text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
@@ -93,39 +93,33 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _study(options: Namespace) -> int:
-    from orchestrator.runs import workspace
+    """Run a study, or an experiment: all but the maps of stability are on the scenes of a study."""
+    name, workers, is_study = options.command, options.workers, options.command == "study"
+    if is_study and not options.plan:
+        from orchestrator.runs import workspace
 
-    asked = options.source, options.out, options.tolerance
-    if not options.plan and (answer_and_page := workspace.finished(*asked)):
-        print("every case was done already; no solver was started", file=sys.stderr)
-        print(*answer_and_page, sep="\n")
-        return 0
+        if answer := workspace.finished(options.source, options.out, options.tolerance):
+            print("every case was done already; no solver was started", file=sys.stderr)
+            print(*answer, sep="\n")
+            return 0
     from orchestrator import pipeline, plan
     from orchestrator.study.study import load
 
-    study = load(options.source, options.tolerance)
-    out = options.out or Path("results") / study.name
+    studies = [load(options.source, options.tolerance)] if "source" in options else []
+    out = options.out or Path("results") / (studies[0].name if is_study else name)
+    cases = out.absolute() / "cases"
+    if is_study:
+        (study,) = studies
+        if options.plan:
+            print(*plan.forecast(study, cases, workers), sep="\n")
+            return 0
+        queue = Queue(options.cluster, study.cluster) if options.cluster else None
+        return _end(pipeline.run(study, out, workers=workers, queue=queue))
+    experiment = import_module(f"orchestrator.experiments.{name}").experiment(*studies, out)
     if options.plan:
-        print(*plan.forecast(study, out.absolute() / "cases", options.workers), sep="\n")
+        print(*plan.expected(experiment.planned, cases, workers), sep="\n")
         return 0
-    queue = Queue(options.cluster, study.cluster) if options.cluster else None
-    return _end(pipeline.run(study, out, workers=options.workers, queue=queue))
-
-
-def _experiment(options: Namespace) -> int:
-    """Run an experiment; all but the maps of stability are on the scenes of a study."""
-    from orchestrator import plan
-    from orchestrator.study.study import load
-
-    module = import_module(f"orchestrator.experiments.{options.command}")
-    out = options.out or Path("results") / options.command
-    studies = [load(options.source)] if "source" in options else []
-    experiment = module.experiment(*studies, out)
-    if options.plan:
-        cases = out.absolute() / "cases"
-        print(*plan.expected(experiment.planned, cases, options.workers), sep="\n")
-        return 0
-    return _end(experiment.run(out, workers=options.workers))
+    return _end(experiment.run(out, workers=workers))
 
 
 def _on_directory(options: Namespace) -> int:

@@ -59,23 +59,20 @@ class SolverError(OrchestratorError):
     exit_code = 3
     ended: ClassVar[str] = "failed"
 
+    def __init_subclass__(cls) -> None:
+        cls.ended = cls.__name__.lower()
+
 
 class Exploded(SolverError):  # noqa: N818
     """A run whose numbers grow without bound."""
-
-    ended = "exploded"
 
 
 class Noisy(SolverError):  # noqa: N818
     """A run whose grains never come to rest."""
 
-    ended = "noisy"
-
 
 class Stalled(SolverError):  # noqa: N818
     """A run that hangs or circles without an end."""
-
-    ended = "stalled"
 
 
 class Interrupted(OrchestratorError):  # noqa: N818

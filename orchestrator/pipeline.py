@@ -35,13 +35,9 @@ class Finished(NamedTuple):
 def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
     """Run a study, or what is missing of it, in a directory; `workers` cases at a time.
 
-    A queue of a cluster runs the cases in place of this machine.
-
-    Raises
-    ------
-    InputError, SolverError, Interrupted
-        If the study cannot be answered or the directory not be used; if a solver is missing or too
-        old; if the user stopped it: then every child has ended.
+    A queue of a cluster runs the cases in place of this machine. An `InputError` says that the
+    study cannot be answered or the directory not be used, a `SolverError` that a solver is missing
+    or too old; after `Interrupted`, by the user, every child has ended.
     """
     space = Workspace(out.absolute())
     # what cannot be answered is refused before anything is written
@@ -133,9 +129,9 @@ def prune(directory: Path) -> str:
     with claimed(space.root, STUDY, study.name, new=False):
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
-        cases = report.drawn_from(Results(study, planned, made, space.cases))
-        shown = {case.name for case in cases}
-        return workspace.prune(space, {name: planned.cases[name] for name in done}, shown)
+        shown = report.drawn_from(Results(study, planned, made, space.cases))
+        cases = {name: planned.cases[name] for name in done}
+        return workspace.prune(space, cases, {case.name for case in shown})
 
 
 def _draw(

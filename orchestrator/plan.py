@@ -52,10 +52,10 @@ class Plan:
 
     def done(self, directory: Path, but: Container[str] = ()) -> dict[str, dict[str, Any]]:
         """The markers of the cases that are done, by name, but for some; results are checked."""
-        cases = [case for name, case in self.cases.items() if name not in but]
+        names = [name for name in self.cases if name not in but]
         with ThreadPoolExecutor() as pool:  # gigabytes of results are read
-            states = list(pool.map(lambda case: done_state(case, directory), cases))
-        return {case.name: state for case, state in zip(cases, states, strict=True) if state}
+            states = pool.map(lambda name: done_state(self.cases[name], directory), names)
+            return {name: state for name, state in zip(names, states, strict=True) if state}
 
     def missing(self, directory: Path, done: Container[str]) -> dict[str, Case]:
         """The cases to be run, by name: those not `done`, and those pruned that they need."""
@@ -121,8 +121,8 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
             if any(failure(directory / run.name)[1] for run in plan.piles[asked].runs)
         }
         if study.tolerance:
-            both, done = (plan.piles, plan.checks), plan.done(directory)
-            compared = decision.compare(*both, study.tolerance, directory, done)
+            done = plan.done(directory)
+            compared = decision.compare(plan.piles, plan.checks, study.tolerance, directory, done)
             more |= decision.overruled(compared, plan.decisions)
         if not more:
             return plan
@@ -133,14 +133,10 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
     plan = settled(study, directory)
-    yield f"{study.title}: {_number(len(study.scenes), 'scene')}"
-    for group in study.groups:
-        regimes = _counted(regime_of(scene) for scene in group.scenes)
-        laws = _counted(scene.forces.law for scene in group.scenes)
-        outside = sum(not law_holds(scene) for scene in group.scenes)
-        note = f"; in {outside} the law does not hold for a single grain" if outside else ""
-        count = _number(len(group.scenes), "scene")
-        yield f"  {group.name}: {count}; regimes: {regimes}; force laws: {laws}{note}"
+    regimes = _counted(regime_of(scene) for scene in study.scenes)
+    yield f"{study.title}: {_number(len(study.scenes), 'scene')}; regimes: {regimes}"
+    if outside := sum(not law_holds(scene) for scene in study.scenes):
+        yield f"  in {outside} the force law does not hold for a single grain"
     for why, times in Counter(answer.why for answer in plan.decisions.values()).most_common():
         yield f"  {times} answered: {why}"
     yield from expected(plan, directory, workers)

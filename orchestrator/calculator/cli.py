@@ -21,9 +21,8 @@ OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in 
 FORM = "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; a z0 may be d/30"
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
-    "several ranges give every combination. Values of diameter, viscosity, roughness and depth "
-    "are spaced geometrically, all others evenly. Winds are those of the logarithmic law over z0; "
-    "a fluid below 100 kg/m3 is a gas. A law that does not hold is marked, with the reason."
+    "several ranges give every combination. Diameter, viscosity, roughness and depth are spaced "
+    "geometrically, all others evenly. A fluid below 100 kg/m3 is a gas."
 )
 UNITS = (
     ("diameter", 0.05, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
@@ -105,8 +104,7 @@ def values(name: str, text: str) -> list[Value]:
         return [*numbers]
     first, last = numbers
     if not (first < last < math.inf and 2 <= count <= MOST_POINTS and count % 1 == 0):
-        what = f"{text!r} is not a range of 2 to {MOST_POINTS} values that rise"
-        raise InputError(what, OPTIONS[name], FORM)
+        raise InputError(f"{text!r} is not a range of values that rise", OPTIONS[name], FORM)
     import numpy as np
 
     space = np.geomspace if name in GEOMETRIC and first > 0 else np.linspace

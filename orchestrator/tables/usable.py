@@ -19,8 +19,7 @@ EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
 CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
 ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
 SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
-"""Piles that agree in these are taken to scatter alike: rows are level, or lie along the slope;
-lift carries grains off, which then collide, or it does not."""
+"""Piles that agree in these scatter alike: level rows or not; lifted grains collide or do not."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
