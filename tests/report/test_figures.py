@@ -60,6 +60,7 @@ def test_study_has_the_figures_of_its_beds(results: Results) -> None:
     names = {"dem-horizontal", "dem-slope-beta60", "accuracy"}
     one = only(results, "grain")
     assert {figure.name for figure in single_figures(one)} == names
+    assert [figure.name for figure in shields.draw(one)] == [shields.NAME]
     assert list(pile_figures(one)) == list(flows.stress(one)) == []
     heap = only(results, "pile")
     assert list(single_figures(heap)) == []
