@@ -1,5 +1,6 @@
 """Measured thresholds, pivots of natural beds, hiding in mixtures, flows over hills."""
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -135,10 +136,11 @@ def rushil_aspect(slope_deg: float) -> float:
     from scipy.optimize import brentq
 
     def steeper(logarithm: float) -> float:
-        x, z = rushil_form(np.exp(logarithm))
-        return float(np.max(np.diff(z) / np.diff(x)) - np.tan(np.radians(slope_deg)))
+        x, z = rushil_form(math.exp(logarithm))
+        return float(np.max(np.diff(z) / np.diff(x))) - math.tan(math.radians(slope_deg))
 
-    return float(np.exp(brentq(steeper, np.log(0.1), np.log(1e3))))
+    # functions of numpy would differ in the last digit, and with it the digests of flows
+    return math.exp(brentq(steeper, math.log(0.1), math.log(1e3)))
 
 
 def rushil_hill(slope_deg: float, height_over_roughness: float) -> MeasuredHill | None:
