@@ -136,9 +136,9 @@ def _cells(case: Path) -> Any:
 def over_u_e(
     pile: Pile, cases: Path, window: Window, unit: float, columns: int = 800
 ) -> FloatArray:
-    """The velocity over a pile on a grid of points, over U_e; the window is in units of `unit`, m.
+    """Velocity over U_e on a grid, shape (rows, columns, 3), rows upwards; NaN outside the mesh.
 
-    The result has the shape (rows, columns, 3), rows upwards, and is NaN outside the mesh.
+    The window is in units of `unit`, m.
     """
     import pyvista  # half a second, which only a study with piles waits for
 

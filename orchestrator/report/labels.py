@@ -84,10 +84,9 @@ def methods(rows: pd.DataFrame) -> str:
 
 
 def varying(table: pd.DataFrame, *shown: str) -> list[str]:
-    """The fields in which rows differ that agree in all columns that are shown.
+    """The fields in which rows differ that agree in all columns that are shown, seeds left out.
 
-    Of several fields that vary together one is enough: questions come first, then the method, then
-    fields that only some methods have. The seed of one packing among many does not count.
+    Of fields that vary together one is enough: questions, the method, fields of some methods.
     """
 
     def rank(column: str) -> int:

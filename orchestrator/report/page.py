@@ -78,11 +78,7 @@ def _cell(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page of an experiment: heading, paragraphs of text, figures and tables.
-
-    The canvases of the figures are made under `style.settings`; `limits` say what a reader must
-    not conclude.
-    """
+    """A part of the page of an experiment; `limits` say what a reader must not conclude."""
 
     title: str
     text: str = ""
@@ -94,10 +90,7 @@ class Section:
 def write(
     title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
 ) -> None:
-    """Put the page of an experiment into a directory, its figures beside it as PNG and SVG.
-
-    `name` is its file; `solvers` are the programs that ran, with their versions.
-    """
+    """Put the page of an experiment, a file `name`, with its figures as PNG and SVG beside it."""
     from orchestrator.report import style, words  # style imports matplotlib
 
     images = ([style.saved(item, folder, png=True) for item in part.figures] for part in sections)

@@ -74,10 +74,7 @@ class Results:
 
     @cached_property
     def exemplars(self) -> pd.DataFrame:
-        """The thresholds at that fraction of each slope, those that stand for it first.
-
-        Usable ones, the largest grains, DEM, beds that change and the least z0 come first.
-        """
+        """The thresholds at that fraction by slope: usable, large grains, DEM, least z0 first."""
         if self.at_fraction.empty:
             return self.at_fraction
         here = seeds_as_one(self.at_fraction[self.at_fraction["shields"].notna()])
@@ -119,10 +116,9 @@ def split(
 
 
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
-    """Thresholds of piles that differ in their seed alone as one row, with all others as they are.
+    """Thresholds of piles that differ in their seed alone as one row: means over the usable seeds.
 
-    A row has the means over the usable seeds, or over all where none is; ``seeds`` and ``of_seeds``
-    are the number of these seeds and of all, ``least`` and ``largest`` the ends of the thresholds.
+    Columns ``seeds``, ``of_seeds``: how many, of how many; ``least``, ``largest`` of them.
     """
     keys = [*fields.others(rows, "seed"), "fraction"]
     twins = valid(rows).groupby([rows[key] for key in keys], dropna=False)

@@ -104,10 +104,7 @@ def canvas(height: float) -> Canvas:
 def grid(
     count: int, height: float, x: str, y: str, columns: int = 2, *, sharey: bool = True
 ) -> tuple[Canvas, list[Axes]]:
-    """A figure of panels of a height (inches), in columns where there are several.
-
-    The panels share x, whose label is below the lowest of each column; that of y is on the left.
-    """
+    """A figure of panels of a height (inches), in columns where there are several; all share x."""
     columns = min(count, columns)
     lines = -(-count // columns)
     figure = canvas(height * lines + 0.9)
@@ -140,10 +137,7 @@ def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) 
 
 
 def samples(axes: Sequence[Axes]) -> list[Artist]:
-    """Entries of a legend: all with a label of which a part is in a frame.
-
-    What has one label in several colours is dark; a line without points counts.
-    """
+    """Entries of a legend: what has a label and is in a frame; dark where colours differ."""
     entries: dict[str, Any] = {}
     for ax in axes:
         for item in (*ax.collections, *ax.lines):
@@ -165,10 +159,7 @@ def entry(label: str, colour: str) -> Line2D:
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set.
-
-    Between decades are ticks at 2 and 5 alone: ticks take most of the time of drawing.
-    """
+    """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set: at 1, 2 and 5."""
     low, high = axis.get_view_interval()
     axis.set_minor_locator(LogLocator(subs=range(2, 9) if high < 5 * low else (2, 5)))
     axis.set_major_formatter("{x:g}")
