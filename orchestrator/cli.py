@@ -60,19 +60,19 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="command")
     for name, run, text in (
         ("study", _study, "run what is missing of a study, and draw it"),
-        ("status", _on_directory, "what of a study is done, running, failed and why"),
-        ("report", _on_directory, "draw tables, figures and page of a study again"),
-        ("gallery", _on_directory, "one page over the studies that a directory holds"),
-        ("prune", _on_directory, "drop the large files of finished cases; a rerun makes them anew"),
+        ("status", _other, "what of a study is done, running, failed and why"),
+        ("report", _other, "draw tables, figures and page of a study again"),
+        ("gallery", _other, "one page over the studies that a directory holds"),
+        ("prune", _other, "drop the large files of finished cases; a rerun makes them anew"),
         ("ladder", _study, "what each model costs and how far it is off"),
         ("budget", _study, "what the choices are worth that all models share"),
         ("stability", _study, "maps of where each method fails"),
-        ("doctor", _doctor, "are the solvers here, can it draw; what to install"),
+        ("doctor", _other, "are the solvers here, can it draw; what to install"),
     ):
         command = commands.add_parser(name, help=text)
         command.set_defaults(run=run, command=name, tolerance=None)
         add = command.add_argument
-        if run == _on_directory:
+        if run == _other and name != "doctor":
             add("directory", type=Path, metavar="DIR")
         if run == _study:
             if name != "stability":
@@ -122,7 +122,14 @@ def _study(options: Namespace) -> int:
     return _end(experiment.run(out, workers=workers))
 
 
-def _on_directory(options: Namespace) -> int:
+def _other(options: Namespace) -> int:
+    """Run a command that asks for no case."""
+    if options.command == "doctor":
+        from orchestrator.solvers import doctor
+
+        findings = list(doctor.examine())
+        print(doctor.text(findings))
+        return 0 if all(finding.good for finding in findings) else 1
     if options.command == "status":
         from orchestrator.runs import workspace
 
@@ -145,11 +152,3 @@ def _end(finished: "Finished") -> int:
         _say(f"{name} failed: {error}")
     print(finished.page)
     return 3 if finished.failures else 0
-
-
-def _doctor(options: Namespace) -> int:
-    from orchestrator.solvers import doctor
-
-    findings = list(doctor.examine())
-    print(doctor.text(findings))
-    return 0 if all(finding.good for finding in findings) else 1

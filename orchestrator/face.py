@@ -2,7 +2,8 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -56,8 +57,6 @@ def threshold(
         arrays = np.broadcast_arrays(*given.values())
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
-    if not arrays[0].size:
-        raise InputError("an array without values", where="threshold")
     points = dict(zip(given, map(np.ravel, arrays), strict=True))
     rows = pd.DataFrame(calculator.thresholds(points, law or "bridged"))
     chosen = rows if law is None else rows[rows["answer"]]
@@ -104,11 +103,12 @@ def open(directory: str | Path) -> "Opened":
 class Opened:
     """A study that was run: its directory, page and title, and every table by its name.
 
-    Tables are DataFrames with SI units in the columns' names. `plot` draws its figures.
+    Tables are DataFrames with SI units in the columns' names; `plot.shields()` draws the extended
+    Shields diagram.
     """
 
     def __init__(self, results: Results) -> None:
-        self._results, self.plot = results, Plots(results)
+        self._results, self.plot = results, SimpleNamespace(shields=self._shields)
         self.directory, self.page = results.cases.parent, results.cases.parent / report.PAGE
         self.title, self.tables = results.study.title, dict(results.tables)
 
@@ -131,18 +131,12 @@ class Opened:
         what = f"{len(names)} cases begin with {name!r}"
         raise InputError(what, str(self.directory), "see the column case")
 
-
-class Plots(NamedTuple):
-    """Figures of a study."""
-
-    results: Results
-
-    def shields(self) -> "Figure":
+    def _shields(self) -> "Figure":
         """The extended Shields diagram of the page; an `OrchestratorError` if there is none."""
         from orchestrator.report import shields, style
 
         with style.settings():
-            for figure in shields.draw(self.results):
+            for figure in shields.draw(self._results):
                 if figure.canvas:
                     return figure.canvas
-        raise OrchestratorError("there is nothing to draw", str(self.results.cases.parent))
+        raise OrchestratorError("there is nothing to draw", str(self.directory))

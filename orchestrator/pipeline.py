@@ -20,11 +20,10 @@ from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed, read_m
 from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
-"""The cases that failed, by name."""
 
 
 class Finished(NamedTuple):
-    """Outcome of a command: its page, number of cases that were run, failures, answer as a text."""
+    """Outcome of a command: page, number of cases that were run, failures by case, answer."""
 
     page: Path
     started: int

@@ -145,8 +145,7 @@ def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
 def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: the cases of a plan by kind, expected time and disk."""
     missing = plan.missing(directory, plan.done(directory)).values()
-    kinds = _counted(case.kind for case in plan.cases.values())
-    todo = _counted(case.kind for case in missing)
+    kinds, todo = (_counted(case.kind for case in each) for each in (plan.cases.values(), missing))
     yield f"{_number(len(plan.cases), 'case')}: {kinds or 'none'}; to run: {todo or 'none'}"
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}

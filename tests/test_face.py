@@ -51,7 +51,6 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
         ({"depth": {}}, "depth"),
         ({"depth": 1j}, "depth"),
         ({"depth": [[1.0], [1.0, 2.0]]}, "depth"),
-        ({"depth": []}, "without values"),
         ({"density": [2e3, 3e3], "slope_deg": [0, 1, 2]}, "broadcast"),
     ],
 )
