@@ -33,16 +33,9 @@ def threshold(
     `gravity` (9.81), m/s2; `depth` of a liquid, m, for its mean velocity. `law` is a force law,
     ``paper`` for the paper's rule, or None: every law.
 
-    Returns
-    -------
-    DataFrame
-        A row for each point of the raveled arrays, or for each point and law, with units in the
-        columns' names; ``valid`` and ``why_not`` say where a law ends.
-
-    Raises
-    ------
-    InputError
-        For a point that is no scene, a law that is none, or if no law holds at any point.
+    The table has a row for each point of the raveled arrays, or for each point and law, with units
+    in the columns' names; ``valid`` and ``why_not`` say where a law ends. An `InputError` refuses a
+    point that is no scene, a law that is none, or if no law holds at any point.
     """
     given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():
