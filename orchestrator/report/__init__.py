@@ -8,19 +8,13 @@ from orchestrator.runs import terminal
 
 if TYPE_CHECKING:
     import pandas as pd
-    from markupsafe import Markup
 
     from orchestrator.report.results import Results
     from orchestrator.runs.case import Case
     from orchestrator.runs.files import Folder
-    from orchestrator.study.study import Study
-    from orchestrator.tables import Tables
 
 PAGE = "report.html"
 FIGURES = "figures"
-Guest = Callable[["Study", "Tables", Sequence[str]], tuple["Markup", Mapping[str, str]] | None]
-"""Given a study, its tables and the names of its figures in their order, the part of the page that
-a guest adds, if any: a section, and the texts of files beside the page by their names."""
 
 
 def write(
@@ -28,12 +22,13 @@ def write(
     timings: "pd.DataFrame",
     failures: Mapping[str, str],
     folder: "Folder",
-    guests: Sequence[Guest] = (),
+    guests: Sequence[Callable[..., tuple[str, Mapping[str, str]] | None]] = (),
 ) -> None:
     """Draw the figures of a study and write its page into its directory.
 
     `timings` are the wall times of the finished cases, `failures` the cases that failed, with why.
-    A figure that fails, for any cause such as too little memory, costs a line of the page.
+    A guest gets the study, the tables and the names of the figures, and adds a section and texts of
+    files by name, or None. A figure that fails, such as for memory, costs a line of the page.
     """
     from orchestrator.report import bed, flows, page, piles, shields, style, words
 

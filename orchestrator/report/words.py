@@ -96,8 +96,7 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
 def _grains(grains: pd.DataFrame) -> Iterator[str]:
     """The finest and the coarsest grain of the least slope."""
     here = grains[grains["alpha_deg"] == grains["alpha_deg"].min()]
-    here = here[valid(here)] if valid(here).any() else here
-    here = here.sort_values("d_m", kind="stable")
+    here = (here[valid(here)] if valid(here).any() else here).sort_values("d_m", kind="stable")
     for at in sorted({0, len(here) - 1}):
         row = here.iloc[at]
         size, slope = (labels.value(column, row[column]) for column in ("d_m", "alpha_deg"))
