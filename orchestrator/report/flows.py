@@ -80,7 +80,7 @@ def stress(results: Results) -> Iterator[Figure]:
 
 
 def _along(results: Results, pile: Pile, ax: Axes) -> None:
-    """Friction velocities along the bed of a pile, over the bed with its marks."""
+    """Friction velocities along the bed of a pile, over the bed."""
     line, h = pile.model.line, pile.bed.height
     rows, grains = results.tables["wall_stress"], results.joined("pile_grain")
     rows = rows[rows["flow_case"] == pile.flow.name].replace([np.inf, -np.inf], np.nan)
@@ -94,10 +94,6 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
         group = group[group["scene_id"] == group["scene_id"].max()]
         label = "as the grains feel it (averaged)"
         ax.plot(group["x_m"] / h, group["ustar_over_ustar0"], label=label, **FELT)
-    for name, at in marks(pile).items():
-        ax.axvline(at / h, zorder=0, gid=name, color="0.6", lw=0.6, ls=(0, (4, 2)))
-        look = {"transform": ax.get_xaxis_transform(), "rotation": 90, **style.NOTE}
-        ax.text(at / h - 0.1, 0.97, name, ha="right", va="top", **look)
     ax.margins(y=0.25)
     ax.set_title(_title(results, pile), loc="left")
     below, low, high = ax.twinx(), min(line.z) / h, max(line.z) / h
@@ -106,25 +102,16 @@ def _along(results: Results, pile: Pile, ax: Axes) -> None:
     ax.set(zorder=1, frame_on=False)  # the lines lie over the bed
 
 
-def marks(pile: Pile) -> dict[str, float]:
-    """Where the forms of a bed begin, are highest and end; of a profile the crest alone."""
-    line, places = pile.model.line, {"crest": pile.model.line.crest[0]}
-    if pile.bed.form.rises and not pile.bed.profile:
-        places |= {"toe": 0.0, "lee toe": line.toe[0]}
-    return {name: float(x) for name, x in places.items() if line.x[1] <= x <= line.x[-2]}
-
-
 def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float, float]:
     """Relative difference of u* by Eq. 10: mean of the windward faces, largest at their crests."""
     table = results.tables["wall_stress"]
-    means, crests = [], []
+    ratios = []
     for name in flow_cases:
         rows = table[table["flow_case"] == name]
         face = rows[(rows["s_m"] > 0) & (rows["s_m"] < results.flows[name].model.line.crest_s)]
         wall, eq10 = face["ustar_over_ustar0_wall"], face["ustar_over_ustar0_eq10"]
-        means.append(eq10.mean() / wall.mean() - 1)
-        crests.append(eq10.max() / wall.max() - 1)
-    return float(np.mean(means)), float(np.max(crests))
+        ratios.append((eq10.mean() / wall.mean() - 1, eq10.max() / wall.max() - 1))
+    return float(np.mean(ratios, axis=0)[0]), float(np.max(ratios, axis=0)[1])
 
 
 @lru_cache(maxsize=16)

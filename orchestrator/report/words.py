@@ -228,11 +228,10 @@ def parameters(results: Results) -> pd.DataFrame:
 
 
 def _values(column: pd.Series) -> str:
-    """The different values of a column, or how many there are and their range."""
+    """The different values of a column, of many the ends."""
     values = sorted(column.dropna().unique(), key=lambda value: (isinstance(value, str), value))
     texts = list(dict.fromkeys(v if isinstance(v, str) else f"{v:.6g}" for v in values))
-    many = f"{len(texts)} from {texts[0]} to {texts[-1]}" if texts else ""
-    return ", ".join(texts) if len(texts) <= FEW else many
+    return ", ".join(texts if len(texts) <= FEW else [*texts[:2], "…", texts[-1]])
 
 
 def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
@@ -269,10 +268,9 @@ def checks(results: Results) -> pd.DataFrame | None:
     table = results.tables.get("check", pd.DataFrame())
     if table.empty:
         return None
-    tau = {name: table[f"shields{name}"] for name in ("", "_dem", "_dem_low", "_dem_high")}
     asked = labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"])
-    told = {f"τ_c{name.replace('_', ' ')}": values for name, values in tau.items()}
-    return pd.DataFrame({**asked, **told, **table[["difference", "agree", "case"]]})
+    names = ["shields", "shields_dem", "shields_dem_low", "shields_dem_high", "difference"]
+    return pd.DataFrame({**asked, **table[[*names, "agree", "case"]]})
 
 
 def remarks(results: Results) -> dict[str, Any]:
