@@ -231,10 +231,9 @@ def write_grains(
     bounds: FloatArray,
     order: IntArray,
 ) -> None:
-    """Write ``grains.data``. Every number has all its digits: a rounded bound would lose grains.
+    """Write ``grains.data``, SI, with all digits: a rounded bound of the box would lose grains.
 
-    Positions (n, 3), diameters (n,) and the corners of the box, `bounds` (2, 3), are in m, the
-    density in kg/m3; `order` has the places of the grains that are written, in order.
+    Positions have the shape (n, 3), `bounds` (2, 3); `order` has the numbers of those written.
     """
     box = "".join(
         f"{low!r} {high!r} {axis}lo {axis}hi\n"

@@ -69,10 +69,9 @@ class Places:
         return cls(np.column_stack([x, np.mod(y, width) if width else y, z]), width)
 
     def pairs(self, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
-        """Grains within a reach of one another, each pair in both orders.
+        """First and second grain of each of k pairs within a reach, in both orders, (k,).
 
-        Returns the first and the second of each of k pairs, shape (k,), and the vector from the
-        first to the second, the shorter way across the sides, shape (k, 3).
+        Also the vector from the first to the second, the shorter way across the sides, (k, 3).
         """
         tree = cKDTree(self.xyz, boxsize=np.array([0.0, self.width, 0.0]))
         pairs = tree.query_pairs(reach, output_type="ndarray")

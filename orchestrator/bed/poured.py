@@ -168,11 +168,7 @@ class PouredBed(Case):
         return np.vstack([upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])])
 
     def rain(self, sizes: FloatArray) -> FloatArray:
-        """Places in the air, shape (n, 3), of grains of n sizes (d), none touching another.
-
-        They lie row upon row, each over what is already there, at a place of its room that the
-        seed decides; in a strip in lanes along the flow.
-        """
+        """Places in the air, (n, 3), of grains of n sizes (d): rows in which no two touch."""
         chance = np.random.default_rng(self.seed).uniform(size=(len(sizes), 3 if self.width else 2))
         places = np.zeros((len(sizes), 3))
         # with no room to the sides each lane would stay a bed in a plane
@@ -327,8 +323,7 @@ def read(
 def standing(packing: Packing, line: BedLine) -> FloatArray:
     """How much higher each grain's lowest point lies than that of a mean exposed grain, d, (n,).
 
-    The local bed is the mean height of the exposed centres within `LOCAL` along the bed, less half
-    of d: a grain of d at that height stands as all grains of a lattice do.
+    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d.
     """
     segment, along = line.nearest(packing.centres)
     height = line.over(packing.centres, segment)

@@ -140,11 +140,9 @@ class FlowCase(Case):
 
     @cached_property
     def needs(self) -> tuple["FlowCase", ...]:
-        """The flow on half the cells, from which that on a fine mesh starts.
-
-        From the log layer its residuals end the iterations while a slow mode of the whole domain
-        still decays: at 80 cells a face the stress was off by up to 1.5 %.
-        """
+        """The flow on half the cells, from which that on a fine mesh starts."""
+        # from the log layer the residuals end the iterations while a slow mode of the whole domain
+        # still decays: at 80 cells a face the stress was off by up to 1.5 %
         cells = self.settings.cells_per_face
         if cells < FINE:
             return ()
@@ -255,11 +253,7 @@ class FlowCase(Case):
         return self.first_cell_m / 2 / cos(radians(self.slope_deg))
 
     def collect(self, directory: Path) -> None:
-        """Check the run and write `wall_stress.csv` and `diagnostics.csv`.
-
-        Raises a SolverError, as `Exploded` or `Stalled` where that is how the run ended, if it
-        failed or did not converge, or if the stress is not usable.
-        """
+        """Check the run and write `wall_stress.csv` and `diagnostics.csv`, or say why it failed."""
         openfoam.check_log(directory)
         solved = SolvedFlow(directory)
         stress = solved.stress(self.roughness_m)

@@ -123,9 +123,8 @@ class SolvedFlow:
     def at(self, name: str, x: FloatArray, heights: FloatArray, bed: BedLine) -> FloatArray:
         """A field of a study's case at the middles of the cells of another mesh over the same bed.
 
-        `x` has the shape (columns,) and the heights over the bed (columns, cells); both are in m.
-        The result has the shape (columns * cells, components). The field is linear along the rows
-        of cells, and in a column in the logarithm of the height.
+        In m, x (columns,) and heights over the bed (columns, cells); a row of the result for each.
+        The field is linear along the rows of cells, in a column in the logarithm of the height.
         """
         middles, values = self.mesh[2], self.field(name)
         rows = int(np.argmax(np.diff(middles[:, 0]) > 1e-9 * bed.h)) + 1

@@ -79,10 +79,9 @@ def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
 
 
 def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
-    """The grid along a bed line (m) that begins and ends with flat bed.
+    """The grid along a bed line (m); `growth` is the ratio of neighbouring cells beside the form.
 
-    A face of the slope that is as high as the form has `cells_per_face` cells; a slope of 0 stands
-    for no face. `growth` is the ratio of neighbouring cells beside the form.
+    A face of the slope as high as the form has `cells_per_face` cells; 0 stands for no face.
     """
     face = line.h / tan(radians(slope_deg)) if slope_deg else 4 * line.h
     cell = face / cells_per_face

@@ -134,9 +134,7 @@ def diagnostics(
     """A few numbers of a solved flow beside the ranges in which sound flows have them.
 
     `approach` and, of a channel, `mean_speed` are the friction velocity and the mean speed before
-    the inlet over those of the log law; `reynolds` is u*_0 over the solve's nu, 1/m. The table has
-    ``value``, ``sound_from``, ``sound_to`` and ``sound``, yes or no (NaN is not), for each
-    ``quantity`` of the index. Lengths are in m.
+    the inlet over those of the log law; `reynolds` is u*_0 over the solve's nu, 1/m. Lengths in m.
     """
     centre = float(np.median(stress.z_e_m))
     shortest = SHORTEST_BUBBLE if slope_deg >= SEPARATES_FROM_DEG else 0.0

@@ -153,10 +153,9 @@ def _streamline(
 
 
 def half_length(line: BedLine) -> float | None:
-    """Half of the length of the highest form at half of its height, m.
+    """Half of the length of the highest form at half of its height, m, up to where the flow lands.
 
-    The form ends where the flow lands behind it. None where the bed does not fall that far before
-    and behind its top.
+    None where the bed does not fall that far before and behind its top.
     """
     seen, crest = seen_by_the_flow(line), line.crest
     half = (float(crest[1]) + min(line.z)) / 2

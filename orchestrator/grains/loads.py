@@ -222,8 +222,7 @@ class Geometry:
 class Loads:
     """The n grains of a bed under a flow, and the flows at which they move by their geometry.
 
-    `ratio`, shape (n,), is the friction velocity that drives each grain over the undisturbed one:
-    that of the mean stress around it, positive downstream.
+    `ratio`, (n,), is the signed friction velocity of the mean stress around each over u*_0.
     """
 
     geometry: Geometry

@@ -186,28 +186,24 @@ class Track(NamedTuple):
 
 
 class Count(NamedTuple):
-    """Motion of N counted grains by each of T samples, shape (T, N); a grain stays counted.
-
-    `moved`: displaced downstream or aside by the criterion at a sample, or carried off. `fallen`:
-    displaced upstream by it; such a grain has not moved, but may yet. `carried`: gone without
-    having been seen beyond the criterion: the flow lifted it off the pile.
-    """
+    """Motion of N counted grains by each of T samples, shape (T, N); a grain stays counted."""
 
     moved: BoolArray
+    """Displaced downstream or aside by the criterion at a sample, or carried off."""
     fallen: BoolArray
+    """Displaced upstream by it; such a grain has not moved, but may yet."""
     carried: BoolArray
+    """Gone without having been seen beyond the criterion: the flow lifted it off the pile."""
 
 
 def count(
     travel: FloatArray, criterion: float, *, falls_out: bool, aside: FloatArray | float = 0.0
 ) -> Count:
-    """Apply the counting rule to the tracks of grains.
+    """Apply the counting rule to `Track.travel` and `Track.aside`, with a criterion in d.
 
-    `travel` is the displacement along the bed since the settling, downstream positive, d, shape
-    (T, N), NaN for a grain that is gone; `aside` that across the flow, 0 in one plane; `criterion`
-    the displacement that counts as motion, d. `falls_out` says whether a grain that is gone and was
-    not seen beyond the criterion fell upstream: from the two neighbours of a single grain it did,
-    for no bed is behind them; only lift can have taken it from a pile.
+    `falls_out` says whether a grain that is gone and was not seen beyond the criterion fell
+    upstream: from the two neighbours of a single grain it did, for no bed is behind them; only lift
+    can have taken it from a pile.
     """
     ahead, back = _ever((travel >= criterion) | (aside >= criterion)), _ever(travel <= -criterion)
     vanished = _ever(np.isnan(travel) & ~ahead)
@@ -223,8 +219,7 @@ def _ever(happened: BoolArray) -> BoolArray:
 def read(directory: Path, grains: GrainTable, criterion: float, *, falls_out: bool) -> Motion:
     """Read the deck's tables of a finished run; the other arguments are those of `count`.
 
-    Raises a SolverError if a table is cut short, grains are lost that may not be, or the counts do
-    not reconcile; as `Exploded` if every counted grain was lost.
+    Raises a SolverError if a table is cut short, grains were lost, or the counts do not reconcile.
     """
     samples = read_table(directory / SAMPLES)
     track = read_track(directory, grains, samples)
@@ -271,8 +266,7 @@ def read_track(directory: Path, grains: GrainTable, samples: pd.DataFrame) -> Tr
     """Read what the counted grains did at each sample, from ``passage.dump`` and ``bed.dump``.
 
     A counted grain that the first does not list, and that the second has at the end of the load
-    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows. Raises
-    a SolverError if a dump is not of these grains and samples, as `Exploded` if it has no grain.
+    step, is at rest where it had settled. `samples` is the deck's table of samples, T rows.
     """
     ids, path = grains.counted_ids, directory / PASSAGE
     steps, rows = read_dump(path, PASSAGE_COLUMNS)
@@ -331,10 +325,9 @@ def check_rest(
 ) -> None:
     """See that a bed of grains came to rest before the flow rose, judged by their energy.
 
-    The submerged weight W of a grain is in N, the stiffness is K d/W. All grains of a pile must
-    come to rest; cells are each a bed of their own and may be one whose grain falls out. Raises
-    `Exploded` if the energy is no number, grows, or has driven grains away, `Noisy` if the grains
-    keep moving.
+    The weight W is in N, the stiffness is K d/W. All grains of a pile must come to rest; of cells
+    some grains may fall out. Raises `Exploded` if the energy is no number, grows, or has driven
+    grains away, `Noisy` if the grains keep moving.
     """
     settling, where = read_table(directory / SETTLING, rows=4), str(directory / SETTLING)
     energy = settling["ke"].to_numpy(float) / grains.mobile_count / (weight * grains.diameter)

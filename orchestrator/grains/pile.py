@@ -103,10 +103,9 @@ class Worn:
 
 @dataclass(frozen=True)
 class WornFlow(Case):
-    """The flow over the bed of a pile that has worn for some rounds.
+    """The flow over a worn bed, after a round under the flow `before`.
 
-    `before` is the flow of the round before, `run` the run of LIGGGHTS in that round; without one
-    the grains of the round leave by peeling.
+    In that round the grains left in the `run` of LIGGGHTS, or by peeling if there is none.
     """
 
     scene: Scene
@@ -220,17 +219,14 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
 
 
 def sunk(geometry: Geometry, worn: Worn) -> BedLine:
-    """The bed line over worn grains, d: as much lower as their upper sides are.
-
-    The difference is averaged over `EDGE`, so that the lattice does not show in it. Corners, one
-    per diameter, are added where it changes.
-    """
+    """The bed line over worn grains, d: as much lower as their upper sides are, averaged."""
     line, packed, present = geometry.line, geometry.packing, worn.present
     x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE, SPACING)
     before = _tops(packed.centres, packed.sizes / 2, x)
     depth = before - _tops(worn.places[present], packed.sizes[present] / 2, x)
     window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
     depth = np.convolve(depth, window, mode="same")
+    # corners, one per diameter, where the depth changes
     step = round(EDGE / 2 / SPACING)
     changes = np.convolve(np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same") > 0
     places = x[changes & (np.arange(len(x)) % step == 0)]
@@ -260,8 +256,7 @@ def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
 class PileCase(GrainCase):
     """The run of LIGGGHTS of the grains of one pile, or of those that are there in a round.
 
-    `flow` is the flow of the round, by default that of the whole pile; `before` the run that this
-    one goes on from.
+    `flow` is that of the round, None over the whole pile; it goes on from the run `before`.
     """
 
     scene: Scene

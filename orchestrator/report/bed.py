@@ -143,10 +143,7 @@ def words(results: Results, pile: Pile) -> str:
 
 
 def data(steps: Steps, shown: int) -> dict[str, Any]:
-    """Data for the slider: the mobile grains that are elsewhere at each stop.
-
-    ``frames`` has three numbers for each such grain: its number, x and -z; null if it has left.
-    """
+    """Data for the slider: at each stop number, x and -z of the grains that have moved since."""
     mobile = steps.pile.packing.mobile[steps.grains]
     last, frames = steps.places[0, mobile].copy(), []
     for places in steps.places[1:]:
@@ -184,10 +181,7 @@ def _paths(steps: Steps) -> list[list[Any]]:
 
 
 def window(pile: Pile) -> tuple[flows.Window, str]:
-    """Left, right, bottom and top of the picture, d, and which part of the bed it shows if not all.
-
-    It shows the whole pile, or the upper end of a long face.
-    """
+    """Left, right, bottom and top of the picture, d, and which part of a long bed it shows."""
     (x, z), toe = pile.line.crest.tolist(), float(pile.line.toe[0])
     if z <= 0:  # a level bed has no crest
         left, right = pile.line.x[1] - 2, pile.line.x[-2] + 2

@@ -106,10 +106,9 @@ class Bed(NamedTuple):
 
 @dataclass(frozen=True)
 class Line:
-    """The closed form of one grain by a law on a bed.
+    """The closed form of one grain by a law on a bed, and the Re* between which a study has grains.
 
-    `first` and `last` are the Re* between which a study has grains of that law, infinite and 0 if
-    it has none.
+    `first` and `last` are infinite and 0 if it has none of that law.
     """
 
     law: str
@@ -264,12 +263,8 @@ def _number(reynolds: float) -> str:
     return f"{reynolds:.0f}" if reynolds >= 9.95 else f"{reynolds:.2g}"
 
 
-def _between(*ends: float) -> str:
-    return " … ".join(map(_number, ends))
-
-
 def _ranges(chosen: BoolArray) -> str:
-    return ", ".join(_between(*ends) for ends in ranges(chosen))
+    return ", ".join(" … ".join(map(_number, ends)) for ends in ranges(chosen))
 
 
 def section(results: Results) -> dict[str, Any] | None:
@@ -325,5 +320,5 @@ def _sentences(grains: pd.DataFrame, listed: Sequence[Line]) -> Iterator[str]:
     covered = np.isfinite(read).any(axis=0)
     if covered.any():
         ratio = np.exp(np.nanmean(read[:, covered], axis=0)) / MEDIANS[covered]
-        where = _between(*MIDDLES[covered][[0, -1]])
+        where = " … ".join(map(_number, MIDDLES[covered][[0, -1]]))
         yield caption("air", ratio=(ratio.min(), np.median(ratio), ratio.max()), span=where)
