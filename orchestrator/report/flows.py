@@ -120,24 +120,22 @@ def _cells(case: Path) -> Any:
     return read_cells(case, "U").cell_data_to_point_data()
 
 
-def over_u_e(
-    pile: Pile, cases: Path, window: Window, unit: float, columns: int = 800
-) -> FloatArray:
-    """Velocity over U_e on a grid, shape (rows, columns, 3), rows upwards; NaN outside the mesh.
+def over_u_e(pile: Pile, cases: Path, window: Window, unit: float, width: int = 800) -> FloatArray:
+    """Velocity over U_e on a grid, shape (rows, width, 3), rows upwards; NaN outside the mesh.
 
     The window is in units of `unit`, m.
     """
     import pyvista  # half a second, which only a study with piles waits for
 
     mesh, (left, right, bottom, top) = _cells(cases / pile.flow.name), np.multiply(window, unit)
-    rows = round(columns * (top - bottom) / (right - left))
-    spacing = ((right - left) / (columns - 1), 1.0, (top - bottom) / (rows - 1))
+    rows = round(width * (top - bottom) / (right - left))
+    spacing = ((right - left) / (width - 1), 1.0, (top - bottom) / (rows - 1))
     origin = (left, (mesh.bounds[2] + mesh.bounds[3]) / 2, bottom)
-    grid = pyvista.ImageData(dimensions=(columns, 1, rows), spacing=spacing, origin=origin)
+    grid = pyvista.ImageData(dimensions=(width, 1, rows), spacing=spacing, origin=origin)
     sampled: Any = grid.sample(mesh)
     inside = np.asarray(sampled["vtkValidPointMask"], bool)[:, None]
     values = np.where(inside, np.asarray(sampled.point_data["U"], float), np.nan)
-    return values.reshape(rows, columns, 3) / pile.scene.flow.speed
+    return values.reshape(rows, width, 3) / pile.scene.flow.speed
 
 
 def flow(results: Results) -> Iterator[Figure]:

@@ -43,9 +43,8 @@ class Results:
     @cached_property
     def flow_fields(self) -> list[str]:
         """The fields of the solved flow in which the piles differ."""
-        piles, columns = self.beds("pile"), fields.COLUMNS.items()
-        solved = [name for name, item in columns if item.info.scope == "solved flows"]
-        return [name for name in solved if piles[name].nunique(dropna=False) > 1]
+        columns, count = fields.COLUMNS.items(), self.beds("pile").nunique(dropna=False)
+        return [n for n, each in columns if each.info.scope == "solved flows" and count[n] > 1]
 
     _joins: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
@@ -107,12 +106,10 @@ def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
         yield hill.aspect, rows
 
 
-def split(
-    table: pd.DataFrame, *columns: str
-) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
+def split(table: pd.DataFrame, *by: str) -> Iterator[tuple[tuple[Hashable, ...], pd.DataFrame]]:
     """The parts of a table that agree in some columns, with what they agree in, in rising order."""
     if len(table):
-        yield from table.groupby(list(columns), sort=True, dropna=False)
+        yield from table.groupby(list(by), sort=True, dropna=False)
 
 
 def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
