@@ -41,6 +41,8 @@ LOWER = 0.1
 """A neighbour bears a grain that stands so much over it, diameters."""
 UNDER = 2
 """Rows of fixed grains where none is counted: none falls through them."""
+HIDES = 4.0
+"""Farthest distance at which a grain hides another one of a lattice, diameters."""
 OFFSET = 0.125
 """Largest offset of a grain normal to its row, over the size of the disorder."""
 FINE = 0.1
@@ -421,7 +423,8 @@ def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> Bo
     narrower than `slack` does not expose the one under it; on such a bed a neighbour that stands
     out by less than `STRAY` hides none.
     """
-    first, _, apart = Places.of(centres).pairs(1.6)
+    # through a gap in the row above, a grain of the row above that may hide one
+    first, _, apart = Places.of(centres).pairs(HIDES)
     x, z = apart[:, 0], apart[:, 2]
     tx, tz = tangents[first].T
     hidden = np.abs(x * tx + z * tz) <= 0.5 + slack + TIE

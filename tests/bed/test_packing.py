@@ -52,6 +52,15 @@ def _check(bed: Packing) -> None:
     assert not (bed.windward & bed.lee).any()
 
 
+@pytest.mark.parametrize("beta", [60.0, 59.5, 50.0])
+def test_through_the_gaps_of_a_row_the_next_is_exposed_and_no_other(beta: float) -> None:
+    line = triangle(15.0, 10.0)
+    bed = pile(line, _lattice(entrainment_angle_deg=beta, mobile_layers=3))
+    shown = line.over(bed.centres[bed.windward], line.top - 1)
+    rows = np.unique(np.round((0.5 + GAP - shown) / np.sin(np.radians(beta))))
+    assert rows.tolist() == ([0] if beta == 60 else [0, 1])
+
+
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("name", BEDS)
 def test_grains_of_any_bed_do_not_overlap_and_mobile_ones_rest(name: str, pattern: Pattern) -> None:
