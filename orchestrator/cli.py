@@ -67,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
         ("ladder", _study, "what each model costs and how far it is off"),
         ("budget", _study, "what the choices are worth that all models share"),
         ("stability", _study, "maps of where each method fails"),
+        ("validate", _study, "the models beside what was measured"),
         ("doctor", _other, "are the solvers here, can it draw; what to install"),
     ):
         command = commands.add_parser(name, help=text)

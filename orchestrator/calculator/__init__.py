@@ -37,6 +37,9 @@ PARAMETERS = {
     "roughness": _Z0,
     "lift_coefficient": _LIFT,
     "gravity": Parameter("fluid.gravity", "g_m_s2", "g, m/s2", (1e-5, 1e4), GRAVITY),
+    "cohesion": Parameter(
+        "grain.cohesion", "cohesion_n_m", "cohesion, N/m", (0, 1e3), 0.0, "pull of a contact over d"
+    ),
     "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""

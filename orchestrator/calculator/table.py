@@ -52,7 +52,9 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
     beta, blocks = grains["entrainment_angle_deg"], []
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
         by_law = {
-            name: threshold(each, exposure, entrainment_angle_deg=beta, **rest)
+            name: threshold(
+                each, exposure, entrainment_angle_deg=beta, cohesion=grains["cohesion"], **rest
+            )
             for name, each in LAWS.items()
         }
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
@@ -96,7 +98,7 @@ def _grains(points: Mapping[str, Any], count: int) -> Table:
             part, _, field = PARAMETERS[name].field.partition(".")
             value = given[name][index]
             parts[part][field] = value if isinstance(value, str) else float(value)
-        scene = make_scene(parts, "threshold")
+        scene = make_scene({**parts, "protocol": {"method": "pivot"}}, "threshold")
         limits.check(scene, "threshold")
         for name, number in single_grain(scene)._asdict().items():
             grains[name][index] = number

@@ -45,7 +45,8 @@ BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured a
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
 SETTINGS = (
     *(*AT_LEAST, "flow.turbulence_model", "flow.convection_scheme", "forces.averaging_length"),
-    *("forces.loaded_grains", "forces.exposure", "protocol.displacement_criterion"),
+    *("forces.loaded_grains", "forces.exposure", "forces.sheltering", "grain.cohesion"),
+    "protocol.displacement_criterion",
 )
 _AT = {name: name.split(".") for name in SETTINGS}
 DEFAULTS = {name: PARTS[part].model_fields[key].default for name, (part, key) in _AT.items()}

@@ -16,8 +16,9 @@ from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
-from orchestrator.grains import peeling
+from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.peeling import FEWER, PLACES, ForceTable, Loading
+from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.study.closed_form import closed_form, single_grain
@@ -37,16 +38,31 @@ Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities 
 
 
 def forces(
-    scene: Scene, sizes: ArrayLike = 1.0, gaps: ArrayLike | None = None
+    scene: Scene,
+    sizes: ArrayLike = 1.0,
+    gaps: ArrayLike | None = None,
+    level: Force | None = None,
 ) -> tuple[Force, Force]:
     """Drag and lift on exposed grains of a resolved scene.
 
     `sizes` are diameters over that of the scene; `gaps` are heights of the grains' lowest points
-    above the level at which the flow begins, m, by default z0.
+    above the bed's level, m, by default z0; `level` is the height above that (m) at which the flow
+    begins, a function of the friction velocity (m/s), by default 0.
     """
     law, grain = LAWS[scene.forces.law], single_grain(scene)
-    exposure = Exposure(grain.diameter * np.asarray(sizes, float), *grain[1:5], gaps)
-    return partial(law.drag, at=exposure), partial(law.lift, at=exposure)
+    given = (grain.diameter * np.asarray(sizes, float), *grain[1:5])
+    heights = np.asarray(grain.roughness if gaps is None else gaps, float)
+    if level is None:
+        exposure = Exposure(*given, heights)
+        return partial(law.drag, at=exposure), partial(law.lift, at=exposure)
+
+    def drag(ustar: ArrayLike) -> FloatArray:
+        return law.drag(ustar, Exposure(*given, heights - level(ustar)))
+
+    def lift(ustar: ArrayLike) -> FloatArray:
+        return law.lift(ustar, Exposure(*given, heights - level(ustar)))
+
+    return drag, lift
 
 
 def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
@@ -58,7 +74,8 @@ def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
     each = [answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)]
-    return np.asarray(np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf)[place])
+    speeds = np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)
+    return np.asarray(speeds[place])
 
 
 @dataclass(frozen=True)
@@ -166,6 +183,21 @@ class Geometry:
         return z0 + poured.standing(self.packing, self.line) * self.scene.grain.diameter
 
     @cached_property
+    def shelter(self) -> Shelter | None:
+        """The level at which the flow begins on each patch, where the grains share its stress."""
+        scene, packed = self.scene, self.packing
+        if scene.forces.sheltering == "none":
+            return None
+        d, unit = scene.grain.diameter, float(closed_form(scene).friction_velocity)
+
+        def drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
+            return forces(scene, sizes, gaps)[0](ustar)
+
+        length = max(1.0, scene.forces.averaging_length * self.bed.relief / d)
+        fluid = {"unit": unit, "density": scene.fluid.density}
+        return sheltering.balanced(drag, packed, self.gaps, d, length=length, **fluid)
+
+    @cached_property
     def force_tables(self) -> list[ForceTable]:
         """Force table of each of the n grains, over its own weight.
 
@@ -174,7 +206,11 @@ class Geometry:
         scene, unit = self.scene, float(closed_form(self.scene).friction_velocity)
         pushed = self.packing.pushed
         sizes = np.where(pushed, self.packing.sizes, 1.0).tolist()
-        kinds = list(zip(sizes, np.where(pushed, self.gaps, self.gaps[0]).tolist(), strict=True))
+        gaps = np.where(pushed, self.gaps, self.gaps[0]).tolist()
+        shelter, levels = self.shelter, [None] * len(sizes)
+        if shelter is not None:
+            levels = [shelter.levels[i] if i >= 0 else None for i in shelter.patch.tolist()]
+        kinds = list(zip(sizes, gaps, levels, strict=True))
         places = PLACES if len(set(kinds)) <= KINDS else FEWER
         tables = {
             kind: ForceTable(*forces(scene, *kind), scene.weight * kind[0] ** 3, unit, places)
@@ -232,9 +268,12 @@ class Loads:
     def loading(self) -> Loading:
         """The forces on the grains: exposed ones that may move carry one."""
         bed, packed = self.geometry, self.geometry.packing
-        drag, lift = forces(bed.scene, packed.sizes, bed.gaps)
+        level = bed.shelter.of_grains if bed.shelter else None
+        drag, lift = forces(bed.scene, packed.sizes, bed.gaps, level)
         normals = np.column_stack([-bed.tangents[:, 1], bed.tangents[:, 0]])
-        return Loading(drag, lift, np.where(packed.pushed, self.ratio, 0.0), bed.tangents, normals)
+        # a gust acts everywhere alike
+        ratio = np.where(packed.pushed, self.ratio * np.sqrt(bed.scene.gust), 0.0)
+        return Loading(drag, lift, ratio, bed.tangents, normals)
 
     @property
     def along(self) -> FloatArray:
@@ -256,10 +295,23 @@ class Loads:
         if bed.pouring:
             places, sizes = bed.packing.places, bed.packing.sizes
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
-            return np.asarray(peeling.pivots(places, sizes, loading, bed.force_tables)[counted])
+            flows = peeling.pivots(places, sizes, loading, bed.force_tables, bed.scene.bond)
+            return np.asarray(flows[counted])
         slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
-        threshold = on_slopes(bed.scene, np.where(speed < 0, -slopes, slopes))
+        slopes = np.where(speed < 0, -slopes, slopes)
+        threshold = self._sheltered(slopes) if bed.shelter else on_slopes(bed.scene, slopes)
         return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
+
+    def _sheltered(self, slopes_deg: FloatArray) -> FloatArray:
+        """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope."""
+        bed, scene = self.geometry, self.geometry.scene
+        beta, tables = np.radians(scene.pocket_angle_deg), bed.force_tables
+        goals = np.cos(np.radians(slopes_deg) - beta) + scene.bond * np.sin(2 * beta)
+        arms = float(np.sin(beta)), float(np.cos(beta))
+        numbers = np.flatnonzero(bed.packing.windward)
+        each = zip(numbers.tolist(), goals.tolist(), strict=True)
+        local = [tables[number].reaching(*arms, goal) for number, goal in each]
+        return np.asarray(np.array(local) / np.sqrt(scene.gust))
 
     def leaving(self, present: BoolArray | None = None) -> FloatArray:
         """Undisturbed friction velocity at which each counted grain leaves by peeling, m/s, (N,).
@@ -268,9 +320,8 @@ class Loads:
         """
         bed, packed = self.geometry, self.geometry.packing
         criterion = bed.scene.protocol.displacement_criterion
-        flows = peeling.flows(
-            packed.places, packed.sizes, self.loading, bed.force_tables, criterion, present
-        )
+        given = packed.places, packed.sizes, self.loading, bed.force_tables
+        flows = peeling.flows(*given, criterion, present, bed.scene.bond)
         return np.asarray(flows[packed.windward])
 
     def row_hold(self) -> float:

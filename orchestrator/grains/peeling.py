@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -127,7 +127,8 @@ class Disc(NamedTuple):
 class _Roller:
     """A grain that the flow pushes towards +x, and its neighbours by their numbers; lengths in d.
 
-    `along` and `outward` are the unit vectors of that way and out of the bed.
+    `along` and `outward` are the unit vectors of that way and out of the bed; `bond` is the pull of
+    a contact between two grains of d over their weight.
     """
 
     start: Disc
@@ -136,14 +137,26 @@ class _Roller:
     ratio: float
     along: Sequence[float]
     outward: Sequence[float]
+    bond: float = 0.0
 
-    def flow_over(self, place: Place, pivot: Disc) -> float:
+    def flow_over(self, place: Place, pivot: Disc, numbers: Iterable[int]) -> float:
         """The flow (u*_0) at which the resultant passes through a contact: no moment about it."""
         lean = _lean(place, pivot[:2])
         x, z = math.cos(lean), math.sin(lean)
         drag_arm = self.along[0] * x + self.along[1] * z
         lift_arm = self.outward[0] * x + self.outward[1] * z
-        return self.table.reaching(drag_arm, lift_arm, z) / self.ratio
+        goal = z + (self._held(place, lean, numbers) if self.bond else 0.0)
+        return self.table.reaching(drag_arm, lift_arm, goal) / self.ratio
+
+    def _held(self, place: Place, lean: float, numbers: Iterable[int]) -> float:
+        """Moment over weight and radius with which contacts pull a grain back from its pivot."""
+        size = 2 * self.start.radius
+        moment = 0.0
+        for other in (self.others[k] for k in numbers):
+            if math.dist(other[:2], place) < (1 + TOUCH) * (self.start.radius + other.radius):
+                pull = self.bond * _pull(size, 2 * other.radius)
+                moment += pull * math.sin(lean - _lean(place, other[:2]))
+        return moment
 
     def way(self, numbers: Sequence[int], criterion: float) -> tuple[float, list[int]]:
         """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
@@ -153,7 +166,7 @@ class _Roller:
             rolled.append(pivot)
             if len(rolled) > STEPS:
                 return math.inf, rolled
-            flow = max(flow, self.flow_over(place, self.others[pivot]))
+            flow = max(flow, self.flow_over(place, self.others[pivot], numbers))
             met = self._next(place, self.others[pivot], numbers)
             if met is None or math.isinf(flow):
                 break
@@ -188,6 +201,11 @@ class _Roller:
         return (pivot.x + arm * math.cos(angle), pivot.z + arm * math.sin(angle)), k
 
 
+def _pull(size: FloatArray | float, other: FloatArray | float) -> Any:
+    """Pull of a contact over the weight of the grain of a size (d), for a bond of 1."""
+    return 2 * other / (size + other) / size**2
+
+
 def flows(
     places: Places,
     sizes: FloatArray,
@@ -195,6 +213,7 @@ def flows(
     tables: Sequence[ForceTable],
     criterion: float,
     present: BoolArray | None = None,
+    bond: float = 0.0,
 ) -> FloatArray:
     """The flow (u*_0, m/s) at which each of n grains in one plane leaves by peeling, shape (n,).
 
@@ -202,10 +221,10 @@ def flows(
     unit of length; grains that carry a force may leave; each has a table of its force law over its
     own submerged weight. The criterion is the displacement along the bed that counts as motion, of
     the grain's own diameter. `present`, shape (n,), has the grains that have not left yet; by
-    default all.
+    default all. `bond` is the pull of a contact between two grains of d over their weight.
     """
     present = np.ones(len(sizes), bool) if present is None else present.copy()
-    rollers = dict(_rollers(places, sizes, loading, tables, present))
+    rollers = dict(_rollers(places, sizes, loading, tables, present, bond))
     left, next_flow = np.full(len(sizes), np.inf), np.full(len(sizes), np.inf)
     ways: dict[int, list[int]] = {}
 
@@ -229,7 +248,11 @@ def flows(
 
 
 def pivots(
-    places: Places, sizes: FloatArray, loading: Loading, tables: Sequence[ForceTable]
+    places: Places,
+    sizes: FloatArray,
+    loading: Loading,
+    tables: Sequence[ForceTable],
+    bond: float = 0.0,
 ) -> FloatArray:
     """The flow at which each grain by itself begins to roll; arguments and result as in `flows`.
 
@@ -238,21 +261,25 @@ def pivots(
     least = np.full(len(sizes), np.inf)
     pushed = loading.ratio != 0
     if not places.width:
-        for i, roller in _rollers(places, sizes, loading, tables, pushed):
+        for i, roller in _rollers(places, sizes, loading, tables, pushed, bond):
             pivot = _foremost(roller.start, roller.others, roller.others)
             start = roller.start[:2]
-            least[i] = 0.0 if pivot is None else roller.flow_over(start, roller.others[pivot])
+            near = roller.others
+            least[i] = 0.0 if pivot is None else roller.flow_over(start, near[pivot], near)
         return least
-    for i, sides in _pyramids(places, sizes, pushed):
+    for i, sides, held in _pyramids(places, sizes, pushed):
         ratio = float(loading.ratio[i])
         drag = -np.sign(ratio) * _in_plane(sides, loading.along[i])
         lift = -_in_plane(sides, loading.outward[i])
-        arms = zip(drag.tolist(), lift.tolist(), (-sides[:, 2]).tolist(), strict=True)
+        goal = bond * held - sides[:, 2]
+        arms = zip(drag.tolist(), lift.tolist(), goal.tolist(), strict=True)
         least[i] = min((tables[i].reaching(*arm) for arm in arms), default=np.inf) / abs(ratio)
     return least
 
 
-def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> FloatArray:
+def pivot_angles_deg(
+    places: Places, sizes: FloatArray, along: FloatArray, only: int | None = None
+) -> FloatArray:
     """Angle from the bed's normal over which each grain has to roll downstream, shape (n,).
 
     In a plane that of its foremost contact, in space that to which the grain bears a force, as a
@@ -260,6 +287,8 @@ def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> Fl
     grain, shape (n, 2). NaN for a grain without contacts, or that no force along the bed moves.
     """
     angles, every = np.full(len(sizes), np.nan), np.ones(len(sizes), bool)
+    if only is not None:
+        every = np.arange(len(sizes)) == only
     if not places.width:
         discs = _discs(places, sizes, 1.0)
         for i, near in _neighbours(places, sizes, every):
@@ -269,7 +298,7 @@ def pivot_angles_deg(places: Places, sizes: FloatArray, along: FloatArray) -> Fl
                 angles[i] = math.degrees(_lean(discs[i][:2], discs[pivot][:2]) - slope)
         return angles
     outward = np.column_stack([-along[:, 1], along[:, 0]])
-    for i, sides in _pyramids(places, sizes, every):
+    for i, sides, _ in _pyramids(places, sizes, every):
         forward, deep = _in_plane(sides, along[i]), -_in_plane(sides, outward[i])
         ahead = forward < 0
         if ahead.any():
@@ -283,6 +312,7 @@ def _rollers(
     loading: Loading,
     tables: Sequence[ForceTable],
     chosen: BoolArray,
+    bond: float,
 ) -> Iterator[tuple[int, _Roller]]:
     """The chosen grains that carry a force, by their numbers."""
     ahead, behind = (_discs(places, sizes, side) for side in (1.0, -1.0))
@@ -293,7 +323,7 @@ def _rollers(
         along = [float(loading.along[i, 0]), side * float(loading.along[i, 1])]
         outward = [side * float(loading.outward[i, 0]), float(loading.outward[i, 1])]
         others = {k: discs[k] for k in near}
-        yield i, _Roller(discs[i], others, tables[i], abs(ratio), along, outward)
+        yield i, _Roller(discs[i], others, tables[i], abs(ratio), along, outward, bond)
 
 
 def _discs(places: Places, sizes: FloatArray, side: float) -> list[Disc]:
@@ -342,8 +372,11 @@ def _lean(place: Place, neighbour: Place) -> float:
 
 def _pyramids(
     places: Places, sizes: FloatArray, chosen: BoolArray
-) -> Iterator[tuple[int, FloatArray]]:
-    """The chosen grains, each with the inward normals of the pyramid of its contacts, (k, 3)."""
+) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """The chosen grains, each with the inward normals of the pyramid of its contacts, (k, 3).
+
+    Beside them is what its contacts pull along each normal, over the weight for a bond of 1, (k,).
+    """
     first, second, apart = places.contacts(sizes)
     directions = apart / np.linalg.norm(apart, axis=1)[:, None]
     for i, rows in _by_grain(first, second, chosen):
@@ -354,7 +387,9 @@ def _pyramids(
             if (others > -FLAT).all() or (others < FLAT).all():
                 sides.append(normal * (1 if others.sum() > 0 else -1))
         # a pyramid of fewer than three contacts contains no direction: its one side faces up
-        yield i, np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
+        normals = np.array(sides if len(touching) > 2 else [[0.0, 0.0, 1.0]]).reshape(-1, 3)
+        pull = _pull(sizes[i], sizes[second[rows]])
+        yield i, normals, normals @ (pull[:, None] * touching).sum(axis=0)
 
 
 def _in_plane(sides: FloatArray, direction: FloatArray) -> FloatArray:

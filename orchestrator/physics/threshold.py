@@ -157,11 +157,13 @@ def threshold(
     slope_deg: ArrayLike,
     entrainment_angle_deg: ArrayLike,
     gravity: ArrayLike = GRAVITY,
+    cohesion: ArrayLike = 0.0,
 ) -> Threshold:
     """Threshold of one grain on its two neighbours under a force law.
 
-    Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta)``, the third of Eqs. 1
-    with the torque T of the flow about the grain's centre, for the least u*.
+    Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta) + F_a sin(2 beta)``, the
+    third of Eqs. 1 with the torque T of the flow about the grain's centre and the pull
+    F_a = cohesion x d (N/m) of the contact that opens, for the least u*.
 
     The slope alpha is positive where the flow goes up it. Inputs are not validated here; a
     resistance that is not positive gives NaN, and a grain that no flow moves an infinite friction
@@ -171,6 +173,7 @@ def threshold(
     grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
     submerged = weight(diameter=e.diameter, **grain)
     moment = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
+    moment = moment + np.asarray(cohesion, float) * e.diameter * np.sin(2 * beta)
     arms = {"along": np.sin(beta), "outward": np.cos(beta), "turning": 2 / e.diameter}
     ustar = friction_velocity_at(law, e, moment, **arms)
     # where no flow moves the grain the forces are those of an infinite one: not a number
@@ -263,6 +266,7 @@ class SingleGrain(NamedTuple):
     slope_deg: float
     entrainment_angle_deg: float
     gravity: float
+    cohesion: float = 0.0
 
 
 _CACHE: dict[tuple[str, tuple[float, ...]], Threshold] = {}

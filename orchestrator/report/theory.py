@@ -45,7 +45,7 @@ SWEEP_M = (5e-5, 1e-3)
 POINTS = 240
 GRAIN = [
     *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
-    *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2"),
+    *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2", "cohesion_n_m"),
 ]
 """Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]

@@ -4,6 +4,7 @@ Thousands of scenes share few grains: thresholds are computed for many grains at
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import cast
 
 from orchestrator.physics.threshold import (
@@ -23,12 +24,23 @@ def single_grain(scene: Scene) -> SingleGrain:
     grain, bed, fluid = scene.grain, scene.bed, scene.fluid
     flow = (bed.roughness, fluid.density, fluid.viscosity, scene.forces.lift_coefficient)
     pivot = (grain.density, bed.slope_deg, scene.pocket_angle_deg, fluid.gravity)
-    return SingleGrain(grain.diameter, *flow, *pivot)
+    # at a contact of two sizes the pull is that of their harmonic mean
+    cohesion = grain.cohesion * 2 / (1 + bed.relative_size)
+    return SingleGrain(grain.diameter, *flow, *pivot, cohesion)
 
 
 def closed_form(scene: Scene, name: str | None = None) -> Threshold:
-    """The threshold of the grain of a scene under a force law, by default the scene's own."""
-    return thresholds_of(name or scene.forces.law, [single_grain(scene)])[0]
+    """The threshold of the grain of a scene under a force law, by default the scene's own.
+
+    Under gusts u*, Re* and the Shields number are those of the mean flow, the forces those of the
+    gust.
+    """
+    at = thresholds_of(name or scene.forces.law, [single_grain(scene)])[0]
+    if scene.gust == 1:
+        return at
+    root = scene.gust**0.5
+    mean = {"friction_velocity": at.friction_velocity / root, "reynolds": at.reynolds / root}
+    return replace(at, **mean, shields=at.shields / scene.gust)
 
 
 def regime_of(scene: Scene) -> Regime:

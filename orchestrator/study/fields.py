@@ -8,7 +8,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from orchestrator.study.closed_form import regime_of
-from orchestrator.study.parts import Info, LogNormal, Part, PileBed
+from orchestrator.study.parts import Gusts, Info, LogNormal, Part, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
 
@@ -56,7 +56,7 @@ def plain(value: Any) -> Any:
         # a class of a sieve table: diameter and part of the mass
         classes = (f"{1e3 * e[0]:g} mm {100 * e[1]:g} %" if type(e) is tuple else e for e in value)
         return "; ".join(map(str, classes)) or None
-    return str(value) if isinstance(value, Profile | LogNormal) else value
+    return str(value) if isinstance(value, Profile | LogNormal | Gusts) else value
 
 
 def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], bool]:

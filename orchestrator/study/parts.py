@@ -169,6 +169,9 @@ class Grain(Part):
     """spring constant of a contact, normal and tangential, times the diameter over the weight"""
     damping: float = _dem(0.1, ge=0, le=1)
     """damping ratio of a collision"""
+    cohesion: float = field(0.0, "", "N/m", "cohesion_n_m", since=True, ge=0, le=1e3)
+    """pull of a contact over the diameter, of two sizes over their harmonic mean; by pivots and
+    peeling alone"""
     sizes: Sizes | None = _poured(None)
     """mixture of a poured bed: a sieve table, rows of diameter (m, rising) and mass fraction or a
     CSV file with columns diameter_m and fraction, whose d50 is the diameter; or log-normal by mass,
@@ -199,6 +202,10 @@ class Forces(Part):
     """height at which the flow meets a grain
     - alike: every exposed grain stands z₀ above the bed, as in the paper
     - protrusion: each stands at its own height over the local bed"""
+    sheltering: Literal["none", "balanced"] = _pile("none", since=True)
+    """how the exposed grains of a pile share the stress of the flow
+    - none: each feels the flow as if it stood alone, as in the paper
+    - balanced: the flow begins where the drags on a patch of the bed add up to its stress"""
 
 
 class Protocol(Part):
@@ -231,6 +238,18 @@ class Protocol(Part):
     )
     """part of the counted grains after which the flow is solved over the bed line of the remaining
     ones, up to the last fraction; 0 keeps the first flow, as in the paper"""
+
+
+class Gusts(Part):
+    """Peaks of the turbulent stress."""
+
+    intensity: Annotated[float, Field(gt=0, le=1)]
+    """standard deviation of the stress over its mean"""
+    events: Annotated[int, Field(ge=2, le=10**9)]
+    """how many independent events there are while the bed is watched"""
+
+    def __str__(self) -> str:
+        return f"{self.events} of intensity {self.intensity:g}"
 
 
 class Flow(Part):
@@ -278,6 +297,10 @@ class Flow(Part):
     - kOmegaSST: k-ω SST"""
     convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved("linearUpwind")
     """OpenFOAM's scheme for the convection of U"""
+    gusts: Gusts | None = field(None, since=True)
+    """peaks of the turbulent stress, { intensity = 0.4, events = 100 }: the largest of some
+    independent, log-normal ones moves the grains, by default the mean stress; the number of events
+    is the time for which the bed is watched over that of an event; by pivots and peeling alone"""
     top: Literal["open water", "closed channel", "boundary layer"] = _pile(
         "boundary layer", "", "", "flow_top", "top of the flow", since=True
     )

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from orchestrator.physics.constants import KARMAN
+from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.threshold import weight
 from orchestrator.physics.velocity import log_law_ustar
@@ -73,8 +74,18 @@ class Scene(parts.Part):
         turns = law in LAWS and LAWS[law].turns and method != "pivot"
         yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
         is_raised = self.forces.exposure == "protrusion"
-        blind = is_raised and law in LAWS and not LAWS[law].protrudes
-        yield blind, "forces.exposure", f"the law {law} has none", 'choose "bridged"'
+        is_balanced = self.forces.sheltering == "balanced"
+        blind = law in LAWS and not LAWS[law].protrudes
+        for name, is_asked in {"exposure": is_raised, "sheltering": is_balanced}.items():
+            what = f"the law {law} has none"
+            yield is_asked and blind, f"forces.{name}", what, 'choose "bridged"'
+        steady: dict[str, object] = {
+            "flow.gusts": self.flow.gusts,
+            "grain.cohesion": grain.cohesion,
+        }
+        for name, value in steady.items():
+            remedy = 'protocol.method = "pivot" or "peeling"'
+            yield value and method == "dem", name, "DEM knows none", remedy
         width = bed.width if isinstance(bed, PileBed) else 0.0
         poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
         for name, value in poured.items():
@@ -91,6 +102,7 @@ class Scene(parts.Part):
             falls = self.pocket_cosine >= 1
             yield falls, "bed.relative_size", "it falls between its neighbours", "raise it"
             yield update, "protocol.update", "it is of piles", OUT
+            yield is_balanced, "forces.sheltering", "a single grain has no neighbours", OUT
 
     def _rules_of_sizes(self, mixture: parts.Sizes) -> Iterator[Rule]:
         d, slack = self.grain.diameter, OFF_MEDIAN
@@ -171,6 +183,17 @@ class Scene(parts.Part):
     def is_poured(self) -> bool:
         """Whether its bed is poured by LIGGGHTS."""
         return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
+
+    @property
+    def gust(self) -> float:
+        """Stress that moves the grains over the mean stress of the flow: 1 without gusts."""
+        gusts = self.flow.gusts
+        return peak_over_mean(gusts.intensity, gusts.events) if gusts else 1.0
+
+    @property
+    def bond(self) -> float:
+        """Pull of a contact between two grains of d over their submerged weight."""
+        return self.grain.cohesion * self.grain.diameter / self.weight
 
     @property
     def reduced_gravity(self) -> float:

@@ -39,8 +39,12 @@ def test_parameters_are_fields_of_a_scene_with_their_columns_and_defaults() -> N
         if name != "roughness":  # its default is a part of the diameter
             assert parameter.default == (None if declared.is_required() else declared.default)
         for value in map(float, parameter.ordinary):  # no scene of an ordinary value is refused
-            given = {"bed.slope_deg": 30.0, "grain.diameter": 10.0, "grain.density": 2.5e4}
-            given["fluid.density"] = 1e-6
+            given: dict[str, object] = {
+                "bed.slope_deg": 30.0,
+                "grain.diameter": 10.0,
+                "grain.density": 2.5e4,
+            }
+            given |= {"fluid.density": 1e-6, "protocol.method": '"pivot"'}
             text = "\n".join(f"{k} = {v}" for k, v in {**given, parameter.field: value}.items())
             (scene,) = parse(text, name="t", where="t").scenes
             limits.check(scene, "t")

@@ -12,7 +12,7 @@ from orchestrator.errors import InputError
 from orchestrator.fidelity.levels import LEVELS, changed
 from orchestrator.study import fields, study
 from orchestrator.study.fields import Quantity
-from orchestrator.study.parts import LogNormal
+from orchestrator.study.parts import Gusts, LogNormal
 from orchestrator.study.scene import Scene
 from orchestrator.tables import COLUMNS, rows
 
@@ -34,6 +34,8 @@ NEEDED: dict[str, dict[str, Any]] = {
     "bed.width": {"bed.packing": "poured", "bed.width": 5.0},
     "flow.top": {"flow.top": "open water", "flow.depth": 1.0},
     "flow.depth": {"flow.top": "open water", "flow.depth": 1.0},
+    "flow.gusts": {"protocol.method": "pivot"},
+    "grain.cohesion": {"protocol.method": "pivot"},
 }
 """Other fields that a scene must have for a field to have an effect."""
 
@@ -53,6 +55,8 @@ def other_value(quantity: Quantity, scene: Scene) -> Any:
     value = quantity.used(scene)
     if quantity.name == "grain.sizes":
         return LogNormal(sigma_g=1.3)
+    if quantity.name == "flow.gusts":
+        return Gusts(intensity=0.4, events=100)
     if isinstance(value, str):
         words = quantity.info.choices or get_args(declaration(quantity).annotation)
         return next(word for word in words if word not in (value, "paper"))

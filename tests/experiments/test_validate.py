@@ -1,0 +1,69 @@
+"""Validation: exact pockets of laid grains, scores, the paper's rule, and measured rows."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from orchestrator.bed.packing import Packing
+from orchestrator.experiments import validate
+from orchestrator.physics.curves import Air, iversen_white
+
+
+def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
+    # rows lie across the flow, so that pockets point up and down it
+    rows, columns = 16, 6
+    y, x = np.meshgrid(np.arange(columns) + 0.0, np.arange(rows) * math.sqrt(3) / 2)
+    y = (y + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)).ravel()
+    every, flat = np.ones(len(y), bool), np.column_stack([x.ravel(), np.zeros_like(y)])
+    packing = Packing(flat, np.ones(len(y)), every, every, ~every, x.ravel(), y, float(columns))
+    angles = validate.laid(packing, 20)
+    # downstream of a pocket is either the saddle between two grains or the top of one
+    exact = np.degrees(np.arctan([math.sqrt(1 / 8), math.sqrt(1 / 2)]))
+    nearest = np.abs(angles[:, None] - exact).min(axis=1)
+    assert nearest.max() < 0.1
+    assert {int(np.abs(angle - exact).argmin()) for angle in angles} == {0, 1}
+
+
+def test_a_score_is_of_rows_that_were_read_alone() -> None:
+    rows = pd.DataFrame(
+        {
+            "set": "a",
+            "model": "m",
+            "ratio": [0.5, 2.0, 4.0, 100.0, np.nan],
+            "sure": ["read", "read", "read", "memory", "read"],
+        }
+    )
+    (score,) = validate.scores(rows).to_dict("records")
+    assert (score["rows"], score["answered"]) == (4, 3)
+    assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
+
+
+def test_the_measured_rows_are_whole() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    counts = beds.groupby("set").size()
+    assert counts["flumes, visual"] == 245
+    assert counts["flumes, fixed intensity"] == 28
+    assert not beds.isna().any().any()
+    assert ((beds["shields"] > 0) & (beds["shields"] < 0.4)).all()
+    air = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    tunnel = beds[beds["set"] == "wind tunnel, curve"]
+    d = tunnel["d_m"].to_numpy()
+    _, curve = air.shields_diagram(d, iversen_white(d, air))
+    assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)
+
+
+def test_the_paper_has_no_answer_in_the_transition() -> None:
+    beds = pd.DataFrame(
+        {
+            "d_m": [1e-5, 1e-3, 1e-2],
+            "rho_sol_kg_m3": 2650.0,
+            "rho_f_kg_m3": 1000.0,
+            "nu_m2_s": 1e-6,
+            "slope": 0.0,
+            "cohesion_n_m": 0.0,
+        }
+    )
+    shields = validate.by_paper(beds)
+    assert np.isnan(shields).tolist() == [False, True, False]

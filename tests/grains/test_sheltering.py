@@ -1,0 +1,190 @@
+"""Sheltering: drags that add up to the stress; a grain that stands clear, one that does not."""
+
+import math
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.bed.packing import Packing, Places
+from orchestrator.grains import peeling, sheltering
+from orchestrator.grains.loads import Geometry
+from orchestrator.grains.peeling import ForceTable, Loading
+from orchestrator.physics.gusts import peak_over_mean
+from orchestrator.physics.laws import LAWS, Exposure
+from orchestrator.physics.threshold import threshold
+from orchestrator.study.study import parse
+from orchestrator.types import FloatArray
+
+D, Z0, RHO, NU = 0.01, 0.01 / 30, 1000.0, 1e-6
+LAW = LAWS["bridged-gravel"]
+WEIGHT = math.pi / 6 * D**3 * 1650 * 9.81
+
+
+def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
+    return LAW.drag(ustar, Exposure(D * sizes, Z0, RHO, NU, gap=gaps))
+
+
+def _shelter(packing: Packing, gaps: FloatArray) -> sheltering.Shelter:
+    return sheltering.balanced(_drag, packing, gaps, D, length=1.0, unit=NU * 1000 / D, density=RHO)
+
+
+def _layer(rows: int, columns: int, *, stands: float) -> tuple[Packing, FloatArray]:
+    """A close-packed layer with one more sphere, so much higher than its own; the gaps, m."""
+    x, y = np.meshgrid(np.arange(columns) + 0.0, np.arange(rows) * math.sqrt(3) / 2)
+    x = x + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)
+    top = np.array([columns // 2 + 0.5, math.sqrt(3) / 6])
+    flat = np.vstack([top, np.column_stack([x.ravel(), y.ravel()])])
+    height = np.r_[stands, np.zeros(rows * columns)]
+    every = np.ones(len(flat), bool)
+    packing = Packing(
+        centres=np.column_stack([flat[:, 0], height]),
+        sizes=np.ones(len(flat)),
+        mobile=every,
+        windward=every,
+        lee=~every,
+        arc_length=flat[:, 0],
+        across=flat[:, 1],
+        width=rows * math.sqrt(3) / 2,
+    )
+    return packing, Z0 + height * D
+
+
+def _shields(packing: Packing, gaps: FloatArray, pivot_deg: float, gust: float) -> float:
+    """Threshold of the first sphere over a pivot angle, under the balance and a gust."""
+    shelter = _shelter(packing, gaps)
+    level = shelter.levels[shelter.patch[0]]
+
+    def force(ustar: FloatArray, kind: str) -> FloatArray:
+        at = Exposure(D, Z0, RHO, NU, gap=gaps[0] - level(ustar))
+        return LAW.drag(ustar, at) if kind == "drag" else LAW.lift(ustar, at)
+
+    table = ForceTable(partial(force, kind="drag"), partial(force, kind="lift"), WEIGHT, 0.1)
+    phi = math.radians(pivot_deg)
+    ustar = table.reaching(math.cos(phi), math.sin(phi), math.sin(phi))
+    return RHO * ustar**2 / (1650 * 9.81 * D) / gust
+
+
+@pytest.mark.parametrize("reynolds", [0.1, 30.0, 3000.0])
+def test_the_drags_on_each_patch_add_up_to_its_stress(reynolds: float) -> None:
+    rng = np.random.default_rng(1)
+    count, width = 300, 6.0
+    every = np.ones(count, bool)
+    s = np.sort(rng.uniform(0, 30, count))
+    packing = Packing(
+        centres=np.column_stack([s, np.zeros(count)]),
+        sizes=rng.uniform(0.7, 1.4, count),
+        mobile=every,
+        windward=every,
+        lee=~every,
+        arc_length=s,
+        across=rng.uniform(0, width, count),
+        width=width,
+    )
+    gaps = Z0 + rng.uniform(-0.3, 0.4, count) * D
+    ustar = reynolds * NU / D
+    shelter, (patch, areas) = _shelter(packing, gaps), sheltering.patches(packing, 1.0)
+    drag = _drag(np.full(count, ustar), packing.sizes, gaps - shelter.of_grains(ustar))
+    assert len(areas) > 10
+    assert areas.sum() == pytest.approx(30 * width, rel=0.02)
+    sums = np.bincount(patch, drag)
+    assert sums == pytest.approx(RHO * ustar**2 * areas * D**2, rel=1e-6)
+
+
+def test_a_grain_alone_on_a_plane_keeps_its_drag() -> None:
+    one = np.ones(1, bool)
+    packing = Packing(np.zeros((1, 2)), np.ones(1), one, one, ~one, np.zeros(1))
+    assert _shelter(packing, np.array([Z0])).of_grains(0.1) == 0.0
+
+
+def test_a_sphere_that_stands_clear_and_one_level_with_its_neighbours() -> None:
+    """Fenton and Abbott 1977: theta 0.010 on a close-packed layer; 0.1 to 0.3 level with it."""
+    gust = peak_over_mean(0.4, 100)
+    clear = _shields(*_layer(8, 20, stands=math.sqrt(2 / 3)), pivot_deg=19.47, gust=gust)
+    level = _shields(*_layer(8, 20, stands=0.0), pivot_deg=30.0, gust=gust)
+    assert clear == pytest.approx(0.010, rel=0.3)
+    assert 0.1 < level < 0.3
+
+
+@pytest.mark.parametrize(
+    ("intensity", "over_mean"),
+    [(0.36, [1.47, 1.78, 2.12, 2.43, 2.77, 3.45]), (0.40, [1.52, 1.88, 2.28, 2.64, 3.05, 3.89])],
+)
+def test_the_largest_of_many_log_normal_stresses(intensity: float, over_mean: list[float]) -> None:
+    peaks = [peak_over_mean(intensity, events) for events in (10, 30, 100, 300, 1000, 10_000)]
+    assert peaks == pytest.approx(over_mean, abs=0.006)
+    drawn = np.random.default_rng(2).lognormal(
+        -math.log1p(intensity**2) / 2, math.sqrt(math.log1p(intensity**2)), 2_000_000
+    )
+    assert drawn.std() / drawn.mean() == pytest.approx(intensity, rel=0.01)
+    assert np.quantile(drawn, 0.99) == pytest.approx(peaks[2], rel=0.01)
+
+
+@pytest.mark.parametrize("gamma", [1.65e-4, 3e-4])
+@pytest.mark.parametrize("method", ["closed form", "pivot", "peeling"])
+def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
+    """u*^2 over that without cohesion is 1 + gamma/(rho_p g d^2) for F_a = pi gamma d/(12 cos phi).
+
+    Y. Shao and H. Lu, 2000, for forces that rise as u*^2, in a pocket of pivot angle phi.
+    """
+    d, density, g = np.geomspace(3e-5, 8e-4, 8), 2650.0, 9.81
+    phi = math.radians(30)
+    cohesion = math.pi * gamma / (12 * math.cos(phi))
+    if method == "closed form":
+        at = Exposure(d, d / 30, 1.2, 1.5e-5, 0.0)
+        grain = {"density": density, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
+        with_it, without = (
+            threshold(LAWS["low"], at, **grain, cohesion=value).friction_velocity
+            for value in (cohesion, 0.0)
+        )
+    else:
+        find = peeling.pivots if method == "pivot" else partial(peeling.flows, criterion=0.3)
+        centres = np.array([[0.0, math.cos(phi)], [-0.5, 0], [0.5, 0]])
+        ways = np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2)
+        loading = Loading(np.square, np.zeros_like, np.array([1.0, 0, 0]), *ways)
+        tables = [ForceTable(np.square, np.zeros_like, weight=1.0, unit=1.0)] * 3
+        bonds = cohesion * d / (math.pi / 6 * d**3 * (density - 1.2) * g)
+        given = Places.of(centres), np.ones(3), loading, tables
+        with_it = np.array([find(*given, bond=bond)[0] for bond in bonds])
+        without = np.full(len(d), find(*given)[0])
+    assert (with_it / without) ** 2 == pytest.approx(1 + gamma / ((density - 1.2) * g * d**2))
+
+
+def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
+    """On rows of equal grains, 2 d cos(beta) apart, each has drag tau d 2 d cos(beta): Eq. 1."""
+    text = """
+        [grain]
+        diameter = 1e-3
+        [bed]
+        kind = "pile"
+        slope_deg = 15.0
+        [flow]
+        model = "flat"
+        [forces]
+        sheltering = "balanced"
+        lift_coefficient = 0.0
+        [protocol]
+        method = "{}"
+    """
+    answers = {}
+    for method in ("pivot", "peeling"):
+        (scene,) = parse(text.format(method), name="a", where="a").scenes
+        loads = Geometry(scene).loads(Path())
+        answers[method] = loads.alone() if method == "pivot" else loads.leaving()
+    beta, alpha = math.radians(60), math.radians(15)
+    tau = scene.weight * math.cos(alpha - beta) / math.sin(beta) / (2 * math.cos(beta) * 1e-6)
+    exact = math.sqrt(tau / scene.fluid.density)
+    assert np.median(answers["pivot"]) == pytest.approx(exact, rel=1e-6)
+    # by peeling a grain waits for those before it, and needs no more flow once they have gone; the
+    # grain of the crest and that of the foot have another share of the bed
+    assert answers["peeling"].max() == pytest.approx(exact, rel=0.05)
+    (gusty,) = parse(
+        text.format("pivot").replace(
+            'model = "flat"', 'model = "flat"\ngusts = { intensity = 0.4, events = 100 }'
+        ),
+        name="a",
+        where="a",
+    ).scenes
+    ratio = Geometry(gusty).loads(Path()).alone() / answers["pivot"]
+    assert ratio == pytest.approx(1 / math.sqrt(peak_over_mean(0.4, 100)), rel=1e-6)
