@@ -27,14 +27,8 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
 
 
 def test_a_score_is_of_rows_that_were_read_alone() -> None:
-    rows = pd.DataFrame(
-        {
-            "set": "a",
-            "model": "m",
-            "ratio": [0.5, 2.0, 4.0, 100.0, np.nan],
-            "sure": ["read", "read", "read", "memory", "read"],
-        }
-    )
+    ratio, sure = [0.5, 2.0, 4.0, 100.0, np.nan], ["read", "read", "read", "memory", "read"]
+    rows = pd.DataFrame({"set": "a", "model": "m", "ratio": ratio, "sure": sure})
     (score,) = validate.scores(rows).to_dict("records")
     assert (score["rows"], score["answered"]) == (4, 3)
     assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
@@ -55,15 +49,7 @@ def test_the_measured_rows_are_whole() -> None:
 
 
 def test_the_paper_has_no_answer_in_the_transition() -> None:
-    beds = pd.DataFrame(
-        {
-            "d_m": [1e-5, 1e-3, 1e-2],
-            "rho_sol_kg_m3": 2650.0,
-            "rho_f_kg_m3": 1000.0,
-            "nu_m2_s": 1e-6,
-            "slope": 0.0,
-            "cohesion_n_m": 0.0,
-        }
-    )
+    water = {"rho_sol_kg_m3": 2650.0, "rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6}
+    beds = pd.DataFrame({"d_m": [1e-5, 1e-3, 1e-2], **water, "slope": 0.0, "cohesion_n_m": 0.0})
     shields = validate.by_paper(beds)
     assert np.isnan(shields).tolist() == [False, True, False]

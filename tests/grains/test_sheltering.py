@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.bed.packing import Packing, Places
+from orchestrator.experiments import validate
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.peeling import ForceTable, Loading
@@ -19,7 +20,6 @@ from orchestrator.types import FloatArray
 
 D, Z0, RHO, NU = 0.01, 0.01 / 30, 1000.0, 1e-6
 LAW = LAWS["bridged-gravel"]
-WEIGHT = math.pi / 6 * D**3 * 1650 * 9.81
 
 
 def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
@@ -28,42 +28,6 @@ def _drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
 
 def _shelter(packing: Packing, gaps: FloatArray) -> sheltering.Shelter:
     return sheltering.balanced(_drag, packing, gaps, D, length=1.0, unit=NU * 1000 / D, density=RHO)
-
-
-def _layer(rows: int, columns: int, *, stands: float) -> tuple[Packing, FloatArray]:
-    """A close-packed layer with one more sphere, so much higher than its own; the gaps, m."""
-    x, y = np.meshgrid(np.arange(columns) + 0.0, np.arange(rows) * math.sqrt(3) / 2)
-    x = x + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)
-    top = np.array([columns // 2 + 0.5, math.sqrt(3) / 6])
-    flat = np.vstack([top, np.column_stack([x.ravel(), y.ravel()])])
-    height = np.r_[stands, np.zeros(rows * columns)]
-    every = np.ones(len(flat), bool)
-    packing = Packing(
-        centres=np.column_stack([flat[:, 0], height]),
-        sizes=np.ones(len(flat)),
-        mobile=every,
-        windward=every,
-        lee=~every,
-        arc_length=flat[:, 0],
-        across=flat[:, 1],
-        width=rows * math.sqrt(3) / 2,
-    )
-    return packing, Z0 + height * D
-
-
-def _shields(packing: Packing, gaps: FloatArray, pivot_deg: float, gust: float) -> float:
-    """Threshold of the first sphere over a pivot angle, under the balance and a gust."""
-    shelter = _shelter(packing, gaps)
-    level = shelter.levels[shelter.patch[0]]
-
-    def force(ustar: FloatArray, kind: str) -> FloatArray:
-        at = Exposure(D, Z0, RHO, NU, gap=gaps[0] - level(ustar))
-        return LAW.drag(ustar, at) if kind == "drag" else LAW.lift(ustar, at)
-
-    table = ForceTable(partial(force, kind="drag"), partial(force, kind="lift"), WEIGHT, 0.1)
-    phi = math.radians(pivot_deg)
-    ustar = table.reaching(math.cos(phi), math.sin(phi), math.sin(phi))
-    return RHO * ustar**2 / (1650 * 9.81 * D) / gust
 
 
 @pytest.mark.parametrize("reynolds", [0.1, 30.0, 3000.0])
@@ -100,11 +64,10 @@ def test_a_grain_alone_on_a_plane_keeps_its_drag() -> None:
 
 def test_a_sphere_that_stands_clear_and_one_level_with_its_neighbours() -> None:
     """Fenton and Abbott 1977: theta 0.010 on a close-packed layer; 0.1 to 0.3 level with it."""
-    gust = peak_over_mean(0.4, 100)
-    clear = _shields(*_layer(8, 20, stands=math.sqrt(2 / 3)), pivot_deg=19.47, gust=gust)
-    level = _shields(*_layer(8, 20, stands=0.0), pivot_deg=30.0, gust=gust)
+    *_, model = validate.MODELS
+    clear = validate.sphere(model.fields, 3000.0, clear=True) / model.gust
     assert clear == pytest.approx(0.010, rel=0.3)
-    assert 0.1 < level < 0.3
+    assert 0.1 < validate.sphere(model.fields, 3000.0, clear=False) / model.gust < 0.3
 
 
 @pytest.mark.parametrize(
@@ -179,12 +142,8 @@ def test_each_grain_of_a_lattice_bears_the_stress_of_its_own_bed() -> None:
     # by peeling a grain waits for those before it, and needs no more flow once they have gone; the
     # grain of the crest and that of the foot have another share of the bed
     assert answers["peeling"].max() == pytest.approx(exact, rel=0.05)
-    (gusty,) = parse(
-        text.format("pivot").replace(
-            'model = "flat"', 'model = "flat"\ngusts = { intensity = 0.4, events = 100 }'
-        ),
-        name="a",
-        where="a",
-    ).scenes
+    gusts = 'model = "flat"\ngusts = { intensity = 0.4, events = 100 }'
+    text = text.format("pivot").replace('model = "flat"', gusts)
+    (gusty,) = parse(text, name="a", where="a").scenes
     ratio = Geometry(gusty).loads(Path()).alone() / answers["pivot"]
     assert ratio == pytest.approx(1 / math.sqrt(peak_over_mean(0.4, 100)), rel=1e-6)

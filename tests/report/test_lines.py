@@ -1,7 +1,5 @@
 """Lines beside thresholds: published curves, the closed form, and how it meets measurements."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,7 +8,7 @@ from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
-from orchestrator.report import shields, style, theory
+from orchestrator.report import theory
 from orchestrator.report.results import Results
 from orchestrator.report.theory import Bed, Line
 
@@ -20,27 +18,6 @@ MIDDLES = np.array([one.middle for one in BUFFINGTON_MONTGOMERY])
 
 def bridged(first: float = 0.01, last: float = 1e3) -> Line:
     return Line("bridged", BED, first, last)
-
-
-@pytest.fixture(scope="module")
-def flat(results: Results) -> pd.DataFrame:
-    """Grains of one flat bed by four laws."""
-    one = results.beds("grain").query("alpha_deg == 0 and force_law == 'low'")
-    names = ("low", "bridged", "profile", "zeng-torque")
-    every = [
-        one.assign(force_law=name, scene_id=one["scene_id"] + name, law_holds=True)
-        for name in names
-    ]
-    return pd.concat(every, ignore_index=True)
-
-
-@pytest.fixture(scope="module")
-def several(results: Results, flat: pd.DataFrame) -> Results:
-    """A study of those."""
-    piles = results.beds("pile")
-    scenes = pd.concat([flat, piles], ignore_index=True)
-    kept = {name: results.tables[name] for name in ("pile_threshold", "wall_stress")}
-    return replace(results, tables={**kept, "scenes": scenes})
 
 
 def test_factors_are_those_of_the_law_from_the_medians() -> None:
@@ -78,34 +55,6 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     nowhere = bridged(400.0, 500.0)
     assert theory.ranges(nowhere.met) == []
     assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
-
-
-def test_many_laws_have_colours_of_their_own(several: Results) -> None:
-    (figure,) = shields.draw(several)
-    assert figure.canvas is not None
-    (ax,) = figure.canvas.axes
-    lines = [line for line in ax.lines if line.get_gid() == shields.RESULT[0]]
-    colours = {line.get_color() for line in lines}
-    met = {fit.law for fit in theory.best(theory.ranked(several)) if fit.decades > 0}
-    assert colours == {theory.look(name)[0] for name in met}
-    (medians,) = [line for line in ax.lines if str(line.get_label()).startswith("measured")]
-    assert np.asarray(medians.get_ydata()).tolist() == theory.MEDIANS.tolist()
-    figures = {figure.name: figure for figure in shields.singles(several)}
-    assert list(figures) == ["shields-d30", "shields-d10"]
-    for figure in figures.values():
-        assert figure.canvas is not None
-        assert len(figure.canvas.axes) == 2 <= style.PANELS
-
-
-def test_band_holds_every_curve_within_its_range() -> None:
-    for curve in curves.WATER:
-        reynolds, theta = curve.points(2000)
-        low, high = theory.water_band(reynolds)
-        common = np.isfinite(low)
-        assert common.sum() > 1500
-        inside = (theta > 0.998 * low) & (theta < 1.002 * high)
-        # curves made of pieces jump where these meet
-        assert inside[common].mean() > 0.995
 
 
 def test_band_is_the_envelope_of_the_curves_that_cover_a_place() -> None:
@@ -152,11 +101,3 @@ def test_grains_of_every_law_lie_on_its_line(law: str, bed: pd.DataFrame) -> Non
         assert line.tau(exact.reynolds) == pytest.approx(exact.shields, rel=1e-6)
         assert line.holds(exact.reynolds) == exact.valid
         assert line.first <= exact.reynolds <= line.last
-
-
-def test_the_fluid_does_not_move_a_line(bed: pd.DataFrame) -> None:
-    reynolds = np.geomspace(0.1, 100, 50)
-    air = theory.lines(bed)[0]
-    water = theory.lines(bed.assign(rho_f_kg_m3=1000.0, nu_m2_s=1e-6))[0]
-    assert (air.first, air.last) != (water.first, water.last)
-    assert air.tau(reynolds) == pytest.approx(water.tau(reynolds))

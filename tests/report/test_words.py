@@ -120,15 +120,6 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
 
 
-def test_of_many_piles_one_fraction_is_drawn(results: Results) -> None:
-    many = copies(results, *[{}] * (shields.FEW + 1))
-    shown = shields.shown_piles(many)
-    assert set(shown["fraction"]) == {0.3}
-    assert len(shown) == shields.FEW + 1
-    heap = only(results, "pile")
-    assert len(shields.shown_piles(heap)) == len(heap.tables["pile_threshold"])
-
-
 def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
     (figure,) = shields.draw(results)
     assert figure.canvas is not None
