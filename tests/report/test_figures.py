@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from orchestrator.report import bed, flows, piles, shields, style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
-from tests.report.conftest import axes_of, changed, copies, legend_of, only
+from tests.report.conftest import axes_of, changed, copies, only
 
 LINE, SOLID, HOLLOW = shields.RESULT
 Points = set[tuple[float, float]]
@@ -174,16 +174,6 @@ def test_figures_have_at_most_six_panels_and_numbers_under_each_column(results: 
     assert sum(len(axes_of(figure)) for figure in figures[2:]) == 7
 
 
-def test_curves_and_points_of_two_layers_are_told_apart(results: Results) -> None:
-    two = copies(results, {}, {"mobile_layers": 2, "answered_mobile_layers": 2})
-    for figure in pile_figures(two):
-        (ax,) = axes_of(figure)
-        lines = marked(ax, *two.scenes["scene_id"], SOLID, HOLLOW)
-        assert {line.get_marker() for line in lines} == {"o", "s"}
-        for layers in ("mobile layers = 1", "mobile layers = 2"):
-            assert any(text.endswith(layers) for text in legend_of(figure))
-
-
 @pytest.mark.parametrize("value", [0.0, -0.01, np.nan, np.inf])
 @pytest.mark.parametrize("rows", [1, 4])
 def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
@@ -194,18 +184,3 @@ def test_a_threshold_without_a_place_on_a_logarithmic_axis_costs_no_figure(
     curve.loc[curve.index[: 3 if rows == 1 else None], ["shields", "reynolds"]] = value
     heap = only(changed(results, pile_threshold=own, pile_curve=curve), "pile")
     assert len(drawn([*shields.draw(heap), *pile_figures(heap)])) == (3 if rows == 1 else 1)
-
-
-def test_flows_by_two_models_have_a_panel_each(results: Results) -> None:
-    two = copies(results, {}, {"turbulence_model": "RNGkEpsilon"})
-    pile = two.plan.piles["copy 0"]
-    flow = pile.scene.flow.model_copy(update={"turbulence_model": "RNGkEpsilon"})
-    other = replace(pile, scene=pile.scene.model_copy(update={"flow": flow}))
-    stress = two.tables["wall_stress"]
-    theirs = stress.assign(flow_case=other.flow.name)
-    plan = replace(two.plan, piles={"copy 0": pile, "copy 1": other})
-    both = changed(two, wall_stress=pd.concat([stress, theirs], ignore_index=True))
-    (figure,) = flows.stress(replace(both, plan=plan))
-    titles = [ax.get_title(loc="left") for ax in axes_of(figure)]
-    assert [title.rpartition(", ")[2] for title in titles if title] == ["RNG k-ε", "k-ε"]
-    assert len(figure.cases) == 2

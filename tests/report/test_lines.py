@@ -57,17 +57,6 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
 
 
-def test_band_is_the_envelope_of_the_curves_that_cover_a_place() -> None:
-    place = np.array([0.02, 0.1, 5.0, 50.0])
-    found = []
-    for curve in curves.WATER:
-        reynolds, theta = curve.points(4000)
-        found.append(np.interp(place, reynolds, theta, left=np.nan, right=np.nan))
-    low, high = theory.water_band(place)
-    assert low == pytest.approx(np.nanmin(found, axis=0), rel=2e-3)
-    assert high == pytest.approx(np.nanmax(found, axis=0), rel=2e-3)
-
-
 def test_air_needs_a_gas(results: Results) -> None:
     grains = results.beds("grain")
     assert set(theory.air_lines(grains)) == set(curves.AIR)

@@ -189,18 +189,6 @@ def test_the_map_shows_every_grain_at_its_place(train: Results) -> None:
     np.testing.assert_allclose(shown[:, 1], goes["ustar0_m_s"])
 
 
-def test_the_picture_of_a_long_train_shows_single_grains(train: Results) -> None:
-    (pile,) = train.plan.piles.values()
-    assert "Shown" not in bed.words(train, pile)
-    five = pile.scene.model_copy(update={"bed": pile.bed.model_copy(update={"forms": 20})})
-    long = replace(pile, scene=five)
-    assert float(long.line.toe[0]) > bed.WHOLE * bed.LONG
-    (left, right, *_), _ = bed.window(long)
-    assert right - left == pytest.approx(bed.LONG)
-    assert left < float(long.line.crest[0]) < right
-    assert "of the first form" in bed.words(train, long)
-
-
 def test_a_steep_hill_separates_where_it_was_measured_to(hills: Results) -> None:
     """On a coarse mesh too, the flow leaves behind the top and is back within 4 to 9 heights."""
     table = hills.tables["flow"]
