@@ -289,7 +289,8 @@ def scores(rows: pd.DataFrame) -> pd.DataFrame:
     A factor is the ratio or its inverse, whichever is above 1. Rows from memory count in no score.
     """
     read = rows[rows["sure"] == "read"]
-    factor = np.exp(np.abs(np.log(read["ratio"])))
+    # a value of the wrong sign has no factor
+    factor = np.exp(np.abs(np.log(read["ratio"].where(read["ratio"] > 0))))
     groups = read.assign(factor=factor).groupby(["set", "model"], sort=False)
     ratio = groups["ratio"]
     return pd.DataFrame(
