@@ -8,15 +8,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = {
     ("benchmark",): 1500,
-    ("report",): 2400,
+    ("report",): 2450,
     ("runs",): 1400,
-    ("study",): 1500,
-    ("experiments", "fidelity"): 1900,
-    ("grains", "bed", "flow", "physics"): 5800,
+    ("study",): 1600,
+    ("experiments", "fidelity"): 2300,
+    ("grains", "bed", "flow", "physics"): 6100,
     ("paper",): 700,
     ("tables", "calculator", "solvers"): 1300,
-    ("root modules",): 700,
-    ("the package",): 17200,
+    ("root modules",): 800,
+    ("the package",): 18000,
     ("tests",): 9500,
     ("docs, words",): 30000,
 }
