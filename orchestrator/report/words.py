@@ -161,7 +161,8 @@ def _single(results: Results) -> pd.DataFrame:
     exact = rows["shields_closed_form"]
     values = {f"shields{end}": rows[f"shields_dem{end}"].where(dem, exact) for end in ends}
     ustar = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
-    return rows.assign(ustar0_m_s=ustar, by=np.where(dem, "DEM", "closed form"), **values)
+    values |= {"ustar0_m_s": ustar, "by": dem.map({True: "DEM", False: "closed form"})}
+    return pd.concat([rows, pd.DataFrame(values)], axis=1)
 
 
 def _thresholds(

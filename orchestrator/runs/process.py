@@ -97,6 +97,8 @@ def run(
                 _, status, usage = os.wait4(process.pid, 0)
                 process.returncode = os.waitstatus_to_exitcode(status)
                 cpu_s = usage.ru_utime + usage.ru_stime
+                # one that prints fast may end by the limit of a file's size before it is asked
+                over = "output" if os.fstat(stream.fileno()).st_size > output_limit else ""
         ended = Ended(process.returncode, time.monotonic() - began, cpu_s, over)
         # a shell reports 128 + n of a program that signal n ended
         code = -ended.returncode if ended.returncode < 0 else ended.returncode - 128
