@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.measured import BUFFINGTON_MONTGOMERY
 from orchestrator.physics.threshold import shields_at
@@ -55,12 +54,6 @@ def test_only_where_the_study_has_grains_is_a_law_judged() -> None:
     nowhere = bridged(400.0, 500.0)
     assert theory.ranges(nowhere.met) == []
     assert theory.sheet([nowhere]).iloc[0].tolist()[3:] == ["nowhere", "0.0", "—", "—"]
-
-
-def test_air_needs_a_gas(results: Results) -> None:
-    grains = results.beds("grain")
-    assert set(theory.air_lines(grains)) == set(curves.AIR)
-    assert theory.air_lines(grains.assign(rho_f_kg_m3=1000.0)) == {}
 
 
 @pytest.fixture
