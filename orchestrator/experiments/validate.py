@@ -6,7 +6,7 @@ answered on strips poured from a mixture of sand. They depend on the Galileo num
 answer hundreds of rows. Each set has the ratio of the model's value to the measured one.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -29,7 +29,7 @@ from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
 from orchestrator.physics.measured import kirchner_pivot
-from orchestrator.physics.threshold import LAWS_OF, PAPER
+from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
 from orchestrator.physics.threshold import threshold as threshold_of
 from orchestrator.report import style
 from orchestrator.report.page import Section
@@ -99,8 +99,8 @@ class Strips:
 
     def grains(
         self, fields: Fields, galileo: float, slope: float = 0.0, bond: float = 0.0
-    ) -> list[FloatArray]:
-        """Shields number at which each counted grain of each strip moves by its pivot.
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Of each strip, Shields number at which each counted grain moves by its pivot, and size.
 
         The bed falls with the flow by a slope (a tangent): the strip and its forces are turned.
         """
@@ -116,7 +116,7 @@ class Strips:
             ustar = peeling.pivots(places, packed.sizes, turned, bed.force_tables, scene.bond)
             excess = (scene.grain.density - scene.fluid.density) * scene.fluid.gravity
             unit = excess * scene.grain.diameter / scene.fluid.density
-            answers.append(ustar[packed.windward] ** 2 / unit)
+            answers.append((ustar[packed.windward] ** 2 / unit, packed.sizes[packed.windward]))
         return answers
 
     def shields(self, fields: Fields, galileo: float, slope: float = 0, bond: float = 0) -> float:
@@ -124,7 +124,8 @@ class Strips:
 
         Grains that the bed's slope alone sets in motion have gone before the flow begins.
         """
-        strips = [np.sort(each[each > 0]) for each in self.grains(fields, galileo, slope, bond)]
+        every = (theta for theta, _ in self.grains(fields, galileo, slope, bond))
+        strips = [np.sort(theta[theta > 0]) for theta in every]
         least = [each[max(int(np.ceil(MOVED * len(each))) - 1, 0)] for each in strips]
         return float(np.exp(np.mean(np.log(least))))
 
@@ -134,11 +135,11 @@ class Strips:
         steep = np.array([self.shields(fields, ROUGH, float(slope)) for slope in SLOPES])
         factor = steep / steep[0]
 
-        def threshold(galileo: FloatArray, slope: FloatArray) -> FloatArray:
+        def shields(galileo: FloatArray, slope: FloatArray) -> FloatArray:
             flat = np.exp(np.interp(np.log(galileo), np.log(GALILEO), values))
             return np.asarray(flat * np.interp(slope, SLOPES, factor))
 
-        return threshold
+        return shields
 
     def pivots_deg(self) -> FloatArray:
         """Percentiles of the pivots of grains of d that are laid on the strips, degrees."""
@@ -148,10 +149,8 @@ class Strips:
 
     def hiding(self, fields: Fields) -> float:
         """Exponent g of theta_i ~ (D_i/D_50)^-g over the classes of the mixture."""
-        sizes = np.concatenate(
-            [bed.packing.sizes[bed.packing.windward] for bed in self.geometries(fields, ROUGH)]
-        )
-        own = np.concatenate(self.grains(fields, ROUGH)) / sizes
+        every, sizes = map(np.concatenate, zip(*self.grains(fields, ROUGH), strict=True))
+        own = every / sizes
         held = own > 0
         classes = [(size, held & chosen) for _, size, chosen in threshold.classes(sizes)]
         kept = [(size, np.quantile(own[at], MOVED)) for size, at in classes if at.sum() >= 20]
@@ -203,7 +202,7 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
     ones = np.ones(len(flat))
     packing = Packing(centres, ones, every, every, ~every, flat[:, 0], flat[:, 1], width)
     law, fluid, gaps = LAWS["bridged-gravel"], (d / 30, 1.0, nu), d / 30 + height
-    weight, unit = np.pi / 6 * galileo**2, galileo * 0.2
+    submerged, unit = np.pi / 6 * galileo**2, galileo * 0.2
 
     def drag(ustar: FloatArray, sizes: FloatArray, over: FloatArray) -> FloatArray:
         return law.drag(ustar, Exposure(sizes, *fluid, gap=over))
@@ -218,7 +217,7 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
         return Exposure(d, *fluid, gap=raised - level(ustar))
 
     table = ForceTable(
-        lambda u: law.drag(u, around(u)), lambda u: law.lift(u, around(u)), weight, unit
+        lambda u: law.drag(u, around(u)), lambda u: law.lift(u, around(u)), submerged, unit
     )
     pivot = np.arctan(np.sqrt(1 / 8)) if clear else np.radians(30)
     ustar = table.reaching(np.cos(pivot), np.sin(pivot), np.sin(pivot))
@@ -228,7 +227,7 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
 def speed_of(density: float, tangent: float) -> float:
     """Speed of water (m/s) next to a sphere of 8 mm whose drag balances its pivot."""
     d, at = 8e-3, Exposure(8e-3, 1e-4, 1000.0, 1e-6)
-    goal = np.pi / 6 * d**3 * (density - 1000) * GRAVITY * tangent
+    goal = weight(diameter=d, density=density, fluid_density=1000.0) * tangent
     speeds = np.geomspace(0.01, 1.0, 2001)
     return float(np.interp(goal, CLIFT_GAUVIN.force(speeds, at), speeds))
 
@@ -251,15 +250,22 @@ def compared(strips: Strips, reattachment: float) -> pd.DataFrame:
     beds = pd.read_csv(FOLDER / "beds.csv").rename(columns={"shields": "measured"})
     excess = beds["rho_sol_kg_m3"] / beds["rho_f_kg_m3"] - 1
     galileo = np.sqrt(excess * GRAVITY * beds["d_m"] ** 3) / beds["nu_m2_s"]
-    weight = np.pi / 6 * beds["d_m"] ** 3 * excess * beds["rho_f_kg_m3"] * GRAVITY
-    bond = beds["cohesion_n_m"] * beds["d_m"] / weight
+    density = {"density": beds["rho_sol_kg_m3"], "fluid_density": beds["rho_f_kg_m3"]}
+    bond = beds["cohesion_n_m"] * beds["d_m"] / weight(diameter=beds["d_m"], **density)
     beds = beds.assign(galileo=galileo, sure="read")
     single = pd.read_csv(FOLDER / "single.csv")
     pivots = pd.DataFrame({"measured": kirchner_pivot(PERCENTILES), "value": strips.pivots_deg()})
     pivots = pivots.assign(set="pivots of laid grains", source="Kirchner et al. 1990", sure="read")
+    by_all = {
+        "saddle": speed_of(2500.0, 0.354),
+        "top": speed_of(1430.0, 0.707),
+        "drag": float(24 / FREE * CLIFT_GAUVIN.factor(np.array(FREE))),
+        "reattachment": reattachment,
+    }
     rows = []
     for name, fields, gust in MODELS:
-        if gust == 1:  # under a gust the same bed goes at a part of its mean stress
+        if gust == 1:  # the model with gusts follows on the same one without: a part of its stress
+            clear, level = (sphere(fields, ROUGH, clear=clear) for clear in (True, False))
             if name == PAPER:
                 steady, hiding = by_paper(beds), np.nan
             else:
@@ -267,15 +273,7 @@ def compared(strips: Strips, reattachment: float) -> pd.DataFrame:
                 for place in np.flatnonzero(bond):
                     steady[place] = strips.shields(fields, galileo[place], bond=bond[place])
                 hiding = strips.hiding(fields)
-        known = {
-            "clear": sphere(fields, ROUGH, clear=True) / gust,
-            "level": sphere(fields, ROUGH, clear=False) / gust,
-            "saddle": speed_of(2500.0, 0.354),
-            "top": speed_of(1430.0, 0.707),
-            "drag": float(24 / FREE * CLIFT_GAUVIN.factor(np.array(FREE))),
-            "hiding": hiding,
-            "reattachment": reattachment,
-        }
+        known = {**by_all, "clear": clear / gust, "level": level / gust, "hiding": hiding}
         alone = single.assign(value=single["what"].map(known))
         parts = [beds.assign(value=steady / gust), alone, pivots]
         rows += [part.assign(model=name) for part in parts]
@@ -355,7 +353,7 @@ def factors(scored: pd.DataFrame) -> Canvas:
     ax = canvas.subplots()
     for number, (model, colour) in enumerate(zip(MODELS, COLOURS, strict=True)):
         part = scored[scored["model"] == model.name]
-        y = [sets.index(name) + 0.18 * (number - 1.5) for name in part["set"]]
+        y = [sets.index(name) + 0.18 * (number - (len(MODELS) - 1) / 2) for name in part["set"]]
         ax.hlines(y, part["ratio_10"], part["ratio_90"], color=colour, lw=2.5, alpha=0.5)
         ax.plot(part["ratio"], y, "o", color=colour, label=model.name)
     ax.axvline(1.0, color="0.2", lw=0.8)
@@ -375,8 +373,7 @@ def diagram(rows: pd.DataFrame) -> Canvas:
     canvas = style.canvas(3.6)
     ax = canvas.subplots()
     level = rows[rows["galileo"].notna() & (rows["slope"] < LEVEL) & (rows["cohesion_n_m"] == 0)]
-    marks: Mapping[str, str] = dict(zip(dict.fromkeys(level["set"]), "osv^D", strict=False))
-    for name, mark in marks.items():
+    for name, mark in zip(dict.fromkeys(level["set"]), "osv^D", strict=False):
         part = level[(level["set"] == name) & (level["model"] == MODELS[0].name)]
         ax.plot(part["galileo"], part["measured"], mark, ms=3, color="0.6", label=name)
     for model, colour in zip(MODELS, COLOURS, strict=True):

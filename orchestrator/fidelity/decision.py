@@ -28,7 +28,6 @@ LEAST_HELD = 6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp 
 ROUNDS = 4
 ASKED = "as the study asks"
 ANSWERS = [q.name.split(".") for q in FIELDS if q.info.about == "answer"]
-UNBOUND = 10.0  # a level that was off by so many times a threshold says nothing of it
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Decision:
     @property
     def error_estimate(self) -> float | None:
         """The known error with its uncertainty; None where it is not known."""
-        return self.known.total if self.known.total < UNBOUND else None
+        return None if math.isinf(self.known.total) else self.known.total
 
     @property
     def is_unchecked(self) -> bool:

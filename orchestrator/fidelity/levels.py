@@ -207,6 +207,7 @@ class Known(NamedTuple):
 
 
 UNKNOWN = Known(math.inf, 0.0, math.inf, 0.0)
+UNBOUND = 10.0  # a level that was off by so many times a threshold says nothing of it
 
 
 class Spread(NamedTuple):
@@ -301,7 +302,7 @@ def known(pair: Pair, scene: Scene) -> Known:
 def known_of_classes(
     flow: Level, grains: Level, flow_classes: tuple[str, ...], grain_classes: tuple[str, ...]
 ) -> Known:
-    """Known error of two levels on scenes of some classes."""
+    """Known error of two levels on scenes of some classes; unknown where it has no bound."""
     exact = flow is FLAT and flow_classes == (LEVEL_BED,)
     keys = [] if exact else [[("flow", flow.name, name) for name in flow_classes]]
     keys.append([("grains", grains.name, name) for name in grain_classes])
@@ -313,7 +314,8 @@ def known_of_classes(
     error, uncertainty = (np.sqrt(sum(part[row] ** 2 for part in parts)) for row in (0, 1))
     worst = int(np.argmax(np.hypot(error, uncertainty)))
     costs = [0.0] * exact + [float(part[2, 0]) for part in parts]
-    return Known(float(error[worst]), float(uncertainty[worst]), *costs)
+    known = Known(float(error[worst]), float(uncertainty[worst]), *costs)
+    return known if known.total < UNBOUND else UNKNOWN
 
 
 @cache

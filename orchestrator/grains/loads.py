@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +41,7 @@ def forces(
     scene: Scene,
     sizes: ArrayLike = 1.0,
     gaps: ArrayLike | None = None,
-    level: Force | None = None,
+    level: Force = np.zeros_like,
 ) -> tuple[Force, Force]:
     """Drag and lift on exposed grains of a resolved scene.
 
@@ -52,9 +52,6 @@ def forces(
     law, grain = LAWS[scene.forces.law], single_grain(scene)
     given = (grain.diameter * np.asarray(sizes, float), *grain[1:5])
     heights = np.asarray(grain.roughness if gaps is None else gaps, float)
-    if level is None:
-        exposure = Exposure(*given, heights)
-        return partial(law.drag, at=exposure), partial(law.lift, at=exposure)
 
     def drag(ustar: ArrayLike) -> FloatArray:
         return law.drag(ustar, Exposure(*given, heights - level(ustar)))
@@ -207,9 +204,10 @@ class Geometry:
         pushed = self.packing.pushed
         sizes = np.where(pushed, self.packing.sizes, 1.0).tolist()
         gaps = np.where(pushed, self.gaps, self.gaps[0]).tolist()
-        shelter, levels = self.shelter, [None] * len(sizes)
+        shelter, levels = self.shelter, [np.zeros_like] * len(sizes)
         if shelter is not None:
-            levels = [shelter.levels[i] if i >= 0 else None for i in shelter.patch.tolist()]
+            of_patch = [*shelter.levels, np.zeros_like]  # -1 is the last
+            levels = [of_patch[number] for number in shelter.patch.tolist()]
         kinds = list(zip(sizes, gaps, levels, strict=True))
         places = PLACES if len(set(kinds)) <= KINDS else FEWER
         tables = {
@@ -268,7 +266,7 @@ class Loads:
     def loading(self) -> Loading:
         """The forces on the grains: exposed ones that may move carry one."""
         bed, packed = self.geometry, self.geometry.packing
-        level = bed.shelter.of_grains if bed.shelter else None
+        level = bed.shelter.of_grains if bed.shelter else np.zeros_like
         drag, lift = forces(bed.scene, packed.sizes, bed.gaps, level)
         normals = np.column_stack([-bed.tangents[:, 1], bed.tangents[:, 0]])
         # a gust acts everywhere alike

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.optimize.elementwise import find_root
 
 from orchestrator.bed.packing import Packing
+from orchestrator.physics.threshold import root
 from orchestrator.types import FloatArray, IntArray
 
 GRAINS = 10
@@ -156,6 +156,6 @@ def _level(
     # an infinite area belongs to a grain alone
     crowded = np.flatnonzero(excess(low, ustar) > 0)
     if len(crowded):
-        bracket = low[crowded], high[crowded]
-        level[crowded] = find_root(excess, bracket, args=(ustar[crowded],)).x
+        speeds = ustar[crowded]
+        level[crowded] = root(lambda at: excess(at, speeds), low[crowded], high[crowded])
     return level

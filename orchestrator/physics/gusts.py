@@ -1,8 +1,7 @@
 """Gusts: by how much the largest of many turbulent stresses exceeds the mean."""
 
 from math import exp, log1p, sqrt
-
-from scipy.special import ndtri
+from statistics import NormalDist
 
 
 def peak_over_mean(intensity: float, events: float) -> float:
@@ -24,4 +23,4 @@ def peak_over_mean(intensity: float, events: float) -> float:
     if events <= 1:
         return 1.0
     variance = log1p(intensity**2)
-    return exp(sqrt(variance) * float(ndtri(1 - 1 / events)) - variance / 2)
+    return exp(sqrt(variance) * NormalDist().inv_cdf(1 - 1 / events) - variance / 2)

@@ -118,15 +118,15 @@ def friction_velocity_at(
     solved = np.flatnonzero(np.isfinite(high))
     if len(solved):
         grains = [arg[solved] for arg in args]
-        found[solved] = _root(lambda ustar: excess(ustar, *grains), low[solved], high[solved])
+        found[solved] = root(lambda ustar: excess(ustar, *grains), low[solved], high[solved])
     with np.errstate(divide="ignore"):
         return np.asarray((found / ratio).reshape(shape))
 
 
-def _root(function: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatArray) -> FloatArray:
+def root(function: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatArray) -> FloatArray:
     """The roots between bounds of different signs (Chandrupatla, Adv. Eng. Softw. 28, 1997).
 
-    The least time of a start: scipy's `find_root` does the same after an import of 0.4 s.
+    scipy's `find_root` does the same, after an import of 0.4 s.
     """
     fa, fb, t = function(a), function(b), np.full_like(a, 0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -137,8 +137,8 @@ def _root(function: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatA
             c, fc = np.where(same, a, b), np.where(same, fa, fb)
             b, fb = np.where(same, b, a), np.where(same, fb, fa)
             a, fa = x, fx
-            root = np.where(np.abs(fa) < np.abs(fb), a, b)
-            least = 2 * np.finfo(float).eps * np.abs(root) / np.abs(b - a)
+            best = np.where(np.abs(fa) < np.abs(fb), a, b)
+            least = 2 * np.finfo(float).eps * np.abs(best) / np.abs(b - a)
             if np.all((least > 0.5) | (fa == 0) | (fb == 0)):
                 break
             xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
@@ -146,7 +146,7 @@ def _root(function: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatA
             inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
             is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
             t = np.clip(np.where(is_safe, inverse, 0.5), least, 1 - least)
-    return root
+    return best
 
 
 def threshold(

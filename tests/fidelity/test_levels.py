@@ -122,7 +122,7 @@ def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: Mak
     softer = changed(scene, {"grain.stiffness": 100.0})
     assert levels.known(pair_of(softer), softer) == UNKNOWN
     pivot = changed(scene, {"protocol.method": "pivot"})
-    assert levels.known(pair_of(pivot), pivot).total > 10
+    assert math.isinf(levels.known(pair_of(pivot), pivot).total)
 
 
 def test_methods_without_dynamics_are_known_to_fail_where_a_row_has_no_edge(
