@@ -20,7 +20,6 @@ class Parameter(NamedTuple):
 
 
 MOST_POINTS = 100_000
-GAS_BELOW = 100.0  # density that tells gases from liquids, kg/m3: Venus has 65 at its ground
 _Z0 = Parameter("bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"')
 _NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), 1e-5, "water: 1e-6")
 _RHO = Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), 1.0, "water: 1000")
@@ -49,6 +48,7 @@ QUANTITIES = {
     "ustar_m_s": ("friction_velocity", "u*, m/s"),
     "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),
     "wind_10m_m_s": ("wind_speed_10_m", "wind at 10 m, m/s"),
+    "current_1m_m_s": ("current_1_m", "current at 1 m, m/s"),
     "mean_velocity_m_s": ("mean_velocity", "mean velocity, m/s"),
     "stress_pa": ("stress", "stress, Pa"),
     "shields": ("shields", "Shields"),

@@ -10,8 +10,9 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import GAS_BELOW, GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
+from orchestrator.calculator import GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
+from orchestrator.physics.constants import GAS_BELOW
 
 if TYPE_CHECKING:
     from orchestrator.types import Row  # its module loads numpy

@@ -8,17 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.calculator import GAS_BELOW, PARAMETERS, QUANTITIES
+from orchestrator.calculator import PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, why_not
-from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, smooth_wall_roughness
-from orchestrator.types import FloatArray, Row
+from orchestrator.physics.velocity import measurable_speeds
+from orchestrator.types import Row
 
 Table = dict[str, NDArray[Any]]
 """Columns of equal length by name."""
-LAMINAR_BELOW = 2000.0
-"""U D/nu below which open water may be laminar, and has no logarithmic profile."""
 
 
 def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
@@ -50,6 +49,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
     )
     rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
     beta, blocks = grains["entrainment_angle_deg"], []
+    flow = (grains["roughness"], grains["viscosity"], rho, np.where(rho < GAS_BELOW, np.nan, depth))
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
         by_law = {
             name: threshold(
@@ -60,10 +60,13 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
         picked = [LAWS_OF[each] if answer == PAPER else (answer,) for each in regimes]
         for name, at in by_law.items():
-            numbers = vars(at) | _results(at.friction_velocity, grains)
+            numbers: Table = {
+                column: getattr(at, key, rho) for column, (key, _) in QUANTITIES.items()
+            }
+            numbers |= measurable_speeds(at.friction_velocity, *flow)
+            numbers |= {"stress_pa": rho * at.friction_velocity**2}
             reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)
-            block: Table = {"law": np.full(count, name, object)}
-            block |= {column: numbers[key] for column, (key, _) in QUANTITIES.items()}
+            block: Table = {"law": np.full(count, name, object), **numbers}
             block |= {"valid": at.valid, "why_not": np.array(reasons, object), "regime": regimes}
             blocks.append({**block, "answer": np.array([name in laws for laws in picked])})
     table = {each.column: np.repeat(grains[name], len(LAWS)) for name, each in PARAMETERS.items()}
@@ -111,17 +114,3 @@ def _length(z0: Any, diameter: float) -> float:
         return float(z0)
     part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0)
     return float(f"{diameter / float(part[1]):.12g}") if part else np.nan  # digits as in a scene
-
-
-def _results(ustar: FloatArray, grains: Table) -> Table:
-    """What follows from u* (m/s), of shape (n,): speeds of the flow and the stress on the bed."""
-    rho, nu, depth = (grains[name] for name in ("fluid_density", "viscosity", "depth"))
-    z0 = np.maximum(grains["roughness"], smooth_wall_roughness(ustar, nu))
-    mean, is_gas = depth_mean_speed(ustar, depth, z0), rho < GAS_BELOW
-    turbulent = mean * depth / nu >= LAMINAR_BELOW
-    return {
-        "wind_speed_1_m": np.where(is_gas, log_law_speed(ustar, 1.0, z0), np.nan),
-        "wind_speed_10_m": np.where(is_gas, log_law_speed(ustar, 10.0, z0), np.nan),
-        "mean_velocity": np.where(~is_gas & turbulent, mean, np.nan),
-        "stress": rho * ustar**2,
-    }

@@ -15,11 +15,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from orchestrator.physics.constants import INVERSE_KARMAN, KARMAN
+from orchestrator.physics.constants import GAS_BELOW, INVERSE_KARMAN, KARMAN
 from orchestrator.types import FloatArray
 
 SMOOTH_WALL = 0.11
 """Roughness length of a smooth wall over nu/u* (Nikuradse 1932: u/u* = 2.5 ln(u* z/nu) + 5.5)."""
+LAMINAR_BELOW = 2000.0
+"""U D/nu below which open water may be laminar, and has no logarithmic profile."""
 HIDDEN = 1e-9  # least exposed part of a grain: none below the flow divides by zero
 DAMPING = 26.0  # van Driest's A+
 ROUGHEST = 2000.0  # ks ustar/nu up to which the correlation of the shift is in use
@@ -49,7 +51,7 @@ def log_law_speed(ustar: ArrayLike, height: ArrayLike, roughness: ArrayLike) -> 
 
 
 def depth_mean_speed(
-    ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike, *, closed: bool = False
+    ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike, *, closed: ArrayLike = False
 ) -> FloatArray:
     """Depth-averaged speed (m/s) of wide open water of a depth (m) with that profile up to its top.
 
@@ -57,9 +59,40 @@ def depth_mean_speed(
     u* = sqrt(g h S) belongs to it, S the slope of its surface. A closed channel has the profile of
     half its depth on each wall.
     """
-    part = np.asarray(roughness, float) / (np.asarray(depth, float) / (2 if closed else 1))
+    part = np.asarray(roughness, float) / (np.asarray(depth, float) / np.where(closed, 2, 1))
     mean = (1 + part) * np.log1p(1 / part) - 1
     return np.asarray(np.asarray(ustar, float) / KARMAN * mean)
+
+
+def measurable_speeds(
+    ustar: ArrayLike,
+    roughness: ArrayLike,
+    viscosity: ArrayLike,
+    density: ArrayLike,
+    depth: ArrayLike,
+    *,
+    closed: bool = False,
+) -> dict[str, FloatArray]:
+    """Speeds of an undisturbed flow that are measured, by the column of a table, m/s.
+
+    They are the wind of a gas 1 and 10 m above the bed, the current of a liquid at 1 m, and the
+    mean velocity of a flow of a `depth`, m, which is NaN where there is none. Not a number is what
+    the flow has not: a height above its top, the mean velocity of one that may be laminar.
+    """
+    rho, nu, deep = (np.asarray(each, float) for each in (density, viscosity, depth))
+    with np.errstate(divide="ignore", invalid="ignore"):  # without a flow, and without a depth
+        z0 = np.maximum(roughness, smooth_wall_roughness(ustar, nu))
+        at_1, at_10 = (
+            np.where(deep < height, np.nan, log_law_speed(ustar, height, z0)) for height in (1, 10)
+        )
+        mean = depth_mean_speed(ustar, deep, z0, closed=closed)
+        is_gas = rho < GAS_BELOW
+        return {
+            "wind_1m_m_s": np.where(is_gas, at_1, np.nan),
+            "wind_10m_m_s": np.where(is_gas, at_10, np.nan),
+            "current_1m_m_s": np.where(is_gas, np.nan, at_1),
+            "mean_velocity_m_s": np.where(mean * deep / nu >= LAMINAR_BELOW, mean, np.nan),
+        }
 
 
 def smooth_wall_roughness(ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:

@@ -13,6 +13,7 @@ from orchestrator import __version__
 from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
+from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
 from orchestrator.report import labels, theory
@@ -22,8 +23,6 @@ from orchestrator.runs import case
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form
 
-GAS_BELOW = 100.0
-"""Density that tells gases from liquids, kg/m3: a gas has a wind."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
 PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
@@ -106,8 +105,8 @@ def _grains(grains: pd.DataFrame) -> Iterator[str]:
 def _flow(row: pd.Series) -> str:
     """A friction velocity with a speed that is measured: of a channel's mean, or of the wind."""
     ustar = row["ustar0_m_s"]
-    if pd.notna(row.get("mean_speed_m_s")):
-        speed, depth = row["mean_speed_m_s"], row["depth_m"]
+    if pd.notna(row.get("mean_velocity_m_s")):
+        speed, depth = row["mean_velocity_m_s"], row["depth_m"]
         return f"u* {ustar:.2g} m/s, {speed:.2g} m/s in the mean over {depth:g} m of depth"
     if row["rho_f_kg_m3"] >= GAS_BELOW:
         return f"u* {ustar:.2g} m/s"

@@ -301,14 +301,14 @@ class Flow(Part):
     """peaks of the turbulent stress, { intensity = 0.4, events = 100 }: the largest of some
     independent, log-normal ones moves the grains, by default the mean stress; the number of events
     is the time for which the bed is watched over that of an event; by pivots and peeling alone"""
-    top: Literal["open water", "closed channel", "boundary layer"] = _pile(
+    top: Literal["open water", "closed channel", "boundary layer"] = field(
         "boundary layer", "", "", "flow_top", "top of the flow", since=True
     )
     """what the flow has above
     - open water: a level surface without stress
     - closed channel: a wall as rough as the bed
     - boundary layer: the log layer goes on above"""
-    depth: Length | None = _pile(None, "D", "m", "depth_m", since=True)
+    depth: Length | None = field(None, "D", "m", "depth_m", since=True)
     """depth of open water or of a closed channel over the flat bed"""
     lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
     """height of a boundary layer's lid above the flat bed, in undisturbed flow"""

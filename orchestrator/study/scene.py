@@ -95,11 +95,15 @@ class Scene(parts.Part):
         yield stiff, "grain.stiffness", "such springs throw poured grains apart", most
         few, least = 0 < update < LEAST_UPDATE, f"0, or at least {LEAST_UPDATE:g}"
         yield few, "protocol.update", "each update is a solve of the flow", least
+        top, depth = self.flow.top, self.flow.depth
+        what = f"{top} {'has none' if top == 'boundary layer' else 'needs one, in m'}"
+        yield (top == "boundary layer") == bool(depth), "flow.depth", what, "see flow.top"
         if isinstance(bed, PileBed):
             yield from self._rules_of_bed(bed)
             yield from self._rules_of_flow(bed)
         else:
             falls = self.pocket_cosine >= 1
+            yield 0 < (depth or 0) <= d, "flow.depth", "it does not cover the grain", "raise it"
             yield falls, "bed.relative_size", "it falls between its neighbours", "raise it"
             yield update, "protocol.update", "it is of piles", OUT
             yield is_balanced, "forces.sheltering", "a single grain has no neighbours", OUT
@@ -158,8 +162,6 @@ class Scene(parts.Part):
         flow, update, height = self.flow, self.protocol.update, bed.relief
         cell = self.first_cell_height
         solved, is_open = flow.model == "solve", flow.top != "boundary layer"
-        what = f"{flow.top} {'needs one, in m' if is_open else 'has none'}"
-        yield is_open != bool(flow.depth), "flow.depth", what, "see flow.top"
         depth = flow.depth or flow.lid * height
         shallow = depth < LEAST_DEPTH * max([height, *(each.height for each in bed.obstacles)])
         what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"

@@ -17,7 +17,7 @@ from orchestrator.grains.motion import MODES, Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.physics import measured
-from orchestrator.physics.velocity import depth_mean_speed, log_law_speed
+from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
@@ -87,10 +87,22 @@ def single_grain(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> I
             "ustar_m_s": ustar * value,
             "ustar_low_m_s": ustar * low,
             "ustar_high_m_s": ustar * high,
+            **_speeds(scene, ustar if np.isnan(value) else ustar * value),
             "drag_over_weight": float(exact.drag) / scene.weight,
             "fell_upstream": fell,
             **case,
         }
+
+
+def _speeds(scene: Scene, ustar: float) -> Row:
+    """Columns of the speeds of an undisturbed flow that has a friction velocity (m/s)."""
+    flow, fluid = scene.flow, scene.fluid
+    of_flow = (scene.bed.roughness, fluid.viscosity, fluid.density, flow.depth or np.nan)
+    speeds = measurable_speeds(ustar, *of_flow, closed=flow.top == "closed channel")
+    row = {column: float(speed) for column, speed in speeds.items() if np.isfinite(speed)}
+    if mean := row.get("mean_velocity_m_s"):
+        row["discharge_m2_s"] = mean * (flow.depth or 0.0)
+    return row
 
 
 def wall_stress(pile: Pile, cases: Path) -> Row:
@@ -223,12 +235,11 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
     """
     pile, motion, asked = answer.pile, answer.motion, answer.decision.asked
     scene, error = pile.scene, answer.decision.error_estimate
-    z0, depth, place = scene.bed.roughness, scene.flow.depth, point(scene)
-    pivot = pile.pivot_thresholds(answer.speed)
+    place, pivot = point(scene), pile.pivot_thresholds(answer.speed)
     for fraction in scene.protocol.fractions:
         found, model = answer.at(fraction), levels.spread(asked, fraction)
         value, factor = shields(scene, found.tau), np.nan if error is None else 1 + error
-        row = {
+        yield {
             "scene_id": answer.scene_id,
             **place,
             "packing": pile.bed.packing,
@@ -244,15 +255,7 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "reynolds": _reynolds(scene, found.tau),
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
-        }
-        # a field user measures the wind at 1 m, or the mean speed of a channel
-        if depth is None:
-            row["u_1m_m_s"] = float(log_law_speed(found.ustar0, 1.0, z0))
-        else:
-            closed = scene.flow.top == "closed channel"
-            mean = float(depth_mean_speed(found.ustar0, depth, z0, closed=closed))
-            row |= {"mean_speed_m_s": mean, "discharge_m2_s": mean * depth}
-        yield row | {
+            **_speeds(scene, found.ustar0),
             "pivot_ustar0_m_s": pivot[ceil(fraction * motion.count - 1e-9) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],

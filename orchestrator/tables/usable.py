@@ -9,6 +9,7 @@ import pandas as pd
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
+from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import fields
 
 # a bed is hydraulically smooth below u* k_s/nu = 5, k_s = 30 z0 (Nikuradse, VDI Forschungsh. 361)
@@ -67,10 +68,10 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
     rows["roughness_reynolds"] = ustar * rows["z0_over_d"] * rows["d_m"] / rows["nu_m2_s"]
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     if "u_e_m_s" in rows:
-        speed, height = rows["u_e_m_s"], SPEED_HEIGHT * rows["h_m"]
-        if "mean_speed_m_s" in rows:
-            speed, height = rows["mean_speed_m_s"].fillna(speed), rows["depth_m"].fillna(height)
-        rows["flow_reynolds"] = speed * height / rows["nu_m2_s"]
+        depth, closed = rows["depth_m"].astype(float), rows["flow_top"] == "closed channel"
+        mean = depth_mean_speed(ustar, depth, rows["z0_over_d"] * rows["d_m"], closed=closed)
+        layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
+        rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
     texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
     return table.assign(usable=[not text for text in texts], why_not=texts)
 

@@ -91,9 +91,9 @@ def test_tables_have_the_discharge(tmp_path: Path) -> None:
     planned = plan.make(asked)
     rows = tables.make(asked, planned, tmp_path, ())["pile_threshold"]
     speed = float(depth_mean_speed(1.0, 0.3, 1e-3 / 30)) * rows["ustar0_m_s"]
-    np.testing.assert_allclose(rows["mean_speed_m_s"], speed)
+    np.testing.assert_allclose(rows["mean_velocity_m_s"], speed)
     np.testing.assert_allclose(rows["discharge_m2_s"], 0.3 * speed)
-    assert "u_1m_m_s" not in rows
+    assert not {"wind_1m_m_s", "current_1m_m_s"} & {*rows}  # of 0.3 m
 
 
 def test_between_nodes_the_stress_is_cubic_in_ln_z0(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ SOUND = {
 }
 SCENE = {
     **{"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0, "h_m": 0.02},
-    **{"relative_size": 1.0, "beta_deg": 60.0},
+    **{"flow_top": "boundary layer", "depth_m": None, "relative_size": 1.0, "beta_deg": 60.0},
 }
 UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
 
