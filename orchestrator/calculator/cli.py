@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
+from orchestrator.calculator import GEOMETRIC, MEASURED, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 
@@ -153,7 +153,7 @@ def as_json(rows: Sequence["Row"]) -> str:
     from orchestrator.physics.threshold import LAWS_OF
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
-    names |= {"valid": "valid", "why_not": "why_not"}
+    names |= {name: name for name in ("valid", "why_not", *MEASURED)}
     count = len({row["law"] for row in rows})
     records = []
     for start in range(0, len(rows), count):
@@ -171,6 +171,7 @@ def as_json(rows: Sequence["Row"]) -> str:
 
 def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
+    from orchestrator.physics.beside import COLUMNS, sentence
     from orchestrator.physics.threshold import LAWS_OF
 
     chosen = [row for row in rows if row["answer"]]
@@ -188,11 +189,18 @@ def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterat
             numbers = (f"{_text(row[column]):10}" for row in chosen)
             yield f"  {'  '.join([label.ljust(width), *numbers])}".rstrip()
         yield ""
+        for row in chosen:
+            of_law = f"{row['law']}: " if len(chosen) > 1 else ""
+            facts = {name: row[column] for name, column in COLUMNS.items()}
+            yield of_law + sentence(row["shields"], row["reynolds"], **facts)
+        yield ""
         rows = sorted(rows, key=lambda row: not row["answer"])
         shown.pop("wind_1m_m_s", None)
     if not varied or answer == "paper":
         first["law"] = "force law"
     first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
+    if varied:
+        first |= {"measured_median": "measured", "measured_curve": "curve"}
     holds = ["holds", *(f"no: {row['why_not']}" if row["why_not"] else "yes" for row in rows)]
     columns = [[label, *(_text(row[c]) for row in rows)] for c, label in first.items()]
     widths = [max(map(len, column)) for column in columns]
@@ -208,4 +216,4 @@ def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterat
 
 
 def _text(value: Value) -> str:
-    return value if isinstance(value, str) else f"{value:.4g}"
+    return value if isinstance(value, str) else "-" if _is_nan(value) else f"{value:.4g}"

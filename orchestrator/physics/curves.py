@@ -90,10 +90,10 @@ WATER = (
 class Air:
     """The grains and the gas that a curve for air is drawn for; SI units."""
 
-    density: float
-    fluid_density: float
-    viscosity: float
-    gravity: float = GRAVITY
+    density: float | FloatArray
+    fluid_density: float | FloatArray
+    viscosity: float | FloatArray
+    gravity: float | FloatArray = GRAVITY
 
     def shields_diagram(self, d: FloatArray, ustar: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Re* and theta_c of grains of a diameter (m) that move at a friction velocity (m/s)."""

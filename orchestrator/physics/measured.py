@@ -48,6 +48,17 @@ Shields_compilation_flume.csv), Re* from their Shields number, median diameter a
 nu = 1e-6 m2/s and g = 9.81 m/s2. Visual thresholds and those by a reference transport are together.
 """
 
+VISUAL = (
+    Bin(0.1, 0.3, 12, 0.1125, 0.063, 0.165),
+    Bin(0.3, 1.0, 16, 0.1265, 0.062, 0.226),
+    Bin(1.0, 3.0, 23, 0.059, 0.039, 0.113),
+    Bin(3.0, 10.0, 46, 0.0395, 0.023, 0.062),
+    Bin(10.0, 30.0, 21, 0.037, 0.020, 0.141),
+    Bin(30.0, 100.0, 38, 0.0285, 0.021, 0.106),
+    Bin(100.0, 300.0, 56, 0.037, 0.023, 0.069),
+    Bin(300.0, 1000.0, 25, 0.047, 0.032, 0.060),
+)
+"""Those of them by eye alone: the first motion, as a model has it."""
 MEASURED_SOURCE = "flumes, compiled by Buffington & Montgomery 1997"
 """For legends."""
 

@@ -54,7 +54,8 @@ class Results:
             table = self.tables.get(name, pd.DataFrame())
             if len(table):
                 columns = ["scene_id", *self.scenes.columns.difference(table.columns, sort=False)]
-                table = table.merge(self.scenes[columns], on="scene_id", how="left")
+                # one block: columns may be added to more than a hundred others
+                table = table.merge(self.scenes[columns], on="scene_id", how="left").copy()
             self._joins[name] = table if len(table) else pd.DataFrame()
         return self._joins[name]
 

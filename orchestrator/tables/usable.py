@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.physics.beside import COLUMNS, beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import depth_mean_speed
@@ -49,10 +50,11 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
 
 
 def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | None) -> pd.DataFrame:
-    """Add the columns ``usable`` and ``why_not`` to thresholds of piles or of single grains.
+    """Add to thresholds of piles or of single grains whether to use them, and what was measured.
 
-    They are judged at their own Re*, by the columns of their `scenes`, and by the tolerance against
-    which the known errors are held.
+    The columns are ``usable``, ``why_not`` and those of `beside`. Thresholds are judged at their
+    own Re*, by the columns of their `scenes`, and by the tolerance against which the known errors
+    are held.
     """
     if table.empty:
         return table
@@ -73,7 +75,11 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
         rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
     texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
-    return table.assign(usable=[not text for text in texts], why_not=texts)
+    grain = {name: rows[column].to_numpy() for name, column in COLUMNS.items()}
+    measured = beside(rows["reynolds"].to_numpy(), **grain)._asdict()
+    made = {"usable": [not text for text in texts], "why_not": texts}
+    made |= {f"measured_{name}": values for name, values in measured.items()}
+    return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:

@@ -86,7 +86,7 @@ def test_the_answer_comes_first_and_the_other_laws_beside_it(run: Run, law: str)
     code, out, err = run(*SAND_IN_AIR, "--law", law)
     assert (code, err) == (0, "")
     record = _json(run(*SAND_IN_AIR, "--law", law, "--json"))
-    answer, *_, table = out.split("\n\n")[0].splitlines()[1:], out.split("\n\n")[1]
+    answer, *_, table = out.split("\n\n")[0].splitlines()[1:], out.split("\n\n")[2]
     assert answer[0].split() == ["u*,", "m/s", f"{record[law]['friction_velocity']:.4g}"]
     rows = [line.split() for line in table.splitlines()[1:]]
     assert rows[0][0] == law
