@@ -125,13 +125,6 @@ def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: Mak
     assert math.isinf(levels.known(pair_of(pivot), pivot).total)
 
 
-def test_methods_without_dynamics_are_known_to_fail_where_a_row_has_no_edge(
-    pile: MakePile,
-) -> None:
-    errors = [levels.known(COARSE, pile(shape=shape)).error for shape in ("dune", "cosine")]
-    assert errors[0] < 0.1 < 1.0 < errors[1]
-
-
 def test_every_measured_class_has_its_reference() -> None:
     table = levels.measured()
     for part, best in (("flow", "fine"), ("grains", "reference")):
@@ -156,12 +149,3 @@ def test_independent_shares_add_as_squares_and_lower_nothing_below_zero() -> Non
     shares = pd.DataFrame({"shields_low": [0.3, 0.4], "shields_high": [0.1, 0.0]})
     assert levels.together(shares) == pytest.approx((0.5, 0.1))
     assert levels.together(3 * shares)[0] == 1.0
-
-
-def test_behind_obstacles_errors_are_not_smaller(pile: MakePile) -> None:
-    fence = [{"kind": "fence", "x": -0.1, "height": 0.01}]
-    for shape in ("triangle", "dune", "cosine"):
-        behind, bare = (
-            levels.known(COARSE, pile(shape=shape, obstacles=each)) for each in (fence, [])
-        )
-        assert behind.error >= 0.9 * bare.error
