@@ -30,6 +30,8 @@ def add(commands: Any) -> None:
     command = part("run", _judge, "run a solver on each scene, ours in turn, and compare")
     text = "such as 'my-solver {case} {out}': a scene's directory, and the CSV file to write"
     command.add_argument("--solver", required=True, metavar="COMMAND", help=text)
+    text = "what the page calls the solver; default: its script, or its program"
+    command.add_argument("--name", default="", metavar="NAME", help=text)
     text = "default: results/benchmark-NAME of the pack"
     command.add_argument("--out", type=Path, metavar="RESULTS", help=text)
     text = "wall time for a scene; default %(default)g"
@@ -38,7 +40,7 @@ def add(commands: Any) -> None:
     command.add_argument("--memory", type=float, default=4.0, metavar="GIB", help=text)
 
     command = part("compare", _judge, "the same for answers that are there already")
-    text = "holds SCENE/answer.csv; its name is the solver's"
+    text = "holds SCENE/answer.csv; unless run wrote it, its name is the solver's"
     command.add_argument("results", type=Path, nargs="+", metavar="RESULTS", help=text)
     text = "default: the only RESULTS, if run wrote them, or results/benchmark-NAME of the pack"
     command.add_argument("--out", type=Path, metavar="DIR", help=text)
@@ -59,7 +61,7 @@ def _judge(options: argparse.Namespace) -> int:
     if "results" in options:
         outcome = compare.compare(options.pack, options.results, options.out, choice)
     else:
-        choice = choice._replace(seconds=options.limit, memory=int(options.memory * 2**30))
+        choice = choice._replace(seconds=options.limit, memory=options.memory, name=options.name)
         outcome = compare.run(options.pack, options.solver, options.out, choice)
     for line in outcome.failures:
         print(f"orchestrator: {line}", file=sys.stderr)

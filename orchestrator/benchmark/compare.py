@@ -33,6 +33,7 @@ ANSWER_BYTES, LOG_BYTES, FILE_BYTES = 4 * MIB, 64 * MIB, 4096 * MIB
 """Largest answer, largest output, and largest file of a solver, bytes."""
 ROUND = 1e-8  # relative rounding of a pack's tables
 LISTED = 10  # failures on the terminal
+DECLINED = "it ended with 2(:|$)"  # message of a solver that does not know a kind of scene
 OPERATORS = re.compile(r"[|&;<>]+|\d*>\S*|\S*;")  # of a shell
 MEASURE = """
 import json, resource, subprocess, sys, time
@@ -51,15 +52,13 @@ solver's."""
 
 
 class Options(NamedTuple):
-    """Scenes by level and by patterns of names, all if empty; limits of a solver for a scene.
-
-    The limits are wall time, s, and the memory of each process, bytes.
-    """
+    """Scenes by level and by patterns of names, all if empty; a solver's limits (s, GiB), name."""
 
     levels: Sequence[int] = ()
     patterns: Sequence[str] = ()
     seconds: float = 600.0
-    memory: int = 4 * 2**30
+    memory: float = 4.0
+    name: str = ""
 
 
 class Outcome(NamedTuple):
@@ -78,6 +77,9 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
     command or the directory cannot be used.
     """
     chosen, words = pack.read(root.absolute()), split(command)
+    scripts = [word for word in words[1:] if Path(word).is_file()]
+    if (solver := options.name or Path([*scripts, words[0]][0]).stem) == OURS:
+        raise InputError("two solvers have the name ours", "--name", "choose another")
     names = chosen.chosen(options.levels, options.patterns)
     digest, out = chosen.manifest.sha256[pack.EXPECTED], _place(out, chosen)
     ours = Ours(chosen, names, out / OURS / "cases")
@@ -86,7 +88,7 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
         if about.get("pack", digest) != digest:
             what = "it holds answers to another pack, or to an earlier export of this one"
             raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
-        folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest}))
+        folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest, "solver": solver}))
         # runs of an earlier time were not in turn with the solver
         shutil.rmtree(folder.path(f"{OURS}/cases"), ignore_errors=True)
         ours.root.mkdir(parents=True)
@@ -103,18 +105,18 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
 def compare(root: Path, results: Sequence[Path], out: Path | None, options: Options) -> Outcome:
     """Judge answers that are there, and write one page of all solvers.
 
-    Each of the `results` is the directory of a solver, which is named by it. `out` is that of the
-    page, by default the only results, if `run` wrote them, or ``results/benchmark-NAME`` of the
-    pack. Raises InputError if the pack or a directory cannot be used, or two have one name.
+    Each of the `results` is the directory of a solver, named by `run` or else by it. `out` is that
+    of the page, by default the only results, if `run` wrote them, or ``results/benchmark-NAME`` of
+    the pack. Raises InputError if the pack or a directory cannot be used, or two have one name.
     """
     chosen = pack.read(root.absolute())
     names = chosen.chosen(options.levels, options.patterns)
-    solvers = [OURS, *(place.absolute().name for place in results)]
+    solvers = [OURS, *map(name_of, results)]
     for place, solver in zip(results, solvers[1:], strict=True):
         if not place.is_dir():
             raise InputError("there is no such directory", where=str(place), remedy="name another")
         if solvers.count(solver) > 1:
-            remedy = "name each directory of results after its solver"
+            remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
     about = workspace.read_marker(results[0], workspace.RESULTS) or {}
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
@@ -132,9 +134,13 @@ def _place(out: Path | None, chosen: Pack) -> Path:
     out = out or Path("results") / f"benchmark-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
-    if out.name == OURS:
-        raise InputError("two solvers have the name ours", str(out), "use --out")
     return out.absolute()
+
+
+def name_of(place: Path) -> str:
+    """The name of the solver of a directory of results: what `run` noted, or the directory's."""
+    noted = (workspace.read_marker(place, workspace.RESULTS) or {}).get("solver")
+    return printable(str(noted or place.absolute().name))
 
 
 def split(command: str) -> list[str]:
@@ -166,11 +172,11 @@ def _solve(words: Sequence[str], scene: Path, options: Options, folder: Folder, 
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as private:
         work, log, report = Path(private, "work"), Path(private, LOG), Path(private, USED)
-        case, out = work / "case", work / ANSWER
+        case, out, memory = work / "case", work / ANSWER, f"{options.memory * 2**30:.0f}"
         shutil.copytree(scene, case)
         command = [word.replace("{case}", str(case)).replace("{out}", str(out)) for word in words]
         ended = process.run(
-            [sys.executable, "-ISc", MEASURE, str(report), str(options.memory), *command],
+            [sys.executable, "-ISc", MEASURE, str(report), memory, *command],
             cwd=work,
             log=log,
             limit_s=options.seconds,
@@ -258,7 +264,8 @@ def judge(
     For each solver `results` has the directory with its ``SCENE/answer.csv``, and with
     ``ours/SCENE/answer.csv`` if ours ran in turn with it. The first table has a row for each
     solver, `OURS` the last, and each expectation: ``answer``, ``error`` (relative), ``within``; the
-    second one for each solver and scene: ``passed``, ``message``, errors and times.
+    second one for each solver and scene: ``passed``, ``failed`` or, by a solver that answers
+    another, ``declined``; ``message``, errors and times.
     """
     expected = chosen.expected[chosen.expected["scene"].isin(names)]
     parts = (expected["scene"], expected["quantity"], expected["at"].map(place_of))
@@ -266,7 +273,7 @@ def judge(
     margin = (expected["tolerance"] + ROUND) * value.abs()
     numbers, verdicts = [], []
     for place in (*results, results[0] / OURS):
-        solver = printable(place.absolute().name)
+        solver = name_of(place) if place in results else OURS
         answers, used = _read(place, names)
         again, ours = (answers, used) if solver == OURS else _read(place / OURS, names)
         table = expected.assign(solver=solver)
@@ -284,10 +291,10 @@ def judge(
             for name, rows in ((str(name), rows) for name, rows in table.groupby("scene"))
         }
         off = {name: _off(rows) for name, rows in judged[~judged["within"]].groupby("scene")}
-        messages = {name: faults[name] or off.get(name, "") for name in names}
         heads = {"solver": solver, "scene": list(names)}
         heads |= {key: [chosen.scenes[name][key] for name in names] for key in ("level", "kind")}
-        verdict = pd.DataFrame({**heads, "message": messages}, index=list(names))
+        heads["message"] = [faults[name] or off.get(name, "") for name in names]
+        verdict = pd.DataFrame(heads, index=list(names))
         verdict = verdict.join(used.drop(columns="message"))
         verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
         answered = pd.Series({name: not faults[name] for name in names})
@@ -295,6 +302,8 @@ def judge(
         errors = judged["error"].where(judged["scene"].map(answered))[~counts]
         sizes, signed = (part.groupby(judged["scene"]) for part in (errors.abs(), errors))
         verdict["answered"], verdict["passed"] = answered, verdict["message"] == ""
+        verdict["declined"] = verdict["message"].str.match(DECLINED) & bool(answered.any())
+        verdict["failed"] = ~(verdict["passed"] | verdict["declined"])
         verdict["error"], verdict["worst"] = sizes.median(), sizes.max()
         verdict["bias"] = signed.median()
         for ratio, time in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
@@ -333,7 +342,7 @@ def _question(row: Mapping[Any, Any]) -> str:
 
 def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
     """The failures of solvers, one for each cause: ``solver``, ``scenes``, ``kind``, ``why``."""
-    failed = verdicts[~verdicts["passed"]]
+    failed = verdicts[verdicts["failed"]]
     # messages of one cause differ in their numbers
     cause = failed["message"].str.replace(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True)
     rows = []
@@ -348,6 +357,7 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     """One row for each level and kind that was asked, and each solver; errors in per cent."""
     columns = {
         **{"scenes": ("scene", "size"), "passed": ("passed", "sum")},
+        **{"failed": ("failed", "sum"), "declined": ("declined", "sum")},
         **{"error, %": ("error", "median"), "bias, %": ("bias", "median")},
         **{"largest, %": ("worst", "max"), "time over ours": ("ratio", "median")},
         **{"CPU over ours": ("cpu_ratio", "median"), "peak, MiB": ("peak_mib", "max")},
@@ -356,6 +366,16 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     table = groups.agg(**columns).reset_index()
     percent = [name for name in columns if name.endswith("%")]
     return table.assign(**(100 * table[percent]))
+
+
+def in_words(verdicts: pd.DataFrame) -> list[str]:
+    """A line for each solver: PASSED or FAILED, its name, and the numbers of its scenes."""
+    lines = []
+    for solver, of in verdicts.groupby("solver", sort=False):
+        counts = [f"{of[kind].sum()} {kind}" for kind in ("passed", "failed", "declined")]
+        word = "FAILED" if of["failed"].any() else "PASSED"
+        lines.append(f"{word} {solver}: of {len(of)} scenes {', '.join(counts)}")
+    return lines
 
 
 def _written(
@@ -372,12 +392,9 @@ def _written(
             columns = ["solver", *table.columns.drop("solver")]
             folder.put(name, text_of_table(table[columns], digits))
         page.write(chosen, numbers, verdicts, folder)
-    is_alone = theirs["solver"].nunique() == 1
-    lines = [
-        f"{'' if is_alone else f'{row.solver}: '}{row.scenes}: {row.why}"
-        for row in failures(theirs).itertuples()
-    ]
+    lines = [f"{row.solver}: {row.scenes}: {row.why}" for row in failures(theirs).itertuples()]
     if len(lines) > LISTED:
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
-    text = summary(theirs).to_string(index=False, na_rep="", float_format="{:.3g}".format)
-    return Outcome(lines, text, folder.root / PAGE)
+    table = summary(theirs).dropna(axis=1, how="all")
+    text = table.to_string(index=False, na_rep="", float_format="{:.3g}".format)
+    return Outcome(lines, "\n".join([text, *in_words(theirs)]), folder.root / PAGE)

@@ -67,11 +67,14 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
         return pack.write(root, listed, (asked.name, asked.text), programs)
     space = Workspace(source.absolute())
     asked, planned = pipeline.reopen(space)
+    unknown = [(s.flow.gusts, s.grain.cohesion, s.forces.sheltering) for s in asked.scenes]
     what, remedy = "", "run the study without it into another directory"
     if not all(answer.is_as_asked for answer in planned.decisions.values()):
         what = f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"
     elif any(pile.scene.protocol.update or pile.bed.width for pile in planned.piles.values()):
         what = "protocol.update or bed.width: a pack holds one flow over each bed, in its plane"
+    elif any(one != (None, 0.0, "none") for one in unknown):
+        what = "flow.gusts, grain.cohesion or forces.sheltering: a pack has no entries for them"
     elif not space.drawn.is_file():
         what, remedy = "the study is not finished", "run it to its end"
     else:
@@ -123,7 +126,7 @@ def problems(
         if pile.bed.is_replica or pile.scene.protocol.method != "dem":
             continue
         # grains on other beds are given at level 4 alone, one by one
-        has_line = id_ in solved and pile.bed.is_triangle
+        has_line = id_ in solved and pile.bed.is_triangle and not pile.pouring
         for kind in ("pile", "line") if has_line else ("pile",):
             if kind in kinds:
                 runs = (*(pile.solves if kind == "line" else ()), pile.case.name)

@@ -56,7 +56,7 @@ AXES: dict[str, tuple[str, str, Look]] = {
 def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
     """Put the page and its figures into a directory; the tables are those of `compare.judge`."""
     theirs = verdicts[verdicts["solver"] != OURS]
-    text = f"{theirs['passed'].sum()} of {len(theirs)} scenes passed.\n\n{ERRORS}"
+    text = "\n\n".join([*compare.in_words(theirs), ERRORS])
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
     with style.settings(), warnings.catch_warnings():

@@ -168,11 +168,9 @@ def _contact(time_step: float, damping: float = 0.1, stiffness: float = STIFFNES
     """Parameters of the grain of the check decks."""
     weight = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
     return {
-        **{"d_m": DIAMETER, "rho_sol_kg_m3": DENSITY},
-        **{"phi_deg": Grain(diameter=DIAMETER).friction_angle_deg},
-        **{"stiffness": stiffness, "damping": damping},
+        **{"d_m": DIAMETER, "rho_sol_kg_m3": DENSITY, "time_step": time_step, "damping": damping},
+        **{"phi_deg": Grain(diameter=DIAMETER).friction_angle_deg, "stiffness": stiffness},
         **mechanics(DIAMETER, DENSITY, GRAVITY, weight, stiffness),
-        "time_step": time_step,
     }
 
 

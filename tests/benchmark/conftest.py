@@ -88,7 +88,7 @@ lift_off = _pack("lift_off", THEORY % ("low", "mobile_layers = 1"), (4,))
 level_rows = _pack("level_rows", THEORY % ("high", 'packing = "horizontal"'), (4,))
 
 
-SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=2**29)
+SCENE = Options(patterns=("2-incline-5",), seconds=60.0, memory=0.5)
 RIGHT = f"{shlex.join([sys.executable, str(NATIVE / 'solver.py')])} {{case}} {{out}}"
 """Command of the example."""
 HEAD = """

@@ -33,6 +33,7 @@ FAULTS = {
     AFTER + "sys.exit(4)": "it ended with 4",
     # files in place of an answer
     "sys.exit(0)": "it wrote no answer.csv",
+    "sys.exit(2)": "it ended with 2",
     "out.open('wb').truncate(8 * 2**20)": "more than 4 MiB",
     "os.mkfifo(out)": "it wrote no answer.csv",
     # answers that are not whole
@@ -45,7 +46,7 @@ FAULTS = {
     AFTER + "out.write_text(text.replace('ustar', 'speed'))": "lacks ustar_m_s",
     # wrong numbers
     AFTER
-    + "out.write_text(text.replace('ustar_m_s,,', 'ustar_m_s,,9'))": "ustar_m_s is 91.*, not 1",
+    + "out.write_text(text.replace('ustar_m_s,,', 'ustar_m_s,,9'))": "ustar_m_s is 90.*, not 0",
 }
 """Bodies of solvers, and what is said of each."""
 
@@ -69,8 +70,11 @@ def test_faults_are_caught_and_named(
         assert re.search(FAULTS[text], str(verdicts.loc[name, "message"])), text
     assert verdicts["passed"].tolist() == [False] * len(FAULTS) + [True]
     assert verdicts["answered"].tolist() == [False] * (len(FAULTS) - 1) + [True] * 2
-    assert f"{names[5]} and 1 more of kind closed-form: it ended with 3" in outcome.failures
+    line = f"my solver: {names[5]} and 1 more of kind closed-form: it ended with 3"
+    assert line in outcome.failures
     assert outcome.failures[-1] == "and 6 more: see verdicts.csv"
+    line = f"FAILED my solver: of {len(FAULTS) + 1} scenes 1 passed, {len(FAULTS) - 1} failed, 1 d"
+    assert line in outcome.summary
     assert "\x1b" not in "".join(outcome.failures) + outcome.page.read_text()
     assert not list(folder.iterdir())  # the private directories are removed
 
@@ -124,8 +128,9 @@ def test_a_command_that_cannot_work(command: str, words: str) -> None:
 def test_ours_answers_as_exported(
     packed: str, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    """A solver that knows no kind: only our own runs answer."""
-    run(request.getfixturevalue(packed), tmp_path, "sys.exit(2)", Options(levels=(3, 4, 5)))
+    """A solver that knows no kind, and so has failed: only our own runs answer."""
+    choice = Options(levels=(3, 4, 5))
+    assert run(request.getfixturevalue(packed), tmp_path, "sys.exit(2)", choice).failures
     numbers = pd.read_csv(tmp_path / "results" / "comparison.csv")
     assert set(numbers["scene"].str[0]) == set("345" if packed == "all_levels" else "4")
     pd.testing.assert_series_equal(numbers["ours"], numbers["value"], check_names=False, rtol=1e-6)
@@ -135,7 +140,9 @@ def test_ours_answers_as_exported(
 def right(all_levels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The results of the example, which passes."""
     out = tmp_path_factory.mktemp("results") / "right"
-    assert compare.run(all_levels, RIGHT, out, CHOICE).failures == []
+    outcome = compare.run(all_levels, RIGHT, out, CHOICE._replace(name="right"))
+    assert outcome.failures == []
+    assert "PASSED right: of 17 scenes 17 passed, 0 failed, 0 declined" in outcome.summary
     return out
 
 
@@ -144,6 +151,7 @@ def wrong(right: Path, tmp_path: Path) -> Path:
     """The same with thresholds of the pile that are too high, and stated time steps."""
     out = tmp_path / "wrong_one"
     shutil.copytree(right, out)
+    (out / "benchmark.json").write_text('{"kind": "benchmark of the solver", "name": "b"}')
     (path,) = out.glob("4-*/answer.csv")
     table = pd.read_csv(path, dtype={"at": str})
     table.loc[table["quantity"] == "shields", "value"] *= HIGH
@@ -162,12 +170,11 @@ def test_two_solvers_on_one_page(
     assert ended.stdout.splitlines()[-1] == str(both / "comparison.html")
     parsed = Page((both / "comparison.html").read_text(encoding="utf-8"))
     assert parsed.texts["title"] == "Against the pack “pack”: right, wrong_one"
-    assert "33 of 34 scenes passed" in parsed.text
+    assert "FAILED wrong_one: of 17 scenes 16 passed, 1 failed, 0 declined" in parsed.text
     assert "wrong_one" in parsed.texts["th"]
     assert {*os.listdir(both / "figures")} >= {"moved.png", "shields.png", "speed-accuracy.png"}
-    # alone a solver is not named, and the page lies with its answers
+    # the page of one solver lies with its answers
     outcome = compare.compare(all_levels, [wrong], None, CHOICE)
-    assert outcome.failures[0].startswith("4-")
     assert outcome.page == wrong / "comparison.html"
 
 
