@@ -30,8 +30,7 @@ roughness = "d/30"
 ```
 
 Each `[[group]]` is an experiment with a `name`: its tables override those of the top, its `axes`
-add to them. A wrong key, type or range is refused in one line with the field and the remedy. The
-[glossary](glossary.md) explains the words.
+add to them. The [glossary](glossary.md) explains the words.
 
 | key of the top | default | meaning |
 |---|---|---|
@@ -42,7 +41,7 @@ add to them. A wrong key, type or range is refused in one line with the field an
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 
-The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
+The *scope* says on which scenes a field has an effect.
 The *column* is named as the field where none is given. A tolerance may change a field marked
 *answer*; column `answered_...` of the table of scenes has the value that was run. Ranges are
 intervals; a parenthesis leaves out the end.
@@ -55,7 +54,7 @@ def text() -> str:
     """The reference, in Markdown."""
     lines = [HEAD]
     for part, model in fields.PARTS.items():
-        about = (model.__doc__ or "").partition("\n")[0]
+        about = " ".join((model.__doc__ or "").split())
         if part == "bed":
             about = "One grain on two others, or a pile of grains."
         lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")

@@ -1,14 +1,16 @@
 """The command line: parse, call, print."""
 
 import argparse
+import difflib
 import os
 import sys
 import warnings
 from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from orchestrator import __version__
 from orchestrator.benchmark import cli as benchmark
@@ -53,9 +55,28 @@ def _say(message: object) -> None:
     print(f"orchestrator: {message}", file=sys.stderr)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser of options that are written in full; of an unknown one it names the nearest."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**{**settings, "allow_abbrev": False})
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse an unknown option first: another may be missing because of it."""
+        given = sys.argv[1:] if args is None else list(args)
+        # what follows a command is its own parser's
+        own = takewhile(lambda word: word.startswith("-"), given) if self._subparsers else given
+        for name in (word.partition("=")[0] for word in own if word.startswith("--")):
+            if name not in self._option_string_actions and name != "--":
+                near = difflib.get_close_matches(name, self._option_string_actions, 1)
+                advice = f"did you mean {near[0]}?" if near else "--help lists all"
+                self.error(f"there is no option {name}: {advice}")
+        return super().parse_known_args(given, namespace)
+
+
 def _parser() -> argparse.ArgumentParser:
     about = "When does a sediment grain, or a whole bedform of grains, start to move?"
-    parser = argparse.ArgumentParser(prog="orchestrator", description=about)
+    parser = _Parser(prog="orchestrator", description=about)
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="command")
     for name, run, text in (

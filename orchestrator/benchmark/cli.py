@@ -12,7 +12,9 @@ def add(commands: Any) -> None:
     parts = group.add_subparsers(required=True, metavar="part")
 
     def part(name: str, run: Any, text: str) -> argparse.ArgumentParser:
-        command: argparse.ArgumentParser = parts.add_parser(name, help=text)
+        # the directories first: an option of several values would take them for its own
+        usage = f"%(prog)s PACK {'RESULTS ... ' if name == 'compare' else ''}[OPTION ...]"
+        command: argparse.ArgumentParser = parts.add_parser(name, help=text, usage=usage)
         command.set_defaults(run=run)
         command.add_argument("pack", type=Path, metavar="PACK", help="directory of the pack")
         several: dict[str, Any] = {"action": "extend", "nargs": "+", "default": []}

@@ -3,8 +3,10 @@
 Here are its parameters and results, by every name that they have.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
+from orchestrator.physics import fluids
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 
 
@@ -21,8 +23,8 @@ class Parameter(NamedTuple):
 
 MOST_POINTS = 100_000
 _Z0 = Parameter("bed.roughness", "z0_m", "z0, m", (1e-12, 1), "d/30", 'or such a part: "d/10"')
-_NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), 1e-5, "water: 1e-6")
-_RHO = Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), 1.0, "water: 1000")
+_RHO = Parameter("fluid.density", "rho_f_kg_m3", "rho_f, kg/m3", (1e-6, 2e4), fluids.PAPER[0])
+_NU = Parameter("fluid.viscosity", "nu_m2_s", "nu, m2/s", (1e-8, 1e3), fluids.PAPER[1])
 _ALPHA = Parameter("bed.slope_deg", "alpha_deg", "alpha, deg", (0, 30), 0.0, "the flow goes up it")
 _BETA = Parameter("bed.entrainment_angle_deg", "beta_deg", "beta, deg", (30, 60), 60.0)
 _LIFT = Parameter("forces.lift_coefficient", "alpha_s", "alpha_s", (0, 100), LIFT_COEFFICIENT)
@@ -42,6 +44,8 @@ PARAMETERS = {
     "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
+OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
+"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
 GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
 """Parameters whose ranges are spaced geometrically."""
 QUANTITIES = {
@@ -59,3 +63,15 @@ QUANTITIES = {
 """Columns of a threshold, each with its name in JSON and its symbol and unit for people."""
 MEASURED = tuple(f"measured_{name}" for name in ("curve", "median", "low", "high", "rows"))
 """Columns of what was measured beside it, `physics.beside.Beside`; names in JSON, too."""
+
+
+def with_fluid(given: Mapping[str, Any], fluid: str | None, degrees: Any) -> dict[str, Any]:
+    """Parameters with those of a fluid by its name at a temperature, if there is one (deg C).
+
+    An `InputError` refuses what a table ``[fluid]`` of a study file may not have either.
+    """
+    named = {"kind": fluid, fluids.TEMPERATURE: degrees}
+    table = {name: value for name, value in named.items() if value is not None}
+    table |= {name: given[key] for key, name in OF_FLUID.items() if key in given}
+    numbers = fluids.numbers_of(table)
+    return {**given, **{key: numbers[name] for key, name in OF_FLUID.items() if name in numbers}}

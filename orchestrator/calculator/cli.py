@@ -10,9 +10,18 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import GEOMETRIC, MEASURED, MOST_POINTS, PARAMETERS, QUANTITIES
+from orchestrator.calculator import (
+    GEOMETRIC,
+    MEASURED,
+    MOST_POINTS,
+    OF_FLUID,
+    PARAMETERS,
+    QUANTITIES,
+    with_fluid,
+)
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE
 
 if TYPE_CHECKING:
     from orchestrator.types import Row  # its module loads numpy
@@ -46,9 +55,15 @@ def add(commands: Any) -> None:
     command = commands.add_parser("threshold", help=about, epilog=RANGES)
     for name, each in PARAMETERS.items():
         default = f"{each.default:g}" if isinstance(each.default, float) else each.default
-        text = "; ".join(filter(None, (each.label, each.note, default and f"default {default}")))
-        settings = {"default": default, "required": name == "diameter", "metavar": "X"}
+        of_paper = ", that of the paper's fluid" if name in OF_FLUID else ""
+        text = f"default {default}{of_paper}" if default else ""
+        text = "; ".join(filter(None, (each.label, each.note, text)))
+        settings = {"required": name == "diameter", "metavar": "X"}
         command.add_argument(OPTIONS[name], dest=name, help=text, **settings)
+    text = f"{', '.join(FLUIDS)}: its density and viscosity at --temperature; default the paper's"
+    command.add_argument("--fluid", metavar="NAME", help=text)
+    text = f"of that fluid, deg C, one number; default {STANDARD_DEG_C:g}"
+    command.add_argument("--temperature", type=float, metavar="T", help=text)
     text = "force law of the answer; default %(default)s; paper: Eq. 2 or 4 where each holds"
     command.add_argument("--law", default="bridged", metavar="NAME", help=text)
     form = command.add_mutually_exclusive_group()
@@ -60,8 +75,13 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from orchestrator.calculator.table import thresholds
 
-    texts = {name: getattr(options, name) for name in PARAMETERS}
-    axes = {name: values(name, text) for name, text in texts.items() if text is not None}
+    given = {name: text for name in PARAMETERS if (text := getattr(options, name)) is not None}
+    try:
+        given = with_fluid(given, options.fluid, options.temperature)
+    except InputError as error:
+        raise _renamed(error, ()) from None
+    texts = {name: given.get(name, each.default) for name, each in PARAMETERS.items()}
+    axes = {name: values(name, str(text)) for name, text in texts.items() if text is not None}
     if (count := math.prod(map(len, axes.values()))) > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
         raise InputError(what, "threshold", "lower a COUNT")
@@ -83,7 +103,7 @@ def _run(options: argparse.Namespace) -> int:
         print(as_json(rows))
     else:
         varied = [name for name, axis in axes.items() if len(axis) > 1]
-        print("\n".join(as_text(rows, options.law, varied)))
+        print("\n".join(as_text(rows, options.law, varied, options.fluid)))
     return 0
 
 
@@ -130,14 +150,14 @@ def questions(axes: Mapping[str, Sequence[Value]]) -> list[str]:
     is_of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
     if rho > 0 and nu > 0 and (is_of_air or not low <= rho * nu <= high):
         unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3"
-        usual = "air has --fluid-density 1.2 and --viscosity 1.5e-05, water 1000 and 1e-06"
-        asked.append(f"{unusual}: {usual}; is it right?")
+        asked.append(f"{unusual}: is it right? water, seawater, air: --fluid NAME")
     return asked
 
 
 def _renamed(error: InputError, asked: Sequence[str]) -> InputError:
     """A refusal with options for the fields of a study file; questions belong to its remedy."""
     options = {each.field: OPTIONS[name] for name, each in PARAMETERS.items()}
+    options |= {"fluid.kind": "--fluid", f"fluid.{TEMPERATURE}": "--temperature"}
     texts = error.what, error.where, "; ".join(filter(None, [error.remedy, *asked]))
     fields = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
     named = [re.sub(fields, lambda at: options.get(at[0], f"--{at[0]}"), text) for text in texts]
@@ -169,7 +189,9 @@ def as_json(rows: Sequence["Row"]) -> str:
     return json.dumps(json.loads(answer, parse_constant=lambda _: None), indent=2)
 
 
-def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterator[str]:
+def as_text(
+    rows: Sequence["Row"], answer: str, varied: Sequence[str], fluid: str | None
+) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
     from orchestrator.physics.beside import COLUMNS, sentence
     from orchestrator.physics.threshold import LAWS_OF
@@ -178,6 +200,8 @@ def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterat
     name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
     quantities = {column: label for column, (_, label) in QUANTITIES.items()}
     shown = {c: text for c, text in quantities.items() if not all(_is_nan(row[c]) for row in rows)}
+    if "mean_velocity_m_s" in shown:
+        shown.pop("current_1m_m_s", None)
     first = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
     if varied:
         yield name
@@ -208,6 +232,11 @@ def as_text(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterat
         yield "  ".join([*(f"{c:<{w}}" for c, w in zip(cells, widths, strict=True)), last])
     if not varied:
         yield f"\nlaws of the paper's rule: {' and '.join(LAWS_OF[rows[0]['regime']])}"
+    fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
+    if fluid or fluids == {PAPER}:
+        ((rho, nu),) = fluids
+        name = fluid or "the paper's fluid (real air: --fluid air)"
+        yield f"{name}: {rho:g} kg/m3, {nu:.5g} m2/s"
     liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
     if any(_is_nan(row["depth_m"]) for row in liquid):
         yield "for the mean velocity of the liquid give its depth, --depth in m"

@@ -140,7 +140,10 @@ _dem = partial(field, scope="DEM", about="answer")
 
 
 class Fluid(Part):
-    """The fluid; the default is the paper's air."""
+    """A `kind`, "water", "seawater" or "air", with `temperature_deg_c` (15), or the numbers.
+
+    The default is the paper's fluid, which is no air of 15 °C.
+    """
 
     # from the vapour that ripples a comet to mercury, 13,500, and melts of metals
     density: float = field(1.0, "ρ_f", "kg/m³", "rho_f_kg_m3", "fluid density", ge=1e-7, le=2e4)
@@ -377,7 +380,8 @@ class PileBed(Bed):
     """height of the forms; that of a profile follows; over a flat bed with obstacles lengths in h
     are heights of the tallest"""
     shape: ShapeName = _pile("triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS)
-    """shape of a form; `slope_deg` is that of its windward side, of a curve where it is steepest"""
+    """shape of a form, which `kind` may name too; `slope_deg` is that of its windward side, of a
+    curve where it is steepest"""
     windward: Literal["straight", "curved"] = _dune("straight", label="windward side")
     """windward side of a dune
     - straight: one slope

@@ -19,11 +19,13 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
+from orchestrator.physics import fluids
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
 from orchestrator.study.profile import Files, read_text
 from orchestrator.study.scene import Scene, roughness_length
+from orchestrator.study.shapes import SHAPES
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
@@ -173,10 +175,23 @@ def _scenes(
 def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = None) -> Scene:
     """Validate the tables of one scene, by their names; `where` names the file in messages.
 
-    A part of the diameter such as d/30 is worked out, and so is the d50 of a sieve table. `files`
-    are those that the tables may name. The first thing wrong raises an `InputError`.
+    A part of the diameter such as d/30 is worked out, and so are the d50 of a sieve table and the
+    numbers of a fluid's kind. `files` are those that the tables may name. The first thing wrong
+    raises an `InputError`.
     """
-    bed, grain = {**BED, **parts["bed"]}, dict(parts["grain"])
+    bed, grain, flow, fluid = (dict(parts.get(n, {})) for n in ("bed", "grain", "flow", "fluid"))
+    bed, kind = {**BED, **bed}, bed.get("kind", BED["kind"])
+    if kind in [*SHAPES] and bed.get("shape", kind) == kind:
+        bed |= {"kind": "pile", "shape": kind}
+    elif kind not in ("grain", "pile"):
+        remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
+        raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
+    if bed.get("shape") == "flat" and not (bed.get("profile") or bed.get("obstacles")):
+        flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
+    try:
+        fluid = fluids.numbers_of(fluid)
+    except InputError as error:
+        raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
     if files and bed["kind"] == "pile" and isinstance(bed.get("profile"), str):
         bed |= files.bed(bed, where)
     if files and isinstance(grain.get("sizes"), str):
@@ -192,7 +207,8 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
                 is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3
                 d = grain["diameter"] / (relative if is_size else 1.0)
                 bed["roughness"] = roughness_length(bed["roughness"], d, mixture)
-        return Scene.model_validate({**parts, "grain": grain, "bed": bed})
+        made = {"fluid": fluid, "grain": grain, "bed": bed, "flow": flow}
+        return Scene.model_validate({**parts, **made})
     except UnfitError as error:
         raise InputError(error.what, f"{where}: {error.field}", error.remedy) from None
     except ValidationError as error:

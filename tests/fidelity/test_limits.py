@@ -29,7 +29,11 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
     ({"bed.shape": "cosine", "bed.slope_deg": 31.0}, "bed", "deg at x = .* is beyond min"),
     ({"bed.shape": "dune", "bed.counted": "all", "bed.lee_slope_deg": 33.0}, "bed", "33 deg at x"),
     ({"bed.forms": 2, "bed.spacing": 0.1}, "bed", r"bed.spacing: forms 0.149\d* m long over"),
-    ({"bed.shape": "flat", "bed.slope_deg": 0.0}, "flow.model", "nothing to solve"),
+    (
+        {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "solve"},
+        "flow.model",
+        "nothing to solve",
+    ),
     ({"flow.model": "hill", "bed.shape": "step up"}, "flow.model", "does not fall to half"),
     ({"flow.model": "hill", **FENCE}, "flow.model", "rises by 75 deg at x = -0.1"),
     ({"bed.forms": 2, "bed.spacing": 1e4}, "bed", LONG),

@@ -1,0 +1,81 @@
+"""Density and viscosity of water, sea water and air at 1013.25 hPa by their temperature."""
+
+import difflib
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator.errors import InputError
+
+PAPER = (1.0, 1e-5)
+"""The paper's fluid, the default: density, kg/m3, and viscosity, m2/s. It is no air of 15 deg C."""
+STANDARD_DEG_C = 15.0
+"""Temperature of a fluid that is named without one: of the standard atmosphere, and of ITTC."""
+SALINITY = 35.0  # of sea water, g/kg
+ZERO_C = 273.15
+TEMPERATURE = "temperature_deg_c"  # as a table ``[fluid]`` calls it
+
+
+def water(t: float) -> tuple[float, float]:
+    """Density (kg/m3) and viscosity (Pa s) of water at t deg C.
+
+    Kell (1975), J. Chem. Eng. Data 20, 97; Patek et al. (2009), J. Phys. Chem. Ref. Data 38, 21,
+    which is IAPWS SR6-08.
+    """
+    density = 999.83952 + 16.945176 * t - 7.9870401e-3 * t**2 - 46.170461e-6 * t**3
+    density += 105.56302e-9 * t**4 - 280.54253e-12 * t**5
+    part = (t + ZERO_C) / 300
+    micro_pa_s = 280.68 * part**-1.9 + 511.45 * part**-7.7
+    micro_pa_s += 61.131 * part**-19.6 + 0.45903 * part**-40
+    return density / (1 + 16.879850e-3 * t), 1e-6 * micro_pa_s
+
+
+def sea_water(t: float) -> tuple[float, float]:
+    """The same of sea water of 35 g/kg of salt.
+
+    Millero and Poisson (1981), Deep-Sea Res. 28A, 625, UNESCO's equation of state of 1980; Sharqawy
+    et al. (2010), Desalin. Water Treat. 16, 354, Eq. 22.
+    """
+    density, viscosity = water(t)
+    salt = 0.824493 - 4.0899e-3 * t + 7.6438e-5 * t**2 - 8.2467e-7 * t**3 + 5.3875e-9 * t**4
+    density += salt * SALINITY + 4.8314e-4 * SALINITY**2
+    density += (-5.72466e-3 + 1.0227e-4 * t - 1.6546e-6 * t**2) * SALINITY**1.5
+    s = SALINITY / 1000
+    first, second = 1.541 + 1.998e-2 * t - 9.52e-5 * t**2, 7.974 - 7.561e-2 * t + 4.724e-4 * t**2
+    return density, viscosity * (1 + first * s + second * s**2)
+
+
+def air(t: float) -> tuple[float, float]:
+    """The same of dry air: an ideal gas, Sutherland's formula (U.S. Standard Atmosphere 1976)."""
+    kelvin = t + ZERO_C
+    return 101_325 / (287.053 * kelvin), 1.458e-6 * kelvin**1.5 / (kelvin + 110.4)
+
+
+FLUIDS = {"water": (water, 0.0, 100.0), "seawater": (sea_water, 0.0, 40.0), "air": (air, -80, 100)}
+"""By name the properties, and the temperatures between which the formulas hold, deg C."""
+
+
+def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table ``[fluid]`` with density (kg/m3) and viscosity (m2/s) in place of its kind.
+
+    They have five digits, so that who writes them by hand asks for the same scene. An `InputError`
+    refuses a kind that has no formulas, a temperature beyond them, and what is given twice.
+    """
+    rest = {name: value for name, value in table.items() if name not in ("kind", TEMPERATURE)}
+    if len(rest) == len(table):
+        return rest
+    kind, t = table.get("kind"), table.get(TEMPERATURE, STANDARD_DEG_C)
+    if kind not in FLUIDS:
+        what = "a temperature needs it" if kind is None else f"no formulas of {kind!r} are here"
+        near = difflib.get_close_matches(str(kind), FLUIDS, 1)
+        names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"
+        raise InputError(what, "fluid.kind", f"{names}; of others give density and viscosity")
+    properties, low, high = FLUIDS[kind]
+    if not (isinstance(t, int | float) and low <= t <= high):
+        what = f"{t!r} is no temperature at which the formulas of {kind} hold"
+        raise InputError(what, f"fluid.{TEMPERATURE}", f"{low:g} ... {high:g} deg C")
+    for name in ("density", "viscosity"):
+        if name in rest:
+            raise InputError(f"{kind} has its own", f"fluid.{name}", "leave out one of the two")
+    density, viscosity = properties(float(t))
+    numbers = {"density": density, "viscosity": viscosity / density}
+    return rest | {name: float(f"{number:.5g}") for name, number in numbers.items()}
