@@ -127,16 +127,7 @@ _LISTED = (
     Shape("rushil", "a hill of the wind tunnel RUSHIL", _rushil, TRAIN, "hill of RUSHIL"),
     Shape("trapezoid", "two straight faces and a level top", _trapezoid, LEVEL + TRAIN + LEE),
     Shape("step up", "a straight face up to higher ground", _level, LEVEL),
-    Shape(
-        "step down",
-        "a straight face down to lower ground",
-        _level,
-        LEVEL + LEE,
-        "",
-        False,
-        30,
-        "all",
-    ),
+    Shape("step down", "a straight face down to lower ground", _level, LEVEL + LEE, "", *DOWN),
     Shape("flat", "level bed", _level, LEVEL, rises=False, counted="all"),
 )
 SHAPES = {shape.name: shape for shape in _LISTED}  # all shapes, by what a study file calls them

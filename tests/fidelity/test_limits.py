@@ -13,6 +13,7 @@ from orchestrator.study.study import Study
 FENCE = {"bed.obstacles": [{"kind": "fence", "x": -0.1, "height": 0.01}]}
 POURED = {"bed.packing": "poured", "bed.slope_deg": 45.0, "bed.height": 0.015}
 LONG = r"m of bed are .* grains, more than 100000"
+SOLVED_LEVEL = {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "solve"}
 MOUND = "beyond what poured grains hold"
 GRAIN: dict[str, object] = {"bed.kind": "grain", "grain.friction_angle_deg": 35.0}
 REFUSED: list[tuple[dict[str, object], str, str]] = [
@@ -29,11 +30,7 @@ REFUSED: list[tuple[dict[str, object], str, str]] = [
     ({"bed.shape": "cosine", "bed.slope_deg": 31.0}, "bed", "deg at x = .* is beyond min"),
     ({"bed.shape": "dune", "bed.counted": "all", "bed.lee_slope_deg": 33.0}, "bed", "33 deg at x"),
     ({"bed.forms": 2, "bed.spacing": 0.1}, "bed", r"bed.spacing: forms 0.149\d* m long over"),
-    (
-        {"bed.shape": "flat", "bed.slope_deg": 0.0, "flow.model": "solve"},
-        "flow.model",
-        "nothing to solve",
-    ),
+    (SOLVED_LEVEL, "flow.model", "nothing to solve"),
     ({"flow.model": "hill", "bed.shape": "step up"}, "flow.model", "does not fall to half"),
     ({"flow.model": "hill", **FENCE}, "flow.model", "rises by 75 deg at x = -0.1"),
     ({"bed.forms": 2, "bed.spacing": 1e4}, "bed", LONG),
