@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = {
-    ("benchmark",): 1502,
+    ("benchmark",): 1504,
     ("report",): 2450,
     ("runs",): 1400,
     ("study",): 1600,
