@@ -9,7 +9,8 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from orchestrator.study import fields
+from orchestrator.fidelity import limits
+from orchestrator.study import fields, profile, scene
 from orchestrator.study.fields import Quantity
 from orchestrator.study.study import BED, TIME_LIMIT_S
 
@@ -41,11 +42,61 @@ add to them. The [glossary](glossary.md) explains the words.
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 
-The *scope* says on which scenes a field has an effect.
-The *column* is named as the field where none is given. A tolerance may change a field marked
-*answer*; column `answered_...` of the table of scenes has the value that was run. Ranges are
-intervals; a parenthesis leaves out the end.
+The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
+The *column* is named as the field where none is given. A field marked *answer* is about how the
+question is answered, not about the question: a tolerance may change it, and column `answered_...`
+of the table of scenes has the value that was run. Ranges are intervals; a parenthesis leaves out
+the end. The [limits](#limits) are what a study refuses within the ranges.
 """
+DAMPED = ", ".join(f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS)
+LOW, HIGH = limits.PILE_SLOPES_DEG
+LIMITS = {
+    "grain.sizes": (
+        f"the largest grain is more than {scene.LARGEST_RATIO:g} times the smallest: the time of "
+        "DEM rises with the square",
+        "merge the finest or the coarsest classes of the sieve",
+    ),
+    "bed.profile": (
+        f"a bed of more than {scene.MOST_GRAINS:g} grains or {profile.MOST_CORNERS} points, a slope "
+        f"above {profile.STEEPEST_DEG:g}°, points nearer than {scene.NARROWEST_OVER_D:g} d or "
+        f"{scene.NARROWEST_OVER_CELL:g} of the first cell",
+        "another method, or a shorter bed; smooth it",
+    ),
+    "bed.slope_deg": (
+        f"a pile below {LOW:g}° or above {HIGH:g}°; anything counted beyond {limits.ANGLES}, where "
+        f"it rolls back without a flow; poured beds beyond the friction angle or {HIGH:g}°",
+        "lower the slope, or count another part with `bed.counted`",
+    ),
+    "bed.entrainment_angle_deg": (
+        f"a pile below {limits.CLOSE_PACKED_DEG:g}°: the row above wedges a row apart",
+        "60; single grains may have less",
+    ),
+    "bed.roughness": (
+        f"above {scene.ROUGHEST:.2g} d, or above the first cell's height",
+        "d/30 is usual",
+    ),
+    "bed.height": ("less than five grains", "raise it, or take a level bed"),
+    "bed.width": (f"below {scene.LEAST_WIDTH:g} of the largest grains", "raise it"),
+    "flow.depth, flow.lid": (
+        f"less than {scene.LEAST_DEPTH:g} heights of the forms or obstacles",
+        "raise it",
+    ),
+    "flow.viscosity": ("a solved flow whose first cell is not turbulent", "lower it"),
+    "flow.model": (
+        f"`waves` and `hill` over a bed that rises by more than {HIGH:g}°; `hill` over one that "
+        "does not fall to half its height on both sides",
+        "`solve`",
+    ),
+    "grain.stiffness": (
+        f"above {scene.MOST_POURED_STIFFNESS:g} in DEM on a poured bed",
+        "lower it",
+    ),
+    "grain.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
+    "protocol.time_step": (f"above {DAMPED}", "lower it"),
+    "forces.law": ("`zeng-torque` by peeling or DEM", "the method `pivot`"),
+    "flow.gusts, grain.cohesion": ("by DEM", "the method `pivot` or `peeling`"),
+}
+"""What is refused within the ranges of the fields, and the remedy."""
 SIGNS = {Gt: ("gt", "({:g},"), Ge: ("ge", "[{:g},"), Lt: ("lt", "{:g})"), Le: ("le", "{:g}]")}
 COLUMNS = "| field | symbol, unit, range | default | meaning | scope | column |"
 
@@ -60,7 +111,9 @@ def text() -> str:
         lines.append(f"## `[{part}]`\n\n{about}\n\n{COLUMNS}\n{'|---' * 6}|")
         rows = (_row(each) for each in fields.FIELDS if each.name.startswith(f"{part}."))
         lines += [*(f"| {' | '.join(row)} |" for row in rows), ""]
-    return "\n".join(lines)
+    lines.append("## Limits\n\n| field | refused | remedy |\n|---|---|---|")
+    lines += [f"| `{name}` | {' | '.join(words)} |" for name, words in LIMITS.items()]
+    return "\n".join(lines) + "\n"
 
 
 def _row(quantity: Quantity) -> list[str]:

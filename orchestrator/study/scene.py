@@ -119,7 +119,8 @@ class Scene(parts.Part):
         off, what = abs(median / d - 1) > slack, f"the d50 of grain.sizes is {median:.6g} m"
         yield off, "grain.diameter", what, "write that, or change the cut-offs"
         what = f"the largest grain is {high / low:.3g} times the smallest"
-        yield high / low > LARGEST_RATIO, "grain.sizes", what, f"at most {LARGEST_RATIO:g}"
+        most = f"merge classes until it is at most {LARGEST_RATIO:g} times"
+        yield high / low > LARGEST_RATIO, "grain.sizes", what, most
 
     def _rules_of_bed(self, bed: PileBed) -> Iterator[Rule]:
         d, profile, slope, shape = self.grain.diameter, bed.profile, bed.slope_deg, bed.shape
