@@ -57,8 +57,8 @@ LIMITS = {
         "merge the finest or the coarsest classes of the sieve",
     ),
     "bed.profile": (
-        f"a bed of more than {scene.MOST_GRAINS:g} grains or {profile.MOST_CORNERS} points, a slope "
-        f"above {profile.STEEPEST_DEG:g}°, points nearer than {scene.NARROWEST_OVER_D:g} d or "
+        f"more than {scene.MOST_GRAINS:g} grains or {profile.MOST_CORNERS} points, a slope above "
+        f"{profile.STEEPEST_DEG:g}°, points nearer than {scene.NARROWEST_OVER_D:g} d or "
         f"{scene.NARROWEST_OVER_CELL:g} of the first cell",
         "another method, or a shorter bed; smooth it",
     ),
