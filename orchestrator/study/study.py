@@ -111,7 +111,7 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     text = read_text(path, MOST_BYTES, source)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
-    study = replace(parse(text, name=name, where=source), file=str(path.absolute()))
+    study = replace(parse(text, name=name, where=str(path)), file=str(path.absolute()))
     return study if tolerance is None else replace(study, tolerance=tolerance)
 
 

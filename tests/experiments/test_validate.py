@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.bed.packing import Packing
 from orchestrator.experiments import validate
+from orchestrator.flow.stress import WallStress
 from orchestrator.physics.curves import Air, iversen_white
 
 
@@ -46,3 +47,11 @@ def test_the_paper_has_no_answer_in_the_transition() -> None:
     beds = pd.DataFrame({"d_m": [1e-5, 1e-3, 1e-2], **water, "slope": 0.0, "cohesion_n_m": 0.0})
     shields = validate.by_paper(beds)
     assert np.isnan(shields).tolist() == [False, True, False]
+
+
+def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:
+    x, cf, ones = pd.read_csv(validate.FOLDER / "hump_stress.csv").to_numpy().T
+    # in other units, at the same places
+    stress = WallStress(x * 0.42, x * 0.42, ones, ones, ones, 300 * cf, ones, ones)
+    rows = validate.over_hump(stress)
+    assert rows["value"].to_numpy() == pytest.approx(rows["measured"].to_numpy(), rel=1e-9)
