@@ -27,9 +27,10 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
 
 
 def test_a_score_is_of_rows_that_were_read_alone() -> None:
-    ratio, sure = [0.5, 2.0, 4.0, 100.0, np.nan], ["read", "read", "read", "memory", "read"]
-    rows = pd.DataFrame({"set": "a", "model": "m", "ratio": ratio, "sure": sure})
-    (score,) = validate.scores(rows).to_dict("records")
+    rows = pd.DataFrame({"set": "a", "model": "m", "ratio": [0.5, 2.0, 4.0, 100.0, np.nan]})
+    (score,) = validate.scores(rows.assign(sure=["read"] * 3 + ["memory", "read"])).to_dict(
+        "records"
+    )
     assert (score["rows"], score["answered"]) == (4, 3)
     assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
 
