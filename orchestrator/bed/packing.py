@@ -432,17 +432,23 @@ def exposed(centres: FloatArray, tangents: FloatArray, slack: float = 0.0) -> Bo
     return np.asarray(np.bincount(first[hidden], minlength=len(centres)) == 0)
 
 
-def unshadowed(along: Places, height: FloatArray, radii: FloatArray) -> BoolArray:
-    """Which grains of any sizes are exposed.
+def shadows(along: Places, height: FloatArray, radii: FloatArray) -> tuple[IntArray, IntArray]:
+    """Pairs of grains of any sizes: one that is hidden, and one that hides it.
 
-    A grain is exposed when the line through its centre, normal to the bed, meets no other grain
+    A grain is hidden where the line through its centre, normal to the bed, meets another grain
     whose centre lies higher. `along` has the place of each along the bed and across the flow, its
     third coordinate is 0; `height` is over the bed line.
     """
     first, second, apart = along.pairs(float(radii.max()) + TIE)
     hidden = np.linalg.norm(apart, axis=1) <= radii[second] + TIE
     hidden &= height[second] > height[first] + TIE
-    return np.asarray(np.bincount(first[hidden], minlength=len(height)) == 0)
+    return first[hidden], second[hidden]
+
+
+def unshadowed(along: Places, height: FloatArray, radii: FloatArray) -> BoolArray:
+    """Which grains of any sizes no other hides; arguments as in `shadows`."""
+    hidden, _ = shadows(along, height, radii)
+    return np.asarray(np.bincount(hidden, minlength=len(height)) == 0)
 
 
 def _rests(centres: FloatArray) -> BoolArray:

@@ -19,7 +19,7 @@ from orchestrator.errors import InputError, Noisy, SolverError
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.parts import LogNormal, Range, Sizes
-from orchestrator.types import FloatArray
+from orchestrator.types import BoolArray, FloatArray
 
 HEAP = 2.0
 """Height of the grains over the line that are cut away, d."""
@@ -320,16 +320,16 @@ def read(
     )
 
 
-def standing(packing: Packing, line: BedLine) -> FloatArray:
+def standing(
+    along: FloatArray, height: FloatArray, sizes: FloatArray, exposed: BoolArray
+) -> FloatArray:
     """How much higher each grain's lowest point lies than that of a mean exposed grain, d, (n,).
 
-    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d.
+    The mean is that of the exposed centres within `LOCAL` along the bed, less half of d. `along`
+    and `height` have the centres' places along the bed line and over it.
     """
-    segment, along = line.nearest(packing.centres)
-    height = line.over(packing.centres, segment)
-    shown = packing.windward | packing.lee
-    order = np.argsort(along[shown], kind="stable")
-    place, sums = along[shown][order], np.append(0, np.cumsum(height[shown][order]))
+    order = np.argsort(along[exposed], kind="stable")
+    place, sums = along[exposed][order], np.append(0, np.cumsum(height[exposed][order]))
     first, last = (np.searchsorted(place, along + side * LOCAL) for side in (-1, 1))
     level = (sums[last] - sums[first]) / np.maximum(last - first, 1)
-    return np.asarray(np.where(shown, height - packing.sizes / 2 - (level - 0.5), 0.0))
+    return np.asarray(np.where(exposed, height - sizes / 2 - (level - 0.5), 0.0))

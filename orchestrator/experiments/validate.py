@@ -8,6 +8,7 @@ answer hundreds of rows. Each set has the ratio of the model's value to the meas
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -110,12 +111,13 @@ class Strips:
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         answers = []
         for bed in self.geometries(fields, galileo, bond):
-            packed, scene, loading = bed.packing, bed.scene, bed.loads(self.cases).loading
+            packed, scene, loads = bed.packing, bed.scene, bed.loads(self.cases)
+            loading = loads.loading
             places = Places.of(packed.centres @ turn.T, packed.across, packed.width)
             ways = {"along": loading.along @ turn.T, "outward": loading.outward @ turn.T}
             ratio = np.where(packed.windward, loading.ratio, 0.0)
             turned = replace(loading, ratio=ratio, **ways)
-            ustar = peeling.pivots(places, packed.sizes, turned, bed.force_tables, scene.bond)
+            ustar = peeling.pivots(places, packed.sizes, turned, loads.tables, scene.bond)
             excess = (scene.grain.density - scene.fluid.density) * scene.fluid.gravity
             unit = excess * scene.grain.diameter / scene.fluid.density
             answers.append((ustar[packed.windward] ** 2 / unit, packed.sizes[packed.windward]))
@@ -211,16 +213,17 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
 
     level: Callable[[FloatArray], FloatArray] = np.zeros_like
     if fields.get("forces.sheltering") == "balanced":
-        shelter = sheltering.balanced(drag, packing, gaps, d, length=d, unit=unit, density=1.0)
-        level = shelter.levels[shelter.patch[0]]
+        patch, areas = sheltering.patches(packing, 1.0)
+        given = {"diameter": d, "unit": unit, "density": 1.0}
+        shelter = sheltering.balanced(drag, patch, ones, gaps, areas, **given)
+        level = partial(shelter.level, patch=patch[0])
     raised = gaps[0] if "forces.exposure" in fields else d / 30
 
     def around(ustar: FloatArray) -> Exposure:
         return Exposure(d, *fluid, gap=raised - level(ustar))
 
-    table = ForceTable(
-        lambda u: law.drag(u, around(u)), lambda u: law.lift(u, around(u)), submerged, unit
-    )
+    drags, lifts = (lambda u: law.drag(u, around(u)), lambda u: law.lift(u, around(u)))
+    (table,) = ForceTable.of(drags, lifts, np.array([submerged]), unit)
     pivot = np.arctan(np.sqrt(1 / 8)) if clear else np.radians(30)
     ustar = table.reaching(np.cos(pivot), np.sin(pivot), np.sin(pivot))
     return float(ustar**2 / galileo**2)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine, of_bed
-from orchestrator.bed.packing import APRON, Lattice, Packing
+from orchestrator.bed.packing import APRON, Lattice, Packing, Places
 from orchestrator.bed.poured import PouredBed
 from orchestrator.errors import InputError
 from orchestrator.flow.case import FlowCase
@@ -24,7 +24,7 @@ from orchestrator.physics.threshold import thresholds_of
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 TOE = 0.05
 """Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
@@ -169,52 +169,92 @@ class Geometry:
         return np.asarray(self.line.tangents[self.line.under(self.packing.centres)])
 
     @cached_property
-    def gaps(self) -> FloatArray:
+    def _placing(self) -> tuple[FloatArray, FloatArray]:
+        """Places of the n centres along the bed line, and their heights over it, d."""
+        segment, along = self.line.nearest(self.packing.centres)
+        return along, self.line.over(self.packing.centres, segment)
+
+    @cached_property
+    def _shadows(self) -> tuple[IntArray, IntArray]:
+        """Pairs of grains: one that is hidden, and one that hides it."""
+        packed, (along, height) = self.packing, self._placing
+        flat = np.column_stack([along, np.zeros_like(along)])
+        places = Places.of(flat, packed.places.xyz[:, 1], packed.width)
+        return packing.shadows(places, height, packed.sizes / 2)
+
+    @property
+    def is_balanced(self) -> bool:
+        """Whether the grains share the stress of the flow."""
+        return self.scene.forces.sheltering == "balanced"
+
+    def exposed(self, present: BoolArray) -> BoolArray:
+        """Which grains meet the flow while some are present, shape (n,).
+
+        Where the grains share its stress these are those, too, that others hid that have gone.
+        """
+        packed = self.packing
+        first = packed.windward | packed.lee
+        if not self.is_balanced or present.all():
+            return np.asarray(first & present)
+        (hidden, hiding), count = self._shadows, len(present)
+        freed = np.bincount(hidden, minlength=count) > 0
+        freed &= np.bincount(hidden[present[hiding]], minlength=count) == 0
+        return np.asarray((first | freed) & present)
+
+    def gaps(self, exposed: BoolArray) -> FloatArray:
         """Height of each grain's lowest point over the level where the flow begins, m, shape (n,).
 
         By `forces.exposure` it is z0, or follows from the grain's own height over the local bed.
         """
-        z0 = np.full(len(self.packing.sizes), self.bed.roughness)
+        z0 = np.full(len(exposed), self.bed.roughness)
         if self.scene.forces.exposure == "alike":
             return z0
-        return z0 + poured.standing(self.packing, self.line) * self.scene.grain.diameter
+        standing = poured.standing(*self._placing, self.packing.sizes, exposed)
+        return z0 + standing * self.scene.grain.diameter
 
     @cached_property
-    def shelter(self) -> Shelter | None:
-        """The level at which the flow begins on each patch, where the grains share its stress."""
-        scene, packed = self.scene, self.packing
-        if scene.forces.sheltering == "none":
-            return None
-        d, unit = scene.grain.diameter, float(closed_form(scene).friction_velocity)
+    def patches(self) -> tuple[IntArray, FloatArray]:
+        """Number of each grain's patch, and the areas of the patches, d^2."""
+        relief = self.bed.relief / self.scene.grain.diameter
+        length = max(1.0, self.scene.forces.averaging_length * relief)
+        return sheltering.patches(self.packing, length)
+
+    def sheltered(self, exposed: BoolArray, chosen: BoolArray) -> Shelter:
+        """The levels at which the flow begins on the patches of some of the exposed grains."""
+        scene, (patch, areas), d = self.scene, self.patches, self.scene.grain.diameter
 
         def drag(ustar: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
             return forces(scene, sizes, gaps)[0](ustar)
 
-        length = max(1.0, scene.forces.averaging_length * self.bed.relief / d)
-        fluid = {"unit": unit, "density": scene.fluid.density}
-        return sheltering.balanced(drag, packed, self.gaps, d, length=length, **fluid)
+        given = patch[chosen], self.packing.sizes[chosen], self.gaps(exposed)[chosen]
+        unit, density = float(closed_form(scene).friction_velocity), scene.fluid.density
+        return sheltering.balanced(
+            drag, *given, areas * d**2, diameter=d, unit=unit, density=density
+        )
 
-    @cached_property
-    def force_tables(self) -> list[ForceTable]:
-        """Force table of each of the n grains, over its own weight.
+    def force_tables(self, exposed: BoolArray, only: int | None = None) -> dict[int, ForceTable]:
+        """Force tables of exposed grains that may move, over their own weight, by their numbers.
 
-        Grains that the flow does not push share one table, that of diameter d; it is never used.
+        `only` those on the patch of one grain.
         """
         scene, unit = self.scene, float(closed_form(self.scene).friction_velocity)
-        pushed = self.packing.pushed
-        sizes = np.where(pushed, self.packing.sizes, 1.0).tolist()
-        gaps = np.where(pushed, self.gaps, self.gaps[0]).tolist()
-        shelter, levels = self.shelter, [np.zeros_like] * len(sizes)
-        if shelter is not None:
-            of_patch = [*shelter.levels, np.zeros_like]  # -1 is the last
-            levels = [of_patch[number] for number in shelter.patch.tolist()]
-        kinds = list(zip(sizes, gaps, levels, strict=True))
-        places = PLACES if len(set(kinds)) <= KINDS else FEWER
-        tables = {
-            kind: ForceTable(*forces(scene, *kind), scene.weight * kind[0] ** 3, unit, places)
-            for kind in set(kinds)
-        }
-        return [tables[kind] for kind in kinds]
+        patch, _ = self.patches if self.is_balanced else (np.zeros(len(exposed), int), None)
+        chosen = exposed if only is None else exposed & (patch == patch[only])
+        pushed = chosen & self.packing.mobile
+        columns = self.packing.sizes, self.gaps(exposed), patch
+        rows = np.column_stack([column[pushed] for column in columns])
+        kinds, place = np.unique(rows, axis=0, return_inverse=True)
+        sizes, gaps, patch = kinds[:, :1], kinds[:, 1:2], kinds[:, 2:].astype(int)
+        level: Force = np.zeros_like
+        table = (PLACES if len(kinds) <= KINDS else FEWER, peeling.RANGE)
+        if self.is_balanced:
+            # at the very friction velocities of the tables
+            known = self.sheltered(exposed, chosen).levels.T[patch[:, 0]]
+            level, table = lambda _: known, (sheltering.PLACES, sheltering.RANGE)
+        laws = forces(scene, sizes, gaps, level)
+        tables = ForceTable.of(*laws, scene.weight * sizes[:, 0] ** 3, unit, *table)
+        each = zip(np.flatnonzero(pushed).tolist(), place.tolist(), strict=True)
+        return {number: tables[kind] for number, kind in each}
 
     @cached_property
     def pivot_angles_deg(self) -> FloatArray:
@@ -226,8 +266,13 @@ class Geometry:
         angles = peeling.pivot_angles_deg(packed.places, packed.sizes, self.tangents)
         return np.asarray(angles[packed.windward])
 
-    def under(self, stress: WallStress, line: BedLine | None = None) -> "Loads":
-        """The grains under the stress along the bed line, or along the line it has worn down to."""
+    def under(
+        self, stress: WallStress, line: BedLine | None = None, present: BoolArray | None = None
+    ) -> "Loads":
+        """The grains under the stress along the bed line, or along the line it has worn down to.
+
+        `present`, shape (n,), has the grains that have not left yet; by default all.
+        """
         how, d = self.scene.forces, self.scene.grain.diameter
         length = max(d, how.averaging_length * self.bed.relief)
         s = self.packing.arc_length
@@ -235,7 +280,8 @@ class Geometry:
             x = np.interp(s, self.line.arc_lengths, self.line.x)
             s = np.interp(x, line.x, line.arc_lengths)
         tau = stress.mean_over(s * d, length, how.stress)
-        return Loads(self, np.where(self._unloaded, 0, np.sign(tau) * np.sqrt(np.abs(tau))))
+        ratio = np.where(self._unloaded, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
+        return Loads(self, ratio, np.ones(len(ratio), bool) if present is None else present)
 
     def loads(self, cases: Path) -> "Loads":
         """The grains under the flow of the whole bed, from the directory of the finished runs."""
@@ -256,22 +302,38 @@ class Geometry:
 class Loads:
     """The n grains of a bed under a flow, and the flows at which they move by their geometry.
 
-    `ratio`, (n,), is the signed friction velocity of the mean stress around each over u*_0.
+    `ratio`, (n,), is the signed friction velocity of the mean stress around each over u*_0;
+    `present`, (n,), has those that have not left yet.
     """
 
     geometry: Geometry
     ratio: FloatArray
+    present: BoolArray
+
+    @cached_property
+    def exposed(self) -> BoolArray:
+        """Which grains meet the flow, shape (n,)."""
+        return self.geometry.exposed(self.present)
 
     @cached_property
     def loading(self) -> Loading:
         """The forces on the grains: exposed ones that may move carry one."""
-        bed, packed = self.geometry, self.geometry.packing
-        level = bed.shelter.of_grains if bed.shelter else np.zeros_like
-        drag, lift = forces(bed.scene, packed.sizes, bed.gaps, level)
+        bed = self.geometry
+        level: Force = np.zeros_like
+        if bed.is_balanced:
+            patch, shelter = bed.patches[0], bed.sheltered(self.exposed, self.exposed)
+            level = partial(shelter.level, patch=patch)
+        drag, lift = forces(bed.scene, bed.packing.sizes, bed.gaps(self.exposed), level)
         normals = np.column_stack([-bed.tangents[:, 1], bed.tangents[:, 0]])
         # a gust acts everywhere alike
-        ratio = np.where(packed.pushed, self.ratio * np.sqrt(bed.scene.gust), 0.0)
+        carries = self.exposed & bed.packing.mobile
+        ratio = np.where(carries, self.ratio * np.sqrt(bed.scene.gust), 0.0)
         return Loading(drag, lift, ratio, bed.tangents, normals)
+
+    @cached_property
+    def tables(self) -> dict[int, ForceTable]:
+        """Force tables of the exposed grains that may move, by their numbers."""
+        return self.geometry.force_tables(self.exposed)
 
     @property
     def along(self) -> FloatArray:
@@ -293,17 +355,17 @@ class Loads:
         if bed.pouring:
             places, sizes = bed.packing.places, bed.packing.sizes
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
-            flows = peeling.pivots(places, sizes, loading, bed.force_tables, bed.scene.bond)
+            flows = peeling.pivots(places, sizes, loading, self.tables, bed.scene.bond)
             return np.asarray(flows[counted])
         slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
         slopes = np.where(speed < 0, -slopes, slopes)
-        threshold = self._sheltered(slopes) if bed.shelter else on_slopes(bed.scene, slopes)
+        threshold = self._sheltered(slopes) if bed.is_balanced else on_slopes(bed.scene, slopes)
         return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
 
     def _sheltered(self, slopes_deg: FloatArray) -> FloatArray:
         """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope."""
         bed, scene = self.geometry, self.geometry.scene
-        beta, tables = np.radians(scene.pocket_angle_deg), bed.force_tables
+        beta, tables = np.radians(scene.pocket_angle_deg), self.tables
         goals = np.cos(np.radians(slopes_deg) - beta) + scene.bond * np.sin(2 * beta)
         arms = float(np.sin(beta)), float(np.cos(beta))
         numbers = np.flatnonzero(bed.packing.windward)
@@ -311,15 +373,25 @@ class Loads:
         local = [tables[number].reaching(*arms, goal) for number, goal in each]
         return np.asarray(np.array(local) / np.sqrt(scene.gust))
 
-    def leaving(self, present: BoolArray | None = None) -> FloatArray:
+    def leaving(self) -> FloatArray:
         """Undisturbed friction velocity at which each counted grain leaves by peeling, m/s, (N,).
 
-        `present`, shape (n,), has the grains that have not left yet; by default all.
+        Where the grains share the stress, those that are left share it anew after each that leaves;
+        under DEM, whose forces a run keeps, they do not.
         """
-        bed, packed = self.geometry, self.geometry.packing
-        criterion = bed.scene.protocol.displacement_criterion
-        given = packed.places, packed.sizes, self.loading, bed.force_tables
-        flows = peeling.flows(*given, criterion, present, bed.scene.bond)
+        bed, packed, loading, renew = self.geometry, self.geometry.packing, self.loading, None
+        if bed.is_balanced and bed.scene.protocol.method == "peeling":
+            there = self.present.copy()
+            ratio = np.where(packed.mobile, self.ratio * np.sqrt(bed.scene.gust), 0.0)
+            loading = replace(loading, ratio=ratio)
+
+            def renew(gone: int) -> dict[int, ForceTable]:
+                there[gone] = False
+                return bed.force_tables(bed.exposed(there), gone)
+
+        given = packed.places, packed.sizes, loading, self.tables
+        criterion, bond = bed.scene.protocol.displacement_criterion, bed.scene.bond
+        flows = peeling.flows(*given, criterion, self.present, bond, renew, packed.windward)
         return np.asarray(flows[packed.windward])
 
     def row_hold(self) -> float:

@@ -12,7 +12,7 @@ the deck; rolling needs no friction.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -34,6 +34,8 @@ FLAT = 1e-9
 Place = tuple[float, float]
 Force = Callable[[FloatArray], FloatArray]
 """Size of a force (N) at local friction velocities (m/s) of at least 0."""
+Renew = Callable[[int], "Mapping[int, ForceTable]"]
+"""Tables of the grains whose forces change when a grain, by its number, has left."""
 
 RANGE = 1e-4, 1e4
 """Local friction velocities of a table of forces, over that at which a grain goes by itself."""
@@ -71,23 +73,39 @@ class Loading:
 
 
 class ForceTable:
-    """Drag and lift over the weight (N), tabulated so that thousands of grains ask in turn.
+    """Drag and lift over the weight, tabulated so that thousands of grains ask in turn.
 
     Between its places each is a power of the friction velocity times a small correction, a cubic
-    spline of the logarithms: with all places it reproduces the force laws within 1e-12. `unit` is
-    the friction velocity in the middle of the table, m/s.
+    spline of the logarithms: with all places it reproduces the force laws within 1e-12.
     """
 
-    def __init__(
-        self, drag: Force, lift: Force, weight: float, unit: float, places: int = PLACES
-    ) -> None:
-        ustar = unit * np.geomspace(*RANGE, places)
-        self._log_ustar = np.log(ustar)
-        self._forces = np.array([drag(ustar), lift(ustar)]) / weight
+    def __init__(self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray) -> None:
+        self._log_ustar, self._forces, self._pieces = log_ustar, forces, pieces
+
+    @classmethod
+    def of(
+        cls,
+        drag: Force,
+        lift: Force,
+        weights: FloatArray,
+        unit: float,
+        places: int = PLACES,
+        span: tuple[float, float] = RANGE,
+    ) -> "list[ForceTable]":
+        """The tables of n grains; the weights (N) are of the shape (n,).
+
+        Drag and lift are laws that take friction velocities of the shape (places,) for all grains,
+        and give forces (N) of the shape (n, places) or alike for all. `unit` is the friction
+        velocity in the middle of the tables, m/s, `span` has their ends over it.
+        """
+        ustar = unit * np.geomspace(*span, places)
+        each = (np.broadcast_to(law(ustar), (len(weights), places)) for law in (drag, lift))
+        forces = np.stack(list(each), axis=1) / weights[:, None, None]
         # a law without lift has none anywhere
-        logs = np.log(np.where(self._forces > 0, self._forces, 1e-300))
-        pieces = CubicSpline(self._log_ustar, logs, axis=1).c
-        self._pieces = pieces.transpose(1, 2, 0).copy()
+        logs = np.log(np.where(forces > 0, forces, 1e-300))
+        pieces = CubicSpline(np.log(ustar), logs, axis=2).c.transpose(2, 1, 3, 0)
+        given = zip(forces, np.ascontiguousarray(pieces), strict=True)
+        return [cls(np.log(ustar), *values) for values in given]
 
     def reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
         """The local friction velocity at which drag and lift times their arms reach a goal, m/s.
@@ -133,20 +151,21 @@ class _Roller:
 
     start: Disc
     others: dict[int, Disc]
-    table: ForceTable
     ratio: float
     along: Sequence[float]
     outward: Sequence[float]
     bond: float = 0.0
 
-    def flow_over(self, place: Place, pivot: Disc, numbers: Iterable[int]) -> float:
+    def flow_over(
+        self, place: Place, pivot: Disc, numbers: Iterable[int], table: ForceTable
+    ) -> float:
         """The flow (u*_0) at which the resultant passes through a contact: no moment about it."""
         lean = _lean(place, pivot[:2])
         x, z = math.cos(lean), math.sin(lean)
         drag_arm = self.along[0] * x + self.along[1] * z
         lift_arm = self.outward[0] * x + self.outward[1] * z
         goal = z + (self._held(place, lean, numbers) if self.bond else 0.0)
-        return self.table.reaching(drag_arm, lift_arm, goal) / self.ratio
+        return table.reaching(drag_arm, lift_arm, goal) / self.ratio
 
     def _held(self, place: Place, lean: float, numbers: Iterable[int]) -> float:
         """Moment over weight and radius with which contacts pull a grain back from its pivot."""
@@ -158,7 +177,9 @@ class _Roller:
                 moment += pull * math.sin(lean - _lean(place, other[:2]))
         return moment
 
-    def way(self, numbers: Sequence[int], criterion: float) -> tuple[float, list[int]]:
+    def way(
+        self, numbers: Sequence[int], table: ForceTable, criterion: float
+    ) -> tuple[float, list[int]]:
         """The least flow that takes it to the criterion, and the neighbours that it rolls over."""
         place, pivot = self.start[:2], _foremost(self.start, self.others, numbers)
         flow, rolled = 0.0, []
@@ -166,7 +187,7 @@ class _Roller:
             rolled.append(pivot)
             if len(rolled) > STEPS:
                 return math.inf, rolled
-            flow = max(flow, self.flow_over(place, self.others[pivot], numbers))
+            flow = max(flow, self.flow_over(place, self.others[pivot], numbers, table))
             met = self._next(place, self.others[pivot], numbers)
             if met is None or math.isinf(flow):
                 break
@@ -210,39 +231,50 @@ def flows(
     places: Places,
     sizes: FloatArray,
     loading: Loading,
-    tables: Sequence[ForceTable],
+    tables: Mapping[int, ForceTable],
     criterion: float,
     present: BoolArray | None = None,
     bond: float = 0.0,
+    renew: Renew | None = None,
+    wanted: BoolArray | None = None,
 ) -> FloatArray:
     """The flow (u*_0, m/s) at which each of n grains in one plane leaves by peeling, shape (n,).
 
     It is infinite for grains that never leave. The places and the diameters, shape (n,), are in one
-    unit of length; grains that carry a force may leave; each has a table of its force law over its
-    own submerged weight. The criterion is the displacement along the bed that counts as motion, of
-    the grain's own diameter. `present`, shape (n,), has the grains that have not left yet; by
-    default all. `bond` is the pull of a contact between two grains of d over their weight.
+    unit of length; grains that have a table, by their numbers, may leave: it is that of their force
+    law over their own submerged weight. The criterion is the displacement along the bed that counts
+    as motion, of the grain's own diameter. `present`, shape (n,), has the grains that have not left
+    yet; by default all. `bond` is the pull of a contact between two grains of d over their weight.
+    `renew` gives the tables that change when a grain has left. The search ends when the `wanted`
+    grains, shape (n,), have left; by default all.
     """
     present = np.ones(len(sizes), bool) if present is None else present.copy()
-    rollers = dict(_rollers(places, sizes, loading, tables, present, bond))
+    rollers, known = dict(_rollers(places, sizes, loading, present, bond)), dict(tables)
     left, next_flow = np.full(len(sizes), np.inf), np.full(len(sizes), np.inf)
     ways: dict[int, list[int]] = {}
 
     def sample(i: int) -> None:
         numbers = [k for k in rollers[i].others if present[k]]
-        next_flow[i], ways[i] = rollers[i].way(numbers, criterion)
+        next_flow[i], ways[i] = rollers[i].way(numbers, known[i], criterion)
 
-    for i in rollers:
+    for i in rollers.keys() & known:
         sample(i)
     reached = 0.0
-    while np.isfinite(lowest := float(next_flow.min())):
+    asked = slice(None) if wanted is None else wanted
+    while present[asked].any() and np.isfinite(lowest := float(next_flow.min())):
         i = int(next_flow.argmin())
         # a grain that is freed late leaves at once
         reached = max(reached, lowest)
         left[i], next_flow[i], present[i] = reached, np.inf, False
-        for k in rollers[i].others:
-            # only neighbours whose rolling path crossed grain i are affected by its departure
-            if k in rollers and present[k] and i in ways[k]:
+        # only neighbours whose rolling path crossed grain i are affected by its departure, and
+        # those that now bear another force
+        affected = {k for k in rollers[i].others if i in ways.get(k, ())}
+        if renew is not None:
+            changed = renew(i)
+            known |= changed
+            affected |= changed.keys()
+        for k in affected:
+            if k in rollers and present[k]:
                 sample(k)
     return left
 
@@ -251,7 +283,7 @@ def pivots(
     places: Places,
     sizes: FloatArray,
     loading: Loading,
-    tables: Sequence[ForceTable],
+    tables: Mapping[int, ForceTable],
     bond: float = 0.0,
 ) -> FloatArray:
     """The flow at which each grain by itself begins to roll; arguments and result as in `flows`.
@@ -261,11 +293,13 @@ def pivots(
     least = np.full(len(sizes), np.inf)
     pushed = loading.ratio != 0
     if not places.width:
-        for i, roller in _rollers(places, sizes, loading, tables, pushed, bond):
+        for i, roller in _rollers(places, sizes, loading, pushed, bond):
             pivot = _foremost(roller.start, roller.others, roller.others)
-            start = roller.start[:2]
-            near = roller.others
-            least[i] = 0.0 if pivot is None else roller.flow_over(start, near[pivot], near)
+            start, near = roller.start[:2], roller.others
+            if pivot is None:
+                least[i] = 0.0
+            else:
+                least[i] = roller.flow_over(start, near[pivot], near, tables[i])
         return least
     for i, sides, held in _pyramids(places, sizes, pushed):
         ratio = float(loading.ratio[i])
@@ -310,7 +344,6 @@ def _rollers(
     places: Places,
     sizes: FloatArray,
     loading: Loading,
-    tables: Sequence[ForceTable],
     chosen: BoolArray,
     bond: float,
 ) -> Iterator[tuple[int, _Roller]]:
@@ -323,7 +356,7 @@ def _rollers(
         along = [float(loading.along[i, 0]), side * float(loading.along[i, 1])]
         outward = [side * float(loading.outward[i, 0]), float(loading.outward[i, 1])]
         others = {k: discs[k] for k in near}
-        yield i, _Roller(discs[i], others, tables[i], abs(ratio), along, outward, bond)
+        yield i, _Roller(discs[i], others, abs(ratio), along, outward, bond)
 
 
 def _discs(places: Places, sizes: FloatArray, side: float) -> list[Disc]:

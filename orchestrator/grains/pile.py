@@ -113,7 +113,7 @@ class WornFlow(Case):
     run: Case | None
     kind: ClassVar[str] = "worn"
     template: ClassVar[str] = FlowCase.template
-    recipe: ClassVar[int] = FlowCase.recipe
+    recipe: ClassVar[int] = FlowCase.recipe + 1
     results: ClassVar[tuple[str, ...]] = FlowCase.results
     derived: ClassVar[tuple[str, ...]] = FlowCase.derived
     bulky: ClassVar[tuple[str, ...]] = FlowCase.bulky
@@ -197,8 +197,10 @@ def line(geometry: Geometry, flow: Flow, cases: Path) -> BedLine:
 def _loads(geometry: Geometry, flow: Flow, cases: Path) -> Loads:
     """The grains in the round of a flow."""
     stress = WallStress.from_csv(cases / flow.name / WALL_STRESS)
-    worn = line(geometry, flow, cases) if isinstance(flow, WornFlow) else None
-    return geometry.under(stress, worn)
+    if not isinstance(flow, WornFlow):
+        return geometry.under(stress)
+    worn = line(geometry, flow, cases), grains(geometry, flow, cases).present
+    return geometry.under(stress, *worn)
 
 
 def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
@@ -207,7 +209,7 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     windward = geometry.packing.windward
     reached = worn.left[np.isfinite(worn.left)].max(initial=0.0)
     flows = np.full(len(windward), np.inf)
-    flows[windward] = np.maximum(loads.leaving(worn.present), reached)
+    flows[windward] = np.maximum(loads.leaving(), reached)
     flows[~worn.present] = np.inf
     least = goal(geometry, flow) - worn.moved
     # those that one grain frees at its flow leave with it
@@ -263,7 +265,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 12
+    recipe: ClassVar[int] = 13
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
 
     @cached_property
@@ -319,7 +321,7 @@ class PileCase(GrainCase):
         else:
             reached = float(Motion.from_csv(cases / self.before.name).flow[-1])
             # the run goes on from the flow that the one before has reached
-            thresholds, step = loads.leaving(worn.present), rules.load_increment
+            thresholds, step = loads.leaving(), rules.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
             rising = deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
         packed = geometry.packing
@@ -415,7 +417,7 @@ def table(loads: Loads, worn: Worn) -> GrainTable:
     geometry, packed = loads.geometry, loads.geometry.packing
     grain = geometry.scene.grain
     kind = np.select(
-        [~worn.present, ~packed.mobile, packed.windward, packed.lee],
+        [~worn.present, ~packed.mobile, packed.windward, loads.exposed],
         [deck.GONE, deck.FIXED, deck.COUNTED, deck.PUSHED],
         deck.MOBILE,
     )
@@ -581,7 +583,7 @@ class Pile(Geometry):
         """
         ratio = np.zeros(len(self.packing.sizes))
         ratio[self.packing.windward] = speed
-        return np.sort(Loads(self, ratio).alone())
+        return np.sort(Loads(self, ratio, np.ones(len(ratio), bool)).alone())
 
     def motion(self, cases: Path) -> Motion:
         """Motion of the counted grains; `cases` is the directory of the finished runs."""

@@ -5,10 +5,14 @@ would add up to several times the stress of the flow. So on each patch of the be
 the flow begins is raised until they do not: ``sum of drag_i(u*, gap_i - level) = tau x area``. The
 level is the only unknown. Grains that stand clear keep most of their drag, those between them lose
 it. Where the drags do not reach the stress, as on a grain alone on a plane, nothing changes.
+
+A patch is a stretch of the bed that stays. When one of its grains has gone, those that it hid are
+exposed and take part in a new balance.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,34 +25,31 @@ from orchestrator.types import FloatArray, IntArray
 GRAINS = 10
 """Fewest exposed grains of a patch. From 3 to all 200 grains of a strip in one patch, its
 thresholds at 5 to 20 % of the grains move by up to 12 %."""
-RANGE, PLACES = (1e-4, 1e4), 161
-"""Local friction velocities between which a level is known, over one of their middle."""
+RANGE, PLACES = (1e-2, 1e2), 81
+"""Local friction velocities between which a level is known, over one of their middle; beyond them
+it stays as it is there. Between two places the drags add up to the stress within 1e-4."""
 Drag = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """Drag (N) at a local friction velocity (m/s) on grains of sizes (d) and gaps (m)."""
 
 
 def patches(packing: Packing, length: float) -> tuple[IntArray, FloatArray]:
-    """Divide the exposed grains of a bed into patches, one after another along it.
+    """Divide a bed into patches, one after another along it.
 
     Parameters
     ----------
     packing : Packing
         The bed, n grains.
     length : float
-        Least length of a patch, d; it has at least `GRAINS` grains, too.
+        Least length of a patch, d; it has at least `GRAINS` exposed grains, too.
 
     Returns
     -------
     patch : ndarray, shape (n,)
-        Number of each grain's patch; -1 of a grain that is not exposed.
+        Number of each grain's patch.
     area : ndarray, shape (patches,)
         Area of bed that each patch has, d^2. In one plane the bed is one d wide.
     """
-    exposed = np.flatnonzero(packing.windward | packing.lee)
-    s = packing.arc_length[exposed]
-    order = np.argsort(s, kind="stable")
-    s, exposed = s[order], exposed[order]
-    patch = np.full(len(packing.sizes), -1)
+    s = np.sort(packing.arc_length[packing.windward | packing.lee])
     # half of the way to the next grain belongs to each
     middle = (s[1:] + s[:-1]) / 2
     alone = len(s) < 2
@@ -59,50 +60,42 @@ def patches(packing: Packing, length: float) -> tuple[IntArray, FloatArray]:
         enough = i - begun >= GRAINS and edges[i] - edges[begun] >= length
         if enough and len(s) - i >= GRAINS and edges[-1] - edges[i] >= length:
             starts.append(i)
-    for number, (begin, end) in enumerate(zip(starts, [*starts[1:], len(s)], strict=True)):
-        patch[exposed[begin:end]] = number
+    patch = np.searchsorted(edges[starts[1:]], packing.arc_length, side="right")
     return patch, np.diff(edges[[*starts, len(s)]]) * (packing.width or 1.0)
-
-
-class Level:
-    """The level (m) over the bed's own at which the flow begins, of local u* (m/s): a table."""
-
-    def __init__(self, ustar: FloatArray, level: FloatArray) -> None:
-        self._spline = CubicSpline(np.log(ustar), level)
-
-    def __call__(self, ustar: ArrayLike) -> FloatArray:
-        """The level at some friction velocities, in their shape."""
-        return np.asarray(self._spline(np.log(ustar)))
 
 
 @dataclass(frozen=True)
 class Shelter:
-    """The level at which the flow begins on each patch of a bed with n grains.
+    """The level at which the flow begins on each patch of a bed.
 
-    `patch`, shape (n,), has the number of each grain's patch in `levels`; -1 of a grain that is not
-    exposed.
+    `levels`, m, shape (places, patches), are those at the local friction velocities `ustar`, m/s.
     """
 
-    patch: IntArray
-    levels: tuple[Level, ...]
+    ustar: FloatArray
+    levels: FloatArray
 
-    def of_grains(self, ustar: ArrayLike) -> FloatArray:
-        """Level (m) for each grain at its own local friction velocity (m/s), shape (n,)."""
-        local = np.broadcast_to(np.asarray(ustar, float), self.patch.shape)
-        level = np.zeros(len(self.patch))
-        for number, each in enumerate(self.levels):
-            chosen = self.patch == number
-            level[chosen] = each(local[chosen])
-        return level
+    @cached_property
+    def _pieces(self) -> FloatArray:
+        """Coefficients of the splines of ln u*, shape (4, places - 1, patches)."""
+        return np.asarray(CubicSpline(np.log(self.ustar), self.levels).c)
+
+    def level(self, ustar: ArrayLike, patch: ArrayLike) -> FloatArray:
+        """Level over the bed's own (m) at local friction velocities (m/s) on patches."""
+        known = np.clip(ustar, self.ustar[0], self.ustar[-1])
+        place = np.clip(np.searchsorted(self.ustar, known) - 1, 0, len(self.ustar) - 2)
+        a, b, c, d = self._pieces[:, place, np.asarray(patch)]
+        x = np.log(known / self.ustar[place])
+        return np.asarray(((a * x + b) * x + c) * x + d)
 
 
 def balanced(
     drag: Drag,
-    packing: Packing,
+    patch: IntArray,
+    sizes: FloatArray,
     gaps: FloatArray,
-    diameter: float,
+    areas: FloatArray,
     *,
-    length: float,
+    diameter: float,
     unit: float,
     density: float,
 ) -> Shelter:
@@ -112,50 +105,30 @@ def balanced(
     ----------
     drag : callable
         Drag (N) of a force law at local friction velocities (m/s), sizes (d) and gaps (m).
-    packing : Packing
-        The bed, n grains.
-    gaps : ndarray, shape (n,)
-        Height of each grain's lowest point over the bed's own level, m.
-    diameter, length : float
-        d, m; least length of a patch, d.
-    unit, density : float
-        Middle of the local friction velocities, m/s; fluid density, kg/m3.
+    patch, sizes, gaps : ndarray, shape (n,)
+        Of each exposed grain: number of its patch, diameter (d), height of its lowest point over
+        the bed's own level (m).
+    areas : ndarray, shape (patches,)
+        Area of each patch, m2.
+    diameter, unit, density : float
+        d, m; middle of the local friction velocities, m/s; fluid density, kg/m3.
     """
-    patch, areas = patches(packing, length)
-    ustar = unit * np.geomspace(*RANGE, PLACES)
-    known: dict[tuple[bytes, ...], Level] = {}
-    levels = []
-    for number, area in enumerate(np.round(areas, 9)):
-        chosen = patch == number
-        sizes, heights = packing.sizes[chosen], gaps[chosen]
-        key = sizes.tobytes(), heights.tobytes(), area.tobytes()
-        if key not in known:
-            height = _level(drag, sizes, heights, density * area * diameter**2, diameter, ustar)
-            known[key] = Level(ustar, height)
-        levels.append(known[key])
-    return Shelter(patch, tuple(levels))
+    order = np.argsort(patch, kind="stable")
+    sizes, gaps = sizes[order], gaps[order]
+    known, starts, place = np.unique(patch[order], return_index=True, return_inverse=True)
+    ustar = unit * np.geomspace(*RANGE, PLACES)[:, None]
+    stress = density * ustar**2 * areas[known]
 
+    def excess(level: FloatArray) -> FloatArray:
+        """Of the root of the drags over that of the stress, which is almost straight."""
+        forces = drag(ustar, sizes, gaps - level[:, place])
+        return np.asarray(np.sqrt(np.add.reduceat(forces, starts, axis=1) / stress) - 1)
 
-def _level(
-    drag: Drag,
-    sizes: FloatArray,
-    gaps: FloatArray,
-    mass: float,
-    diameter: float,
-    ustar: FloatArray,
-) -> FloatArray:
-    """The level (m) at each u* at which the drags are `mass` (density x area) x u*^2, or 0."""
-
-    def excess(level: FloatArray, speed: FloatArray) -> FloatArray:
-        forces = drag(speed[:, None], sizes, gaps - level[:, None])
-        return np.asarray(forces.sum(axis=1) / (mass * speed**2) - 1)
-
-    top = float((gaps + sizes * diameter).max())
-    low, high = np.zeros_like(ustar), np.full_like(ustar, top)
-    level = np.zeros_like(ustar)
-    # an infinite area belongs to a grain alone
-    crowded = np.flatnonzero(excess(low, ustar) > 0)
-    if len(crowded):
-        speeds = ustar[crowded]
-        level[crowded] = root(lambda at: excess(at, speeds), low[crowded], high[crowded])
-    return level
+    levels = np.zeros((PLACES, len(areas)))
+    if len(known):
+        # at the top of its highest grain the flow misses a patch
+        top = np.maximum.reduceat(gaps + sizes * diameter, starts)
+        low, high = np.zeros_like(stress), np.broadcast_to(top, stress.shape)
+        crowded = excess(low) > 0
+        levels[:, known] = root(lambda at: np.where(crowded, excess(at), at), low, high)
+    return Shelter(ustar[:, 0], levels)

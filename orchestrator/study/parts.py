@@ -208,7 +208,7 @@ class Forces(Part):
     sheltering: Literal["none", "balanced"] = _pile("none", since=True)
     """how the exposed grains of a pile share the stress of the flow
     - none: each feels the flow as if it stood alone, as in the paper
-    - balanced: the flow begins where the drags on a patch of the bed add up to its stress"""
+    - balanced: drags on a patch add up to its stress, by peeling or updates anew as grains leave"""
 
 
 class Protocol(Part):

@@ -20,6 +20,9 @@ TURBULENT_FROM = 2000.0
 EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
 CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
 ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
+KEPT_TO = (
+    0.1  # n/N to which a balance of the whole bed does; at 0.3 theta is 2 to 3.5 times as high
+)
 SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these scatter alike: level rows or not; lifted grains collide or do not."""
 
@@ -113,6 +116,9 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {TURBULENT_FROM:g}"
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
+    is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
+    if row.get("sheltering") == "balanced" and not is_renewed and row["fraction"] > KEPT_TO + 1e-9:
+        yield f"kept balance: beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
     if pd.isna(error):
         yield "no interval: the error of its levels on such a pile is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):

@@ -39,7 +39,7 @@ def test_a_grain_feels_the_closed_forms_force_at_its_own_stress(
     exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
     np.testing.assert_allclose(loading.at(ustar0), [exact, [0, 0]], rtol=1e-12, atol=0)
     # and the table of forces finds the flow at which a moment is reached
-    ustar = ForceTable(drag, lift, 1e-5, 0.5).reaching(*arms, goal)
+    ustar = ForceTable.of(drag, lift, np.array([1e-5]), 0.5)[0].reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))
     assert moment / 1e-5 == pytest.approx(goal, rel=1e-10)
 

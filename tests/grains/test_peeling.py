@@ -31,12 +31,16 @@ def _law(lift: float) -> tuple[Force, Force]:
     return np.square, lambda ustar: lift * ustar**2
 
 
+def _tables(count: int, lift: float = 0.0, unit: float = 1.0) -> dict[int, ForceTable]:
+    return dict(enumerate(ForceTable.of(*_law(lift), np.ones(count), unit)))
+
+
 def _flows(
     centres: FloatArray, ratio: FloatArray, *, slope_deg: float = 0.0, lift: float = 0.0
 ) -> FloatArray:
     """The flow at which each grain leaves; those of a ratio of 0 feel none, and are fixed."""
     loading = Loading(*_law(lift), ratio, *_along(slope_deg, len(centres)))
-    tables = [ForceTable(*_law(lift), weight=1.0, unit=1.0)] * len(centres)
+    tables = {i: table for i, table in _tables(len(centres), lift).items() if ratio[i]}
     return peeling.flows(Places.of(centres), np.ones(len(centres)), loading, tables, 0.3)
 
 
@@ -45,7 +49,7 @@ def test_a_grain_of_another_size_leaves_at_the_angle_of_its_own_pocket(size: flo
     half = math.sqrt(((1 + size) / 2) ** 2 - 0.25)
     centres, sizes = np.array([[0.0, half], [-0.5, 0], [0.5, 0]]), np.array([size, 1.0, 1.0])
     loading = Loading(*_law(0.0), np.array([1.0, 0, 0]), *_along(0.0, 3))
-    bed = Places.of(centres), sizes, loading, [ForceTable(*_law(0.0), 1.0, 1.0)] * 3
+    bed = Places.of(centres), sizes, loading, _tables(3)
     alone, leaving = peeling.pivots(*bed)[0], peeling.flows(*bed, criterion=0.3)[0]
     assert leaving == alone == pytest.approx(math.sqrt(0.5 / half), rel=1e-9)
 
@@ -135,7 +139,7 @@ def _loading() -> Loading:
 
 def test_the_pyramid_of_three_contacts_is_the_closed_form() -> None:
     places, loading = _grains(), _loading()
-    tables = [ForceTable(*_law(0.0), 1.0, 0.5)] * len(loading.ratio)
+    tables = _tables(len(loading.ratio), unit=0.5)
     ustar = peeling.pivots(places, np.ones(len(tables)), loading, tables)[3::4]
     np.testing.assert_allclose(ustar**2, [_drag(turned) for turned in TURNED], rtol=1e-9)
     angles = peeling.pivot_angles_deg(places, np.ones(len(tables)), loading.along)[3::4]
