@@ -19,10 +19,10 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.physics.constants import KARMAN
-from orchestrator.study.closed_form import closed_form
+from orchestrator.study.closed_form import closed_form, outer_roughness
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import PileBed, extremes
-from orchestrator.study.scene import LEAST_WIDTH, Scene, default_first_cell_height
+from orchestrator.study.scene import CELLS_OVER_Z0, LEAST_WIDTH, Scene, default_first_cell_height
 from orchestrator.study.study import make_scene
 from orchestrator.types import FloatArray
 
@@ -92,7 +92,10 @@ class Level:
 
     def answer(self, scene: Scene) -> Scene:
         """The scene as this level answers it."""
-        return changed(scene, self.fields(scene))
+        fields = self.fields(scene)
+        if self.sets.get("flow.model", "flat") != "flat":
+            fields = {**fields, "flow.roughness": _outer_roughness(scene)}
+        return changed(scene, fields)
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
         """Whether the scene is on this level, or has numbers that are finer and all else alike."""
@@ -108,7 +111,7 @@ class Level:
         fields, bed = {**self.sets, **(self.on_poured if scene.is_poured else {})}, scene.bed
         assert isinstance(bed, PileBed)
         if fields.get("flow.model") == "solve":
-            fields = {"flow.roughness": None, "flow.nodes": False, **fields}
+            fields = {"flow.nodes": False, **fields}
         if self.derived == "threshold_speed":
             ustar = float(closed_form(scene).friction_velocity)
             speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)
@@ -136,6 +139,15 @@ class Pair(NamedTuple):
     def answer(self, scene: Scene) -> Scene:
         """The scene as both levels answer it."""
         return self.grains.answer(self.flow.answer(scene))
+
+
+def _outer_roughness(scene: Scene) -> float | None:
+    """The z0 (m) at which levels find the flow over a bed; None for that of the bed.
+
+    A sublayer that is thicker than the first cells bears no turbulent flow.
+    """
+    outer, most = outer_roughness(scene), scene.first_cell_height / CELLS_OVER_Z0
+    return outer and max(min(outer, most), scene.bed.roughness)
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -277,7 +289,8 @@ def unmeasured(scene: Scene) -> str:
         default = default_first_cell_height(scene.bed.relief, scene.solve_roughness)
         if abs(scene.first_cell_height / default - 1) > SAME_CELL:
             return f"first cells of {scene.first_cell_height:.3g} m in place of {default:.3g} m"
-    if roughness and abs(math.log2(roughness / scene.bed.roughness)) > 0.5 + 1e-6:
+    near = (scene.bed.roughness, _outer_roughness(scene) or scene.bed.roughness)
+    if roughness and all(abs(math.log2(roughness / z0)) > 0.5 + 1e-6 for z0 in near):
         return f"flow.roughness = {roughness:.3g} m"
     return ""
 

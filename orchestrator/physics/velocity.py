@@ -18,8 +18,10 @@ from numpy.typing import ArrayLike
 from orchestrator.physics.constants import GAS_BELOW, INVERSE_KARMAN, KARMAN
 from orchestrator.types import FloatArray
 
-SMOOTH_WALL = 0.11
+SMOOTH_WALL = 1 / 9
 """Roughness length of a smooth wall over nu/u* (Nikuradse 1932: u/u* = 2.5 ln(u* z/nu) + 5.5)."""
+ROUGH_FROM = 70 / 30
+"""u* z0/nu from which a bed is hydraulically rough: u* k_s/nu = 70, k_s = 30 z0 (Nikuradse)."""
 LAMINAR_BELOW = 2000.0
 """U D/nu below which open water may be laminar, and has no logarithmic profile."""
 HIDDEN = 1e-9  # least exposed part of a grain: none below the flow divides by zero
@@ -81,7 +83,7 @@ def measurable_speeds(
     """
     rho, nu, deep = (np.asarray(each, float) for each in (density, viscosity, depth))
     with np.errstate(divide="ignore", invalid="ignore"):  # without a flow, and without a depth
-        z0 = np.maximum(roughness, smooth_wall_roughness(ustar, nu))
+        z0 = outer_roughness(roughness, ustar, nu)
         at_1, at_10 = (
             np.where(deep < height, np.nan, log_law_speed(ustar, height, z0)) for height in (1, 10)
         )
@@ -96,8 +98,21 @@ def measurable_speeds(
 
 
 def smooth_wall_roughness(ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
-    """Roughness length (m) of a smooth wall, 0.11 nu/u*."""
+    """Roughness length (m) of a smooth wall, nu/(9 u*)."""
     return np.asarray(SMOOTH_WALL * np.asarray(viscosity, float) / np.asarray(ustar, float))
+
+
+def outer_roughness(roughness: ArrayLike, ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
+    """Roughness length (m) that the flow high above a bed has: z0 + nu/(9 u*), if not rough.
+
+    Colebrook's sum of the rough and the smooth wall (J. Inst. Civ. Eng. 11, 1939); Nikuradse's sand
+    lies a little below it. It is z0 on a rough bed, and without a friction velocity.
+    """
+    z0 = np.asarray(roughness, float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        number = np.asarray(ustar) * z0 / np.asarray(viscosity)
+        is_smoothed = (number > 0) & (number < ROUGH_FROM)
+        return np.where(is_smoothed, z0 + smooth_wall_roughness(ustar, viscosity), z0)
 
 
 def viscous_length(diameter: FloatArray, gap: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import cast
 
+from orchestrator.physics import velocity
 from orchestrator.physics.threshold import (
     LAWS_OF,
     PAPER,
@@ -41,6 +42,19 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     root = scene.gust**0.5
     mean = {"friction_velocity": at.friction_velocity / root, "reynolds": at.reynolds / root}
     return replace(at, **mean, shields=at.shields / scene.gust)
+
+
+def outer_roughness(scene: Scene) -> float | None:
+    """Roughness length (m) of the flow over the bed of a scene; None if that is the bed's own.
+
+    Where the bed is not rough viscosity adds to its own, by the friction velocity at which the
+    grain moves. The flows of Eqs. 2 and 4 are the paper's, over a rough wall.
+    """
+    if scene.forces.law in LAWS_OF["transition"]:
+        return None
+    z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
+    outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
+    return float(f"{outer:.3g}") if outer > z0 else None
 
 
 def regime_of(scene: Scene) -> Regime:

@@ -23,6 +23,7 @@ from orchestrator.study.shapes import SHAPES
 BUILDABLE_DEG = (2.0, 60.0)  # slopes of piles that can be meshed and packed
 SOLVE_VISCOSITY = 1e-5  # at which flows are solved, m2/s, where it is low enough for their cells
 VISCOUS_CELLS = 2.5  # first cell over nu/(kappa u*_0): at its centre the flow is turbulent
+CELLS_OVER_Z0 = 2.5  # first cell over z0: its centre is not within the roughness
 LEAST_DEPTH = 3.0  # of a flow, over forms and obstacles: mesh rows are level at half of it
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in one another by
@@ -262,7 +263,7 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
     viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow is not turbulent.
     h/4 is the end.
     """
-    return min(max(height / 40, 2.5 * roughness, VISCOUS_CELLS * viscous), height / 4)
+    return min(max(height / 40, CELLS_OVER_Z0 * roughness, VISCOUS_CELLS * viscous), height / 4)
 
 
 def roughness_length(text: str, diameter: float, mixture: parts.Sizes | None = None) -> float:

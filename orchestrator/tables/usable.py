@@ -13,8 +13,6 @@ from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import fields
 
-# a bed is hydraulically smooth below u* k_s/nu = 5, k_s = 30 z0 (Nikuradse, VDI Forschungsh. 361)
-SMOOTH_BELOW = 5 / 30
 # speed times depth over nu: of a channel its mean speed, of a boundary layer U_e at 10 h
 TURBULENT_FROM = 2000.0
 EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
@@ -70,7 +68,6 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
     rows["law"] = ""
     for name, part in rows.groupby("force_law"):
         rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
-    rows["roughness_reynolds"] = ustar * rows["z0_over_d"] * rows["d_m"] / rows["nu_m2_s"]
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
     if "u_e_m_s" in rows:
         depth, closed = rows["depth_m"].astype(float), rows["flow_top"] == "closed channel"
@@ -109,9 +106,7 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
     if "share_carried_off" not in row:
         return
-    number, flow, error = row["roughness_reynolds"], row["flow_reynolds"], row["error_estimate"]
-    if number < SMOOTH_BELOW:
-        yield f"hydraulically smooth bed: u* z0/nu {number:.2g} is below {SMOOTH_BELOW:.2g}"
+    flow, error = row["flow_reynolds"], row["error_estimate"]
     if flow < TURBULENT_FROM:
         yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {TURBULENT_FROM:g}"
     if row["share_carried_off"] > CARRIED_OFF:

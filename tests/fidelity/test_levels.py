@@ -21,6 +21,7 @@ from orchestrator.fidelity.levels import (
     level,
     pair_of,
 )
+from orchestrator.study.closed_form import closed_form
 from tests.fidelity.conftest import MakePile
 
 PACKINGS = ("aligned", "horizontal", "disordered", "poured")
@@ -41,6 +42,19 @@ def test_a_scene_on_a_level_is_recognised_and_asks_the_same(
     assert (answered.fluid, answered.forces) == (scene.fluid, scene.forces)
     assert answered.bed.slope_deg == scene.bed.slope_deg
     assert answered.protocol.fractions == scene.protocol.fractions
+
+
+def test_the_flow_over_fine_sand_has_a_roughness_of_its_own(pile: MakePile) -> None:
+    water = {"fluid.density": 1000.0, "fluid.viscosity": 1e-6, "grain.density": 2650.0}
+    fine, coarse = (pile({**water, "grain.diameter": d}, roughness=d / 30) for d in (2e-4, 3e-3))
+    ustar = float(closed_form(fine).friction_velocity)
+    own = [each.answer(fine).flow.roughness for each in (COARSE.flow, level("flow", "waves"))]
+    assert own == pytest.approx([2e-4 / 30 + 1e-6 / (9 * ustar)] * 2, rel=5e-3)
+    assert levels.known(COARSE, COARSE.flow.answer(fine)) == levels.known(COARSE, fine) != UNKNOWN
+    # over a level bed, a rough one and by Eqs. 2 and 4 it is the bed's, and nothing changes
+    papers = changed(fine, {"forces.law": "low"})
+    for flow, scene in ((FLAT, fine), (COARSE.flow, coarse), (COARSE.flow, papers)):
+        assert flow.answer(scene).flow.roughness is None
 
 
 @pytest.mark.parametrize("field", ["flow.expansion_ration", "grain.stiffness", "nothing", "flow"])

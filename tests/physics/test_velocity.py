@@ -16,6 +16,7 @@ from orchestrator.physics.velocity import (
     layer,
     log_law_speed,
     log_law_ustar,
+    outer_roughness,
     rough_gradient,
     rough_speed,
     shift,
@@ -31,6 +32,13 @@ def test_speed_and_friction_velocity_are_inverse(speed: float, height: float, z0
     ustar = log_law_ustar(speed, height, z0)
     assert float(ustar) == pytest.approx(0.41 * speed / np.log((height + z0) / z0), rel=1e-10)
     assert float(log_law_speed(ustar, height, z0)) == pytest.approx(speed, rel=1e-13)
+
+
+def test_viscosity_adds_to_the_roughness_of_a_bed_that_is_not_rough() -> None:
+    z0 = outer_roughness([1e-6, 2e-4], 0.01, 1e-6)  # u* z0/nu 0.01 and 2
+    np.testing.assert_allclose(z0, [1e-6 + 1e-6 / 0.09, 2e-4 + 1e-6 / 0.09])
+    # rough, no flow, no threshold
+    np.testing.assert_array_equal(outer_roughness(2.4e-4, [0.01, 0.0, np.nan], 1e-6), 2.4e-4)
 
 
 def test_eq_10_as_printed_changes_its_sign_below_z0() -> None:
