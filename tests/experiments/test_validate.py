@@ -42,11 +42,6 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
     assert shields == pytest.approx(air.shields_diagram(d, iversen_white(d, air))[1], rel=1e-3)
 
 
-def test_the_paper_has_no_answer_in_the_transition() -> None:
-    water = {"rho_sol_kg_m3": 2650.0, "rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6}
-    beds = pd.DataFrame({"d_m": [1e-5, 1e-3, 1e-2], **water, "slope": 0.0, "cohesion_n_m": 0.0})
-    assert np.isnan(validate.by_paper(beds)).tolist() == [False, True, False]
-
 
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:
     x, cf, ones = pd.read_csv(validate.FOLDER / "hump_stress.csv").to_numpy().T

@@ -139,15 +139,6 @@ def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: Mak
     assert math.isinf(levels.known(pair_of(pivot), pivot).total)
 
 
-def test_every_measured_class_has_its_reference() -> None:
-    table = levels.measured()
-    for part, best in (("flow", "fine"), ("grains", "reference")):
-        classes = {name for where, _, name in table if where == part}
-        assert classes
-        for name in classes:
-            assert not table[part, best, name][0].any()
-    assert all(numbers.shape == (3, 4) for numbers in table.values())
-
 
 def test_the_spread_of_the_model_is_known_at_every_fraction(pile: MakePile) -> None:
     spreads = [levels.spread(pile(), fraction) for fraction in (0.1, 0.3, 0.42, 0.7)]
