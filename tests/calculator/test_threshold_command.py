@@ -107,7 +107,6 @@ def test_the_papers_rule_gives_both_equations_in_the_transition(run: Run) -> Non
         assert (row["answer"] == "True") == (row["law"] in laws)
 
 
-
 def test_csv_and_json_say_the_same(run: Run) -> None:
     asked = [*QUARTZ_IN_WATER, "--roughness", "d/30:d/10:3", "--depth", "2"]
     rows = list(csv.DictReader(io.StringIO(run(*asked, "--csv")[1])))

@@ -42,7 +42,6 @@ def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
     assert shields == pytest.approx(air.shields_diagram(d, iversen_white(d, air))[1], rel=1e-3)
 
 
-
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:
     x, cf, ones = pd.read_csv(validate.FOLDER / "hump_stress.csv").to_numpy().T
     # in other units, at the same places

@@ -139,7 +139,6 @@ def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: Mak
     assert math.isinf(levels.known(pair_of(pivot), pivot).total)
 
 
-
 def test_the_spread_of_the_model_is_known_at_every_fraction(pile: MakePile) -> None:
     spreads = [levels.spread(pile(), fraction) for fraction in (0.1, 0.3, 0.42, 0.7)]
     assert all(0 < spread.low <= 1 and spread.high > 0 and spread.dominant for spread in spreads)
