@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from orchestrator import pipeline, report, tables
+from orchestrator import paper, pipeline, report, tables
 from orchestrator.calculator import PARAMETERS
 from orchestrator.calculator import table as calculator
 from orchestrator.errors import InputError, OrchestratorError, SolverError
@@ -114,7 +114,7 @@ class Opened:
     @property
     def answer(self) -> str:
         """The answer, in words and a short table."""
-        return report.said(self._results)
+        return report.said(self._results, paper.cards(self._results.study, self.tables))
 
     def case(self, name: str) -> Path:
         """The directory of the one case whose name begins so; else an `InputError`."""

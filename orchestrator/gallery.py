@@ -22,7 +22,7 @@ def write(directory: Path) -> Path:
             continue
         try:
             opened = face.open(study)
-            title, says = opened.title, opened.answer.split("\n\n")[-1].splitlines()
+            title, says = opened.title, opened.answer.split("\n\n")[0].splitlines()
         except OrchestratorError as error:
             title, says = study.name, [error.what]
         figures = [path for name in PICTURES for path in sorted((study / FIGURES).glob(name))]

@@ -142,12 +142,12 @@ def _draw(
     made = tables.make(study, planned, space.cases, states)
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
-    causes = {name: str(error) for name, error in failures.items()}
+    causes, guests = {n: str(error) for n, error in failures.items()}, paper.cards(study, made)
     with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
-        report.write(results, times, causes, space, (paper.report_card,))
-    answer = report.said(results)
+        report.write(results, causes, space, guests)
+    answer = report.said(results, guests)
     terminal.check()
     if not failures:
         space.note(STATE, text_of({**space.drawn_of(planned.ids), "answer": answer}))

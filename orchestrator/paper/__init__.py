@@ -1,15 +1,13 @@
 """The paper: its studies, and the report card of its claims.
 
-Only the pipeline imports it.
+Only the pipeline and the public face import it.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
-
+    from orchestrator.report.page import Guest
     from orchestrator.study.study import Study
     from orchestrator.tables import Tables
 
@@ -17,18 +15,15 @@ PRESETS = Path(__file__).parent / "presets"
 CLAIMS = "claims.csv"
 
 
-def report_card(
-    study: "Study", tables: "Tables", figures: Sequence[str]
-) -> "tuple[Markup, dict[str, str]] | None":
-    """The report card of a study of the paper; none for any other.
+def cards(study: "Study", tables: "Tables") -> "list[Guest]":
+    """The report card of a study of the paper; none for any other, or if no claim can be judged.
 
-    The paper's studies are the presets of this package, word for word; `figures` are the names of
-    the page's figures, in its order.
+    The paper's studies are the presets of this package, word for word.
     """
     if study.text not in [path.read_text(encoding="utf-8") for path in PRESETS.glob("*.toml")]:
-        return None
+        return []
     from orchestrator.paper import claims
 
     judged = claims.judge(tables)
-    section = claims.section(judged, figures, bool(study.tolerance))
-    return section, {CLAIMS: claims.frame(judged).to_csv(index=False)}
+    found = any(one.verdict != "no data" for one in judged)
+    return [claims.card(judged, bool(study.tolerance), CLAIMS)] if found else []

@@ -13,9 +13,16 @@ from markupsafe import Markup
 from orchestrator.paper import measures
 from orchestrator.paper.evidence import RULE, Comparison, Evidence, Verdict, combined
 from orchestrator.report import page
+from orchestrator.report.page import Guest
 from orchestrator.tables import Tables
 
 FILE = Path(__file__).with_name("claims.toml")
+WORDS: dict[Verdict, str] = {
+    "reproduced": "reproduced",
+    "partly": "partly",
+    "not": "not reproduced",
+}
+"""Verdicts, and what the page calls them."""
 
 
 @dataclass(frozen=True)
@@ -66,21 +73,23 @@ def judge(tables: Tables) -> list[Judged]:
     return [Judged(claim, tuple(claim.measure(evidence))) for claim in CLAIMS]
 
 
-def section(judged: Sequence[Judged], figures: Sequence[str], has_tolerance: bool) -> Markup:
-    """The report card as a section of the page; empty where no claim could be judged.
+def card(judged: Sequence[Judged], has_tolerance: bool, file: str) -> Guest:
+    """The report card: how many claims hold, the section of the page, and a CSV file."""
+    counts = Counter(one.verdict for one in judged)
+    told = ", ".join(f"{counts[verdict]} {word}" for verdict, word in WORDS.items())
+    said = f"{len(judged)} claims of the paper: {told}."
+    if lacking := counts["no data"]:
+        why = "a tolerance leaves scenes without DEM; `--tolerance 0` judges all"
+        why = why if has_tolerance else "the study has no scenes for them"
+        said += f" {lacking} could not be judged: {why}."
 
-    `figures` are the names of the page's figures in their order; `has_tolerance` is whether many
-    scenes may be answered without DEM.
-    """
-    entries = []
-    for one in (one for one in judged if one.verdict != "no data"):
-        named = [name.startswith(one.claim.figures) for name in figures]
-        entries.append((one, [number for number, is_shown in enumerate(named, 1) if is_shown]))
-    counts = Counter(one.verdict for one, _ in entries)
-    lacking = [one for one in judged if one.verdict == "no data"]
-    values = {"entries": entries, "counts": counts, "lacking": lacking, "rule": RULE}
-    template = ("card.html.j2", Path(__file__).parent)
-    return Markup(page.fill(*template, **values, has_tolerance=has_tolerance))
+    def section(figures: Sequence[str]) -> Markup:
+        each = list(enumerate(figures, 1))
+        shown = [[n for n, name in each if name.startswith(one.claim.figures)] for one in judged]
+        values = {"entries": list(zip(judged, shown, strict=True)), "said": said, "rule": RULE}
+        return Markup(page.fill("card.html.j2", FILE.parent, **values, words=WORDS))
+
+    return Guest("claims", said, section, {file: frame(judged).to_csv(index=False)})
 
 
 def frame(judged: Sequence[Judged]) -> pd.DataFrame:

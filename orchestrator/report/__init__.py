@@ -1,14 +1,13 @@
 """Figures and page of a study."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator.runs import terminal
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from orchestrator.report.page import Guest
     from orchestrator.report.results import Results
     from orchestrator.runs.case import Case
     from orchestrator.runs.files import Folder
@@ -19,16 +18,14 @@ FIGURES = "figures"
 
 def write(
     results: "Results",
-    timings: "pd.DataFrame",
     failures: Mapping[str, str],
     folder: "Folder",
-    guests: Sequence[Callable[..., tuple[str, Mapping[str, str]] | None]] = (),
+    guests: Sequence["Guest"] = (),
 ) -> None:
     """Draw the figures of a study and write its page into its directory.
 
-    `timings` are the wall times of the finished cases, `failures` the cases that failed, with why.
-    A guest gets the study, the tables and the names of the figures, and adds a section and texts of
-    files by name, or None. A figure that fails, such as for memory, costs a line of the page.
+    `failures` are the cases that failed, with why.
+    A figure that fails, such as for memory, costs a line of the page.
     """
     from orchestrator.report import bed, flows, page, piles, shields, style, words
 
@@ -49,12 +46,12 @@ def write(
             terminal.check()
     figures.sort(key=lambda figure: not figure.leads)
     names = [figure.name for figure in figures]
-    added = [part for guest in guests if (part := guest(results.study, results.tables, names))]
-    for name, text in (item for _, files in added for item in files.items()):
+    for name, text in (item for guest in guests for item in guest.files.items()):
         folder.put(name, text)
-    parts = {**words.contents(results, timings, failures), "faults": faults, "figures": figures}
+    parts = {**words.contents(results, failures), "faults": faults, "figures": figures}
+    sections = [guest.section(names) for guest in guests]
     terminal.check()
-    folder.put(PAGE, page.fill("page.html.j2", **parts, sections=[text for text, _ in added]))
+    folder.put(PAGE, page.fill("page.html.j2", **parts, guests=guests, sections=sections))
 
 
 def drawn_from(results: "Results") -> "list[Case]":
@@ -67,8 +64,8 @@ def drawn_from(results: "Results") -> "list[Case]":
     return [*shown, *(pile.flow for pile in flows.drawn(results))]
 
 
-def said(results: "Results") -> str:
+def said(results: "Results", guests: Sequence["Guest"] = ()) -> str:
     """The answer of a study for a terminal, see `words.text`."""
     from orchestrator.report import words
 
-    return words.text(results)
+    return words.text(results, guests)

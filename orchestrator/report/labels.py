@@ -15,7 +15,7 @@ TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
 WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {
-    **{"fraction": Info("fraction", "n/N", "%"), "by": Info("by")},
+    **{"fraction": Info("n/N", "n/N", "%"), "by": Info("by")},
     "answered_method": fields.ANSWERS["answered_method"].info,
 }
 """Words of columns of tables that are no fields."""
@@ -64,9 +64,11 @@ def panel(row: pd.Series, columns: Sequence[str]) -> str:
 
 
 def amount(value: float, unit: str) -> str:
-    """A value with its unit; one in metres is written in millimetres."""
+    """A value with its unit; one in metres that is below 1 m is written in millimetres."""
     if unit in ("d", "h"):
         return ratio_of(value, unit)
+    if unit == "m" and abs(value) >= 1:
+        return f"{value:.4g} m"
     factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(unit, (0.0, ""))
     return f"{factor * value:.4g}{written}" if factor else f"{value:g} {unit}".rstrip()
 
@@ -74,7 +76,8 @@ def amount(value: float, unit: str) -> str:
 def ratio_of(ratio: float, length: str) -> str:
     """A length over another, such as ``d/30``."""
     whole = round(1 / ratio)
-    return f"{length}/{whole}" if abs(1 - whole * ratio) < 1e-3 else f"{ratio:.3g} {length}"
+    is_whole = abs(1 - whole * ratio) < 1e-3 and whole <= 1000
+    return f"{length}/{whole}" if is_whole else f"{ratio:.3g} {length}"
 
 
 def methods(rows: pd.DataFrame) -> str:

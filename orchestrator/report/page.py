@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
@@ -74,6 +74,19 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True)
+class Guest:
+    """What another package adds to a page: a sentence at its head, a section, texts of files.
+
+    `section`, of an anchor `name`, gets the names of the page's figures in their order.
+    """
+
+    name: str
+    said: str
+    section: Callable[[Sequence[str]], Markup]
+    files: Mapping[str, str]
 
 
 @dataclass(frozen=True)

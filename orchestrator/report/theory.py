@@ -4,7 +4,7 @@ A law's line in (Re*, tau) depends on the bed alone; density, viscosity and grav
 of it a grain is on. Measurements judge each line over the Re* that a study has grains of.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, NamedTuple
@@ -275,7 +275,7 @@ def section(results: Results) -> dict[str, Any] | None:
     return {
         "source": MEASURED_SOURCE,
         "start": FACTORS_FROM,
-        "sentences": list(_sentences(results.beds("grain"), listed)),
+        "sentences": nearest(results),
         "best": sheet(best(listed)),
         "every": sheet(listed),
     }
@@ -292,33 +292,26 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
-def _sentences(grains: pd.DataFrame, listed: Sequence[Line]) -> Iterator[str]:
-    """Conclusions from the numbers: the best law, ranges that none meets, small Re*, air."""
+def nearest(results: Results) -> list[str]:
+    """The law and bed nearest to measurements in water, what none meets, the nearest in air."""
+    listed, said = ranked(results), []
     first, (_, at) = listed[0], listed[0].worst
     if at and first.decades:
         facts = {"count": len(listed), "decades": DECADES, "start": FACTORS_FROM}
-        yield caption("best_law", fit=first, at=_number(at), **facts)
+        said.append(caption("best_law", fit=first, at=_number(at), **facts))
     unmet = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
     unmet &= ~np.any([line.met for line in listed], axis=0)
     if unmet.any():
-        yield caption("unmet", ranges=_ranges(unmet))
-    # up to which Re* the published curves for water lie above every law
-    grid = np.geomspace(min(line.first for line in listed), BINS[-1].high, 1000)
-    low, _ = water_band(grid)
-    highest = np.max([np.where(x.holds(grid), x.tau(grid), -np.inf) for x in listed], axis=0)
-    above = np.isfinite(highest) & (low > highest)
-    if above[grid < 1].any():
-        start = int(above.argmax())
-        ends = [start, start + int((~np.append(above[start:], False)).argmax()) - 1]
-        lowest, law, begin = low[ends], highest[ends], BINS[0].low
-        numbers = [_number(end) for end in grid[ends]]
-        yield caption("small_reynolds", ends=numbers, curve=lowest, law=law, begin=begin)
-    # published curves for air over the medians for water at the same Re*
+        said.append(caption("unmet", ranges=_ranges(unmet)))
     outside, logs = {"left": np.nan, "right": np.nan}, np.log(MIDDLES)
-    air = [np.interp(logs, *np.log(line), **outside) for line in air_lines(grains).values()]
-    read = np.array(air).reshape(-1, len(logs))
-    covered = np.isfinite(read).any(axis=0)
-    if covered.any():
-        ratio = np.exp(np.nanmean(read[:, covered], axis=0)) / MEDIANS[covered]
-        where = " … ".join(map(_number, MIDDLES[covered][[0, -1]]))
-        yield caption("air", ratio=(ratio.min(), np.median(ratio), ratio.max()), span=where)
+    air = air_lines(results.beds("grain")).values()
+    read = np.array([np.interp(logs, *np.log(line), **outside) for line in air])
+    covered = np.isfinite(read.reshape(-1, len(logs))).any(axis=0)
+    if covered.any() and len(listed) > 1:
+        mean, x = np.exp(np.nanmean(read[:, covered], axis=0)), MIDDLES[covered]
+        ratios = [line.answers(x) / mean for line in listed]
+        # infinite where a law does not hold: few of the curves' Re* judge no line
+        off = [np.median(np.nan_to_num(np.maximum(r, 1 / r), nan=np.inf)) for r in ratios]
+        at_ends, of = f"{_number(x[0])} … {_number(x[-1])}", listed[int(np.argmin(off))]
+        said.append(caption("best_in_air", fit=of, off=min(off), of_first=off[0], ends=at_ends))
+    return said

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from platform import python_version
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -13,16 +13,24 @@ from orchestrator import __version__
 from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
-from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.grains.threshold import STEP
+from orchestrator.physics.beside import COLUMNS, sentence
 from orchestrator.physics.laws import LAWS
-from orchestrator.physics.velocity import log_law_speed, smooth_wall_roughness
+from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import labels, theory
-from orchestrator.report.page import caption
-from orchestrator.report.results import Results, by_dem, held, measured_hills, split, valid
+from orchestrator.report.page import Guest, caption
+from orchestrator.report.results import Results, measured_hills, split, valid
 from orchestrator.runs import case
 from orchestrator.study import fields
-from orchestrator.study.closed_form import closed_form
 
+SPEEDS = {
+    "wind_1m_m_s": "wind at 1 m",
+    "wind_10m_m_s": "wind at 10 m",
+    "mean_velocity_m_s": "mean velocity",
+}
+"""Speeds of a flow that are measured in the field, by their columns."""
+MIXED, LEAST_GRAINS = 2.0, 10
+"""Least ratio of sizes that are told apart; exposed grains below which a size is marked."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
 PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
@@ -30,88 +38,98 @@ EACH, RANGES = ("alpha_deg", "d_m", "force_law"), ("alpha_deg", "force_law")
 """Columns that each row of a table tells, of single piles and of ranges."""
 
 
-def text(results: Results) -> str:
-    """The short table, then the sentences, for a terminal.
+class Answer(NamedTuple):
+    """What a page and a terminal say first."""
+
+    sentences: list[str]
+    table: pd.DataFrame | None
+
+
+def text(results: Results, guests: Sequence[Guest] = ()) -> str:
+    """What guests say, the answer, its table and its doubts, for a terminal.
 
     An `OrchestratorError` if the tables lack columns, as those of another version do.
     """
     try:
-        answer = "\n".join(sentences(results)) or "No case has given a result yet."
-        table = short(results)
+        (said, table), warned = answer(results), doubts(results)
     except KeyError as error:
         what = f"its tables lack {error}: another version of this program wrote them"
         remedy = "`orchestrator study` of the same file runs it again"
         raise OrchestratorError(what, where=str(results.cases.parent), remedy=remedy) from None
-    if table is None:
-        return answer
-    rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padded = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
-    return "\n".join([*padded, "", answer])
+    lines = [*(guest.said for guest in guests), *said] or ["No case has given a result yet."]
+    if table is not None:
+        rows = [[str(name) for name in table], *table.to_numpy(str).tolist()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines += ["", *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)]
+    return "\n".join([*lines, *[""] * bool(warned), *warned])
 
 
-def sentences(results: Results) -> list[str]:
-    """The answer, from the least slope to the largest, then warnings."""
-    piles, grains = results.joined("pile_threshold"), _single(results)
-    table = piles if len(piles) else grains
-    if table.empty:
-        return []
-    count, usable = len(table), table["usable"].sum()
-    warnings = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
-    if piles.empty:
-        return [*_grains(grains), *warnings]
-    hills, ends = list(_hills(results)), []
-    if usable or not hills:  # the least and the largest slope in each fluid, as in the pictures
-        for _, wet in split(results.exemplars, "rho_f_kg_m3"):
-            firsts = wet.drop_duplicates("alpha_deg")
-            ends += [firsts.iloc[at] for at in sorted({0, len(firsts) - 1})]
-    ends.sort(key=lambda row: float(row["alpha_deg"]))
-    telling = labels.varying(piles, "alpha_deg", "d_m", "fraction")[:3]
-    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
-    if len(beyond):
-        warnings.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
-    chosen = [d for d in results.plan.decisions.values() if d.by_default]
-    if chosen:
-        names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
-        error, floor = max(item.known.total for item in chosen), min(fidelity.floors().values())
-        warnings.append(caption("defaults", names=names, error=error, floor=floor))
-    rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
-    if tolerance and len(rows):
-        low = 1 - rows["shields_model_low"] / rows["shields"]
-        high = rows["shields_model_high"] / rows["shields"] - 1
-        if tolerance < float(((low + high) / 2).min()):
-            facts = {"ends": (low.max(), high.max()), "share": rows["model_share"].mode().iloc[0]}
-            warnings.append(caption("tolerance", tolerance=tolerance, **facts))
-    return [*hills, *(_pile(row, results, telling) for row in ends), *warnings]
+def answer(results: Results) -> Answer:
+    """What a study asks: which of many laws is nearest to measurements, or at which flow what goes.
+
+    Of piles these are the sizes of mixtures, or where motion starts and when a fraction has moved.
+    """
+    best = theory.best(theory.ranked(results))
+    if len(best) > theory.MANY:
+        return Answer(theory.nearest(results), theory.sheet(best))
+    table = short(results) if (mixed := sizes(results)) is None else mixed
+    return Answer(_grains(results) if results.at_fraction.empty else _piles(results), table)
+
+
+def _piles(results: Results) -> list[str]:
+    """Hills that others measured, the pile of the first picture, then one in each other fluid."""
+    hills, rows = list(_hills(results)), results.exemplars
+    if hills and not results.joined("pile_threshold")["usable"].any():
+        return hills
+    telling = labels.varying(results.joined("pile_threshold"), "alpha_deg", "d_m", "fraction")
+    firsts = rows.drop_duplicates("rho_f_kg_m3")
+    return [*hills, *(_pile(row, results, telling[:3]) for _, row in firsts.iterrows())]
 
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
-    single = float(closed_form(results.plan.decisions[str(row["scene_id"])].asked).shields)
-    slope = labels.value("alpha_deg", row["alpha_deg"])
-    name = ", ".join([slope, *labels.told(row, ["d_m", *telling])])
-    return caption("pile", row=row, name=name, single=single, flow=_flow(row))
+    """Where and at which flow the first grain of a pile moves, and when a fraction of it has."""
+    pile, grains = results.plan.piles[str(row["scene_id"])], results.tables["pile_grain"]
+    grains = grains[(grains["scene_id"] == row["scene_id"]) & (grains["ustar0_m_s"] > 0)]
+    x, z = pile.line.crest * pile.scene.grain.diameter
+    facts = {"name": ", ".join(labels.told(row, ["alpha_deg"] * bool(z > 0) + ["d_m", *telling]))}
+    if len(grains) and z > 0:  # a level bed has no place that goes first
+        first = grains.loc[grains["ustar0_m_s"].idxmin()]
+        facts |= {"x": labels.amount(first["x_m"], "m"), "crest": labels.amount(x, "m")}
+        facts |= {"first": _flow(row, first["ustar0_m_s"])}
+    flow = _flow(row, row["ustar0_m_s"])
+    return f"{caption('pile', row=row, flow=flow, **facts)} {_measured(row)}"
 
 
-def _grains(grains: pd.DataFrame) -> Iterator[str]:
+def _grains(results: Results) -> list[str]:
     """The finest and the coarsest grain of the least slope."""
+    if (grains := _single(results)).empty:
+        return []
     here = grains[grains["alpha_deg"] == grains["alpha_deg"].min()]
     here = (here[valid(here)] if valid(here).any() else here).sort_values("d_m", kind="stable")
-    for at in sorted({0, len(here) - 1}):
-        row = here.iloc[at]
+    rows = [here.iloc[at] for at in sorted({0, len(here) - 1})]
+    said = []
+    for row in rows:
         size, slope = (labels.value(column, row[column]) for column in ("d_m", "alpha_deg"))
-        yield caption("one_grain", row=row, size=size, slope=slope, flow=_flow(row))
+        facts = {"row": row, "size": size, "slope": slope, "flow": _flow(row, row["ustar0_m_s"])}
+        said.append(f"{caption('one_grain', **facts)} {_measured(row)}")
+    return said
 
 
-def _flow(row: pd.Series) -> str:
-    """A friction velocity with a speed that is measured: of a channel's mean, or of the wind."""
-    ustar = row["ustar0_m_s"]
-    if pd.notna(row.get("mean_velocity_m_s")):
-        speed, depth = row["mean_velocity_m_s"], row["depth_m"]
-        return f"u* {ustar:.2g} m/s, {speed:.2g} m/s in the mean over {depth:g} m of depth"
-    if row["rho_f_kg_m3"] >= GAS_BELOW:
-        return f"u* {ustar:.2g} m/s"
-    z0 = max(row["z0_m"], float(smooth_wall_roughness(ustar, row["nu_m2_s"])))
-    return f"u* {ustar:.2g} m/s, {float(log_law_speed(ustar, 1.0, z0)):.2g} m/s wind at 1 m"
+def _measured(row: pd.Series) -> str:
+    """What was measured beside a threshold."""
+    grain = {name: row[column] for name, column in COLUMNS.items()}
+    said = sentence(row["shields"], row["reynolds"], **grain)
+    return f"{said[0].upper()}{said[1:]}."
+
+
+def _flow(row: pd.Series, ustar: float) -> str:
+    """A friction velocity with speeds that are measured: of the wind, or of a channel."""
+    depth, closed = float(row["depth_m"] or np.nan), row["flow_top"] == "closed channel"
+    of_flow = row["z0_m"], row["nu_m2_s"], row["rho_f_kg_m3"], depth
+    speeds = measurable_speeds(ustar, *of_flow, closed=closed)
+    told = [f"{label} {speeds[c]:#.3g} m/s" for c, label in SPEEDS.items() if speeds[c] > 0]
+    told += [f"depth {depth:g} m"] * (depth > 0)
+    return f"u*₀ = {ustar:#.3g} m/s" + f" ({', '.join(told)})" * bool(told)
 
 
 def _hills(results: Results) -> Iterator[str]:
@@ -124,15 +142,80 @@ def _hills(results: Results) -> Iterator[str]:
         yield caption("hill", hill=hill, ends=ends, **facts)
 
 
+def doubts(results: Results) -> list[str]:
+    """What a reader must know of the thresholds: which are usable, what their intervals lack."""
+    piles = results.joined("pile_threshold")
+    table = piles if len(piles) else _single(results)
+    count, usable = len(table), table["usable"].sum() if len(table) else 0
+    said = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
+    if piles.empty:
+        return said
+    beyond = piles[piles["frozen_bed"] > FROZEN_BED]
+    if len(beyond):
+        said.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
+    chosen = [d for d in results.plan.decisions.values() if d.by_default]
+    if chosen:
+        names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
+        error, floor = max(item.known.total for item in chosen), min(fidelity.floors().values())
+        said.append(caption("defaults", names=names, error=error, floor=floor))
+    rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
+    if tolerance and len(rows):
+        low = 1 - rows["shields_model_low"] / rows["shields"]
+        high = rows["shields_model_high"] / rows["shields"] - 1
+        if tolerance < float(((low + high) / 2).min()):
+            facts = {"ends": (low.max(), high.max()), "share": rows["model_share"].mode().iloc[0]}
+            said.append(caption("tolerance", tolerance=tolerance, **facts))
+    return said
+
+
 def short(results: Results) -> pd.DataFrame | None:
-    """The thresholds in at most a screen: of few piles each, of many their range by slope."""
-    here = results.at_fraction
+    """The thresholds in at most a screen: of few scenes each, of many their range by slope.
+
+    Of piles they are at every fraction if these are few, else at one.
+    """
+    every, tau = results.joined("pile_threshold"), "τ_c"
+    here, by = (_single(results), ["by"]) if every.empty else (results.at_fraction, [])
     if here.empty:
-        return grains(results)
-    keys = [*EACH, *labels.varying(here, *EACH)]
-    few = len(here[keys].drop_duplicates()) <= FEW
-    tau = f"τ_c at n/N = {here['fraction'].iloc[0]:.0%}"
-    return _thresholds(here, keys if few else RANGES, tau)
+        return None
+    at = tau if by else f"{tau} at n/N = {here['fraction'].iloc[0]:.0%}"
+    keys = [*EACH, *labels.varying(here, *EACH), *by]
+    choices = [(here, keys, at), (here, [*RANGES, *by], at)]
+    choices = choices if by else [(every, [*keys, "fraction"], tau), *choices]
+    fit = (each for each in choices if len(each[0][[*each[1]]].drop_duplicates()) <= FEW)
+    return _thresholds(*next(fit, choices[-1]))
+
+
+def sizes(results: Results) -> pd.DataFrame | None:
+    """The thresholds of the sizes of mixtures at one fraction, those of all seeds in a row."""
+    rows = results.joined("size_class")
+    if rows.empty or rows["size_over_d"].max() < MIXED * rows["size_over_d"].min():
+        return None
+    rows = rows[rows["fraction"] == results.at_fraction["fraction"].iloc[0]]
+    keys, number = (
+        labels.varying(rows, "fraction"),
+        np.rint(np.log(rows["size_over_d"]) / np.log(STEP)),
+    )
+    size = rows["size_over_d"] * rows["d_m"]
+    stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(rows["size_over_d"], axis=0)
+    rows = rows.assign(size=1e3 * size, **stress)
+    groups = rows.groupby([*(rows[key] for key in keys), number], dropna=False, sort=False)
+    low, high = groups.min(numeric_only=True), groups.max(numeric_only=True)
+    spans = {
+        "u*₀, m/s": ["ustar0_m_s"],
+        "stress over that of d50": ["hiding"],
+        "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
+        "θ of its own size": ["shields_own"],
+        "interval of θ": ["shields_own_low", "shields_own_high"],
+    }
+    told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
+    table = {
+        **told.mask(told.eq(told.shift()).all(axis=1), ""),  # a bed is named once
+        "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
+        **_spans(low, high, spans),
+    }
+    count = groups["count"].sum()
+    grains = [f"{n}" if n >= LEAST_GRAINS else f"{n}: too few" for n in count]
+    return pd.DataFrame({**table, "exposed grains": grains})
 
 
 def piles(results: Results) -> pd.DataFrame | None:
@@ -145,12 +228,6 @@ def piles(results: Results) -> pd.DataFrame | None:
     return _thresholds(rows, keys, more=("count", "case"))
 
 
-def grains(results: Results) -> pd.DataFrame | None:
-    """By slope, force law, fluid and method: the range of the thresholds of single grains."""
-    rows = _single(results)
-    return None if rows.empty else _thresholds(rows, [*RANGES, "by"])
-
-
 def _single(results: Results) -> pd.DataFrame:
     """Single grains with their thresholds: by DEM, or else by the closed form."""
     rows = results.joined("single_grain")
@@ -160,6 +237,7 @@ def _single(results: Results) -> pd.DataFrame:
     exact = rows["shields_closed_form"]
     values = {f"shields{end}": rows[f"shields_dem{end}"].where(dem, exact) for end in ends}
     ustar = rows["ustar_m_s"].where(dem, rows["ustar_closed_form_m_s"])
+    rows = rows.assign(reynolds=rows["reynolds"].where(dem, rows["reynolds_closed_form"]))
     values |= {"ustar0_m_s": ustar, "by": dem.map({True: "DEM", False: "closed form"})}
     return pd.concat([rows, pd.DataFrame(values)], axis=1)
 
@@ -170,7 +248,7 @@ def _thresholds(
     """A row for all thresholds that agree in some columns, with the range of the usable ones."""
     ranges = "d_m" not in keys
     if ranges:  # fluids are never merged
-        keys = [*keys, *(n for n in ("rho_f_kg_m3", "nu_m2_s") if rows[n].nunique() > 1)]
+        keys = [*(name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1), *keys]
     rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable, d = (rows[name].groupby(number) for name in ("usable", "d_m"))
@@ -180,14 +258,18 @@ def _thresholds(
     table: dict[str, Any] = labels.cells(first, keys)
     if ranges:
         low[~usable.any()] = np.nan
-        table["diameter, mm"] = _spans(1e3 * d.min(), 1e3 * d.max(), "g")
-    table[tau] = _spans(low["shields"], high["shields"], ".4f")
-    table["interval"] = _spans(low["shields_low"], high["shields_high"], ".4f")
-    if "shields_model_low" in rows and not ranges:
-        wide = _spans(low["shields_model_low"], high["shields_model_high"], ".3f")
+        table["diameter, mm"] = _ranges(1e3 * d.min(), 1e3 * d.max(), "g")
+    known = set(rows.columns[rows.notna().any()])
+    spans = {f"{text}, m/s": [name] for name, text in SPEEDS.items() if name in known}
+    spans = {"u*₀, m/s": ["ustar0_m_s"], **spans, tau: ["shields"]}
+    spans |= {"interval": ["shields_low", "shields_high"]}
+    if "measured_low" in known:
+        spans |= {"measured": ["measured_low", "measured_high"]}
+    table |= _spans(low, high, spans)
+    if "shields_model_low" in known and not ranges:
+        wide = _ranges(low["shields_model_low"], high["shields_model_high"])
         shares = zip(wide, first["model_share"], strict=True)
         table["model's interval"] = [f"{a}, most by {b}" if a != "—" else a for a, b in shares]
-    table["u*₀, m/s"] = _spans(low["ustar0_m_s"], high["ustar0_m_s"], ".3f")
     table["usable"] = [
         f"{n} of {of}" if ranges or of > 1 else "yes" if n else f"no: {why}"
         for n, of, why in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
@@ -195,7 +277,14 @@ def _thresholds(
     return pd.DataFrame({**table, **{name: first[name] for name in more}})
 
 
-def _spans(low: pd.Series, high: pd.Series, form: str) -> list[str]:
+def _spans(
+    low: pd.DataFrame, high: pd.DataFrame, spans: Mapping[str, Sequence[str]]
+) -> dict[str, list[str]]:
+    """Columns of ranges by their heads: from the least of the first to the largest of the last."""
+    return {head: _ranges(low[names[0]], high[names[-1]]) for head, names in spans.items()}
+
+
+def _ranges(low: pd.Series, high: pd.Series, form: str = "#.3g") -> list[str]:
     """The range between each two values as a text, one number where they are written alike."""
     pairs = ([format(float(end), form) for end in pair] for pair in zip(low, high, strict=True))
     return ["—" if "nan" in pair else " … ".join(dict.fromkeys(pair)) for pair in pairs]
@@ -241,16 +330,6 @@ def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["program", "version"])
 
 
-def times(timings: pd.DataFrame) -> pd.DataFrame | None:
-    """Wall time of the finished cases by their kind: in the solver, and outside it."""
-    if timings.empty:
-        return None
-    groups = pd.concat([timings, timings.assign(kind="all")]).groupby("kind", sort=False)
-    sums = groups.agg({"case": "size", "solver_s": "sum", "outside_s": "sum"})
-    head = ["kind of case", "cases", "in the solver, s", "outside it, s"]
-    return sums.reset_index().set_axis(head, axis=1)
-
-
 def levels(results: Results) -> pd.DataFrame | None:
     """On which fidelity levels the piles were answered, why, and what is known of them."""
     rows, table = [], results.joined("pile_threshold")
@@ -263,16 +342,6 @@ def levels(results: Results) -> pd.DataFrame | None:
     return pd.DataFrame(rows, columns=head) if rows else None
 
 
-def checks(results: Results) -> pd.DataFrame | None:
-    """The piles that DEM answered as well: how far the cheap answers are from it."""
-    table = results.tables.get("check", pd.DataFrame())
-    if table.empty:
-        return None
-    asked = labels.cells(table, ["alpha_deg", "packing", "force_law", "d_m", "fraction"])
-    names = ["shields", "shields_dem", "shields_dem_low", "shields_dem_high", "difference"]
-    return pd.DataFrame({**asked, **table[[*names, "agree", "case"]]})
-
-
 def remarks(results: Results) -> dict[str, Any]:
     """Counts that a reader must know before using this study's results; 0 is no remark."""
     scenes, thresholds = results.scenes, results.joined("pile_threshold")
@@ -281,36 +350,26 @@ def remarks(results: Results) -> dict[str, Any]:
     names = ["scene_id", "carried_off", "fallen_upstream"]
     curve = results.tables.get("pile_curve", pd.DataFrame()).reindex(columns=names)
     lost = curve.groupby("scene_id").max()
-    grains = by_dem(results.joined("single_grain"))
-    counts: dict[str, Any] = {
+    return {
         **{"outside": len(outside), "transition": both.sum(), "thresholds": len(thresholds)},
         "unreached": thresholds["shields"].isna().sum() if len(thresholds) else 0,
         **{name: ((lost[name] > 0).sum(), lost[name].max()) for name in names[1:]},
     }
-    if len(grains):
-        ratio = grains["ustar_m_s"] / grains["ustar_closed_form_m_s"]
-        far = ((ratio - 1).abs() > 0.01) & held(grains)
-        counts |= {"far": (far.sum(), (far & valid(grains)).sum()), "silent": ratio.isna().sum()}
-    return {"far": (0, 0), "silent": 0, **counts}
 
 
-def contents(
-    results: Results, timings: pd.DataFrame, failures: Mapping[str, str]
-) -> dict[str, Any]:
+def contents(results: Results, failures: Mapping[str, str]) -> dict[str, Any]:
     """The words and numbers of the page beside its figures, by the names of its template."""
     from orchestrator.report import flows  # imports what draws
 
-    sheets = (short, piles, grains, levels, checks, remarks, force_laws, parameters)
+    sheets = (answer, doubts, short, piles, levels, remarks, force_laws, parameters)
     root, cases = results.cases, results.plan.cases
     scenes = [pile.scene for pile in results.plan.piles.values()]
     return {
         **{sheet.__name__: sheet(results) for sheet in sheets},
         "results": results,
         "title": results.study.title,
-        "answer": sentences(results),
         "measured": theory.section(results),
         "programs": versions(case.programs(root, cases)),
-        "times": times(timings),
         "failures": failures,
         "links": {n: quote(f"{root.name}/{n}/") for n in cases if (root / n).is_dir()},
         "paper_pair": results.scenes["force_law"].isin(theory.PAIR).any(),

@@ -157,10 +157,12 @@ def test_a_study_of_the_paper_alone_gets_a_report_card(
     (tmp_path / "cases").mkdir()
     grains = {name: results.tables[name] for name in ("scenes", "single_grain")}
     whole = replace(results, study=replace(results.study, text=text), tables=grains)
-    report.write(whole, pd.DataFrame(), {}, Folder(tmp_path), (paper.report_card,))
+    cards = paper.cards(whole.study, whole.tables)
+    report.write(whole, {}, Folder(tmp_path), cards)
     page = (tmp_path / report.PAGE).read_text(encoding="utf-8")
     assert ('id="claims"' in page) == (tmp_path / paper.CLAIMS).exists() == is_paper
     if is_paper:
+        assert cards[0].said.startswith("17 claims of the paper: ")
         table = pd.read_csv(tmp_path / paper.CLAIMS)
         assert len(table) == len(CLAIMS)
         assert set(table["verdict"]) > {"no data"}

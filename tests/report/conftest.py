@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 
-from orchestrator import report, tables
+from orchestrator import report
 from orchestrator.report import style
 from orchestrator.report.results import Results
 from orchestrator.report.style import Figure
@@ -32,8 +32,7 @@ def styled() -> Iterator[None]:
 
 
 def write(results: Results, out: Path, failures: dict[str, str]) -> Path:
-    times = tables.timings(results.plan, results.plan.done(results.cases))
-    report.write(results, times, failures, Folder(out))
+    report.write(results, failures, Folder(out))
     return out / report.PAGE
 
 

@@ -88,7 +88,7 @@ def test_page_needs_nothing_else(html: str, parsed: Page) -> None:
 
 def test_the_first_screen_answers(html: str, parsed: Page) -> None:
     order = [html.index(text) for text in (
-        "times the stress of a single one", 'id="bed-alpha15"', 'id="shields"', 'id="thresholds"',
+        "motion starts at x = ", "<th", 'id="bed-alpha15"', 'id="shields"', 'id="thresholds"',
         'aria-label="Contents"', 'id="figures"', 'id="limits"', "<summary>Parameters",
     )]  # fmt: skip
     assert order == sorted(order)
@@ -252,7 +252,7 @@ def test_a_study_of_another_version_costs_its_own_sentences(studies: Path) -> No
         _ = orchestrator.open(studies / "one").answer
     html = gallery.write(studies).read_text(encoding="utf-8")
     assert html.count("another version of this program wrote them") == 1
-    assert html.count("One grain of 1 mm on 0° starts to move at u* ") == 1
+    assert html.count("One grain of 1 mm on 0° starts to move at u*₀ = ") == 1
 
 
 SPEED = "Speed & <accuracy>"

@@ -69,7 +69,7 @@ def test_the_picture_is_of_the_scene_that_the_sentence_is_about(results: Results
         assert row["rho_f_kg_m3"] == 1e3
         (figure,) = bed.draw(study)
         assert "1000 kg/m³" in figure.title
-        assert any("1000 kg/m³" in sentence for sentence in words.sentences(study))
+        assert "1000 kg/m³" in words.answer(study).sentences[0]
 
 
 def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
@@ -79,7 +79,7 @@ def test_each_fluid_has_a_row_and_a_sentence(results: Results) -> None:
         for n in range(words.FEW)
     ]
     study = copies(results, *fluids)
-    sheet, said = words.short(study), " ".join(words.sentences(study))
+    sheet, said = words.short(study), " ".join(words.answer(study).sentences)
     assert sheet is not None
     assert len(sheet) == 2
     assert "1.2 kg/m³" in said
@@ -92,29 +92,29 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     study = copies(results, *seeds)
     sheet = words.short(study)
     assert sheet is not None
-    (row,) = sheet.to_numpy().tolist()
-    assert {"3 of 3", "0.0400 … 0.0900"} <= set(row)
-    first, *_ = words.sentences(study)
-    assert "τ_c = 0.06 in the mean of 3 seeds (0.04 … 0.09)" in first
+    assert set(sheet["usable"]) == {"3 of 3"}
+    assert set(sheet["τ_c"]) == {"0.0400 … 0.0900"}
+    (first,) = words.answer(study).sentences
+    assert "the mean of 3 seeds: τ_c = 0.0600 (0.0400 … 0.0900)" in first
 
 
 def test_a_study_of_single_grains_has_an_answer_too(results: Results) -> None:
     grains = only(results, "grain")
-    assert words.sentences(grains)[0].startswith("One grain of 0.05 mm on 0° starts to move at u* ")
+    first, *_ = words.answer(grains).sentences
+    assert first.startswith("One grain of 0.05 mm on 0° starts to move at u*₀ = ")
     without = grains.tables["single_grain"].assign(answered_method="pivot", ustar_m_s=np.nan)
     exact = changed(grains, single_grain=without)
     sheet = words.short(exact)
     assert sheet is not None
     assert set(sheet["by"]) == {"closed form"}
-    assert "One grain" in words.sentences(exact)[0]
+    assert "One grain" in words.answer(exact).sentences[0]
 
 
 def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     bad = results.tables["pile_threshold"].assign(usable=False, why_not="Re* 2 is below 30")
     study = changed(results, pile_threshold=bad)
-    first, *others = words.sentences(study)
-    assert first.endswith("(not usable: Re* 2 is below 30).")
-    assert others[0] == "Usable: 0 of 4 thresholds."
+    assert "(not usable: Re* 2 is below 30)." in words.answer(study).sentences[0]
+    assert words.doubts(study)[0] == "Usable: 0 of 4 thresholds."
     sheet = words.short(study)
     assert sheet is not None
     assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
