@@ -8,7 +8,6 @@ import warnings
 from argparse import Namespace
 from collections.abc import Sequence
 from importlib import import_module
-from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.showwarning = lambda message, *_, **__: _say(f"warning: {message}")
     # PYTHONWARNINGS=error is about libraries: a message of this program ends no command
     warnings.simplefilter("default", UserWarning)
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
     try:
         if getattr(options, "workers", 1) < 1:
             raise InputError("at least 1", "--workers")
@@ -61,17 +60,15 @@ class _Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**{**settings, "allow_abbrev": False})
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+    def parse_known_args(self, args: Any, namespace: Any = None) -> Any:  # type: ignore[override]
         """Refuse an unknown option first: another may be missing because of it."""
-        given = sys.argv[1:] if args is None else list(args)
+        names = {word.partition("=")[0] for word in args if word.startswith("--")} - {"--"}
         # what follows a command is its own parser's
-        own = takewhile(lambda word: word.startswith("-"), given) if self._subparsers else given
-        for name in (word.partition("=")[0] for word in own if word.startswith("--")):
-            if name not in self._option_string_actions and name != "--":
-                near = difflib.get_close_matches(name, self._option_string_actions, 1)
-                advice = f"did you mean {near[0]}?" if near else "--help lists all"
-                self.error(f"there is no option {name}: {advice}")
-        return super().parse_known_args(given, namespace)
+        for name in () if self._subparsers else names - {*self._option_string_actions}:
+            near = difflib.get_close_matches(name, self._option_string_actions, 1)
+            advice = f"did you mean {near[0]}?" if near else "--help lists all"
+            self.error(f"there is no option {name}: {advice}")
+        return super().parse_known_args(args, namespace)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,28 +1,41 @@
 """The public Python face: `threshold`, `run` and `open`."""
 
 import os
+import warnings
+from html import escape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from orchestrator import paper, pipeline, report, tables
 from orchestrator.calculator import PARAMETERS
-from orchestrator.calculator import table as calculator
+from orchestrator.calculator.cli import OPTIONS, answered
 from orchestrator.errors import InputError, OrchestratorError, SolverError
 from orchestrator.report.results import Results
 from orchestrator.runs.workspace import Workspace
 from orchestrator.study import study
 
+FIRST = (
+    *("d_m", "alpha_deg", "rho_f_kg_m3", "force_law", "fraction", "shields", "shields_low"),
+    *("shields_high", "shields_closed_form", "shields_dem", "ustar0_m_s", "ustar_closed_form_m_s"),
+    *("ustar_m_s", "wind_10m_m_s", "current_1m_m_s", "mean_velocity_m_s", "usable", "why_not"),
+)
+"""Columns of `Opened.thresholds` that come before all others, those that it has."""
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 
 def threshold(
-    diameter: ArrayLike, *, law: str | None = "bridged", **parameters: ArrayLike
+    diameter: "ArrayLike",
+    *,
+    law: str | None = "bridged",
+    fluid: str | None = None,
+    temperature: float | None = None,
+    **parameters: "ArrayLike",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
@@ -31,11 +44,13 @@ def threshold(
     goes up, and `entrainment_angle_deg` (60) of the contact that a grain rolls over; `roughness`,
     the length z0, m, or a part of the diameter ("d/30"); Saffman's `lift_coefficient` (1.615);
     `gravity` (9.81), m/s2; `depth` of a liquid, m, for its mean velocity. `law` is a force law,
-    ``paper`` for the paper's rule, or None: every law.
+    ``paper`` for the paper's rule, or None: every law. `fluid` is "water", "seawater" or "air" at a
+    `temperature` (15), deg C, in place of density and viscosity; the defaults are the paper's.
 
     The table has a row for each point of the raveled arrays, or for each point and law, with units
-    in the columns' names; ``valid`` and ``why_not`` say where a law ends. An `InputError` refuses a
-    point that is no scene, a law that is none, or if no law holds at any point.
+    in the columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is usual in
+    another unit is asked about in a warning. An `InputError` refuses a point that is no scene, a
+    law that is none, or if no law holds at any point.
     """
     given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():
@@ -50,8 +65,12 @@ def threshold(
         arrays = np.broadcast_arrays(*given.values())
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
-    points = dict(zip(given, map(np.ravel, arrays), strict=True))
-    rows = pd.DataFrame(calculator.thresholds(points, law or "bridged"))
+    points = {name: each.ravel().tolist() for name, each in zip(given, arrays, strict=True)}
+    names = {name: name for name in OPTIONS}
+    table, asked = answered(points, law or "bridged", fluid, temperature, names)
+    if asked:
+        warnings.warn("; ".join(asked), stacklevel=2)
+    rows = pd.DataFrame(table)
     chosen = rows if law is None else rows[rows["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)
 
@@ -107,14 +126,31 @@ class Opened:
 
     @property
     def thresholds(self) -> pd.DataFrame:
-        """The thresholds of the piles, or else of the single grains, beside their scenes."""
+        """The thresholds of the piles, or else of the single grains, beside their scenes.
+
+        First come the columns that tell points apart, then threshold, speeds, and its use.
+        """
         piles = self._results.joined("pile_threshold")
-        return piles if len(piles) else self._results.joined("single_grain")
+        rows = piles if len(piles) else self._results.joined("single_grain")
+        first = [name for name in FIRST if name in rows]
+        return rows[[*first, *rows.columns.difference(first, sort=False)]]
 
     @property
     def answer(self) -> str:
         """The answer, in words and a short table."""
         return report.said(self._results, paper.cards(self._results.study, self.tables))
+
+    def __repr__(self) -> str:
+        """The study in five lines."""
+        rows, scenes = self.thresholds, len(self._results.scenes)
+        usable = f"{rows['usable'].sum()} of {len(rows)} thresholds are usable" if len(rows) else ""
+        lines = [f"{scenes} scenes; {usable or 'no threshold yet'}", f"page: {self.page}"]
+        lines += [f"tables: {', '.join(self.tables)}", "in words: .answer; as a table: .thresholds"]
+        return "\n".join([self.title, *lines])
+
+    def _repr_html_(self) -> str:
+        """The answer with its table, for a notebook."""
+        return f"<h3>{escape(self.title)}</h3><pre>{escape(self.answer)}</pre>"
 
     def case(self, name: str) -> Path:
         """The directory of the one case whose name begins so; else an `InputError`."""

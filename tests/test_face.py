@@ -48,6 +48,8 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
 def test_a_bad_argument_gets_one_clear_error(arguments: dict[str, Any], name: str) -> None:
     with pytest.raises(InputError, match=name):
         orchestrator.threshold(1e-3, **arguments)
+    with pytest.warns(UserWarning, match="did you mean 0.35 mm, diameter 0.00035"):
+        orchestrator.threshold(0.35)
 
 
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
@@ -67,7 +69,10 @@ def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:
     assert rows["d_m"].tolist() == [7e-4, 1e-3]
     assert rows["usable"].all()
     assert set(opened.tables) == {"scenes", "single_grain"}
-    assert "One grain of 0.7 mm" in opened.answer
+    assert [*rows][:5] == ["d_m", "alpha_deg", "rho_f_kg_m3", "force_law", "shields_closed_form"]
+    assert "One grain of 0.7 mm" in opened.answer in opened._repr_html_()
+    _, usable, *rest = repr(opened).splitlines()
+    assert (usable, len(rest)) == ("2 scenes; 2 of 2 thresholds are usable", 3)
     (name,) = set(rows["case"])
     assert opened.case(name) == opened.case("cells") == out / "cases" / name
     with pytest.raises(InputError, match="0 cases begin with"):

@@ -3,8 +3,7 @@
 Here are its parameters and results, by every name that they have.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from orchestrator.physics import fluids
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
@@ -44,8 +43,6 @@ PARAMETERS = {
     "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
-OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
-"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
 GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
 """Parameters whose ranges are spaced geometrically."""
 QUANTITIES = {
@@ -63,15 +60,3 @@ QUANTITIES = {
 """Columns of a threshold, each with its name in JSON and its symbol and unit for people."""
 MEASURED = tuple(f"measured_{name}" for name in ("curve", "median", "low", "high", "rows"))
 """Columns of what was measured beside it, `physics.beside.Beside`; names in JSON, too."""
-
-
-def with_fluid(given: Mapping[str, Any], fluid: str | None, degrees: Any) -> dict[str, Any]:
-    """Parameters with those of a fluid by its name at a temperature, if there is one (deg C).
-
-    An `InputError` refuses what a table ``[fluid]`` of a study file may not have either.
-    """
-    named = {"kind": fluid, fluids.TEMPERATURE: degrees}
-    table = {name: value for name, value in named.items() if value is not None}
-    table |= {name: given[key] for key, name in OF_FLUID.items() if key in given}
-    numbers = fluids.numbers_of(table)
-    return {**given, **{key: numbers[name] for key, name in OF_FLUID.items() if name in numbers}}

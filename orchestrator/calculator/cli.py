@@ -10,24 +10,22 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import (
-    GEOMETRIC,
-    MEASURED,
-    MOST_POINTS,
-    OF_FLUID,
-    PARAMETERS,
-    QUANTITIES,
-    with_fluid,
-)
+from orchestrator.calculator import GEOMETRIC, MEASURED, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE
+from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE, numbers_of
 
-if TYPE_CHECKING:
-    from orchestrator.types import Row  # its module loads numpy
+if TYPE_CHECKING:  # these load numpy
+    from orchestrator.calculator.table import Table
+    from orchestrator.types import Row
 
 Value = float | str  # a number, or a part of the diameter such as ``d/30``
-OPTIONS = {name: f"--{name.removesuffix('_deg').replace('_', '-')}" for name in PARAMETERS}
+OF_FLUID = {"fluid_density": "density", "viscosity": "viscosity"}
+"""Parameters that a fluid has by its name, as a table ``[fluid]`` calls them."""
+OPTIONS = {
+    name: f"--{name.removesuffix('_deg').replace('_', '-')}"
+    for name in (*PARAMETERS, "fluid", "temperature", "law")
+}
 FORM = "write a number in SI units, or FIRST:LAST:COUNT such as 1e-4:2e-3:20; a z0 may be d/30"
 RANGES = (
     "Any number may be a range FIRST:LAST:COUNT, such as --diameter 1e-4:2e-3:20, for a table; "
@@ -73,24 +71,13 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from orchestrator.calculator.table import thresholds
-
-    given = {name: text for name in PARAMETERS if (text := getattr(options, name)) is not None}
-    try:
-        given = with_fluid(given, options.fluid, options.temperature)
-    except InputError as error:
-        raise _renamed(error, ()) from None
-    texts = {name: given.get(name, each.default) for name, each in PARAMETERS.items()}
-    axes = {name: values(name, str(text)) for name, text in texts.items() if text is not None}
+    texts = {name: text for name in PARAMETERS if (text := getattr(options, name)) is not None}
+    axes = {name: values(name, text) for name, text in texts.items()}
     if (count := math.prod(map(len, axes.values()))) > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
         raise InputError(what, "threshold", "lower a COUNT")
-    asked = questions(axes)
     points = dict(zip(axes, zip(*itertools.product(*axes.values()), strict=True), strict=True))
-    try:
-        table = thresholds(points, options.law)
-    except InputError as error:
-        raise _renamed(error, asked) from None
+    table, asked = answered(points, options.law, options.fluid, options.temperature, OPTIONS)
     if asked:
         print(f"orchestrator: {'; '.join(asked)}", file=sys.stderr)
     cells = zip(*(column.tolist() for column in table.values()), strict=True)
@@ -133,12 +120,49 @@ def values(name: str, text: str) -> list[Value]:
     return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else spaced
 
 
-def questions(axes: Mapping[str, Sequence[Value]]) -> list[str]:
+def answered(
+    points: Mapping[str, Sequence[Value]],
+    law: str,
+    fluid: str | None,
+    degrees: float | None,
+    names: Mapping[str, str],
+) -> tuple["Table", list[str]]:
+    """`table.thresholds` of points, in a fluid by its name (at deg C), and questions on them.
+
+    `names` are those that refusals and questions have for the parameters.
+    """
+    from orchestrator.calculator.table import thresholds
+
+    asked: list[str] = []
+    try:
+        given: dict[str, Any] = {"kind": fluid, TEMPERATURE: degrees}
+        given |= {field: points.get(name) for name, field in OF_FLUID.items()}
+        numbers = numbers_of({field: value for field, value in given.items() if value is not None})
+        if fluid is not None:
+            count = len(points["diameter"])
+            both = {name: [numbers[field]] * count for name, field in OF_FLUID.items()}
+            points = {**points, **both}
+        asked = questions(points, names)
+        return thresholds(points, law), asked
+    except InputError as error:
+        fields = {each.field: names[name] for name, each in PARAMETERS.items()}
+        fields |= {"fluid.kind": names["fluid"], f"fluid.{TEMPERATURE}": names["temperature"]}
+        fields["law"] = names["law"]
+        texts = error.what, error.where, "; ".join(filter(None, [error.remedy, *asked]))
+        written = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
+        named = [re.sub(written, lambda at: fields.get(at[0], at[0]), text) for text in texts]
+        raise InputError(*named) from None
+
+
+def questions(points: Mapping[str, Sequence[Value]], names: Mapping[str, str]) -> list[str]:
     """Questions on parameters whose largest value, or smallest diameter, looks wrong."""
-    numbers = {name: [x for x in axis if not isinstance(x, str)] for name, axis in axes.items()}
-    top = {name: max(values, default=0.0) for name, values in numbers.items()}
+    given = {name: points.get(name, (each.default,)) for name, each in PARAMETERS.items()}
+    numbers = {
+        name: [x for x in of_name if isinstance(x, int | float)] for name, of_name in given.items()
+    }
+    top = {name: max(of_name, default=0.0) for name, of_name in numbers.items()}
     asked = [
-        f"{question.format(top[name])}, {OPTIONS[name]} {top[name] * factor:.4g}?"
+        f"{question.format(top[name])}, {names[name]} {top[name] * factor:.4g}?"
         for name, low, high, question, factor in UNITS
         if low <= top[name] < high
     ]
@@ -150,18 +174,9 @@ def questions(axes: Mapping[str, Sequence[Value]]) -> list[str]:
     is_of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
     if rho > 0 and nu > 0 and (is_of_air or not low <= rho * nu <= high):
         unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3"
-        asked.append(f"{unusual}: is it right? water, seawater, air: --fluid NAME")
+        known = f"{names['fluid']} names water, seawater, air"
+        asked.append(f"{unusual}: is it right? {known}")
     return asked
-
-
-def _renamed(error: InputError, asked: Sequence[str]) -> InputError:
-    """A refusal with options for the fields of a study file; questions belong to its remedy."""
-    options = {each.field: OPTIONS[name] for name, each in PARAMETERS.items()}
-    options |= {"fluid.kind": "--fluid", f"fluid.{TEMPERATURE}": "--temperature"}
-    texts = error.what, error.where, "; ".join(filter(None, [error.remedy, *asked]))
-    fields = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
-    named = [re.sub(fields, lambda at: options.get(at[0], f"--{at[0]}"), text) for text in texts]
-    return InputError(*named)
 
 
 def _is_nan(value: object) -> bool:

@@ -1,4 +1,9 @@
-"""Density and viscosity of water, sea water and air at 1013.25 hPa by their temperature."""
+"""Density and viscosity of water, sea water and air at 1013.25 hPa by their temperature.
+
+Kell, J. Chem. Eng. Data 20, 97 (1975); Patek et al., J. Phys. Chem. Ref. Data 38, 21 (2009), which
+is IAPWS SR6-08; Millero and Poisson, Deep-Sea Res. 28A, 625 (1981); Sharqawy et al., Desalin. Water
+Treat. 16, 354 (2010), Eq. 22; U.S. Standard Atmosphere (1976).
+"""
 
 import difflib
 from collections.abc import Mapping
@@ -16,25 +21,16 @@ TEMPERATURE = "temperature_deg_c"  # as a table ``[fluid]`` calls it
 
 
 def water(t: float) -> tuple[float, float]:
-    """Density (kg/m3) and viscosity (Pa s) of water at t deg C.
-
-    Kell (1975), J. Chem. Eng. Data 20, 97; Patek et al. (2009), J. Phys. Chem. Ref. Data 38, 21,
-    which is IAPWS SR6-08.
-    """
+    """Density (kg/m3) and viscosity (Pa s) of water at t deg C: Kell (1975), IAPWS SR6-08."""
     density = 999.83952 + 16.945176 * t - 7.9870401e-3 * t**2 - 46.170461e-6 * t**3
     density += 105.56302e-9 * t**4 - 280.54253e-12 * t**5
-    part = (t + ZERO_C) / 300
-    micro_pa_s = 280.68 * part**-1.9 + 511.45 * part**-7.7
-    micro_pa_s += 61.131 * part**-19.6 + 0.45903 * part**-40
+    terms = ((280.68, 1.9), (511.45, 7.7), (61.131, 19.6), (0.45903, 40.0))
+    micro_pa_s = sum(factor * (300 / (t + ZERO_C)) ** power for factor, power in terms)
     return density / (1 + 16.879850e-3 * t), 1e-6 * micro_pa_s
 
 
 def sea_water(t: float) -> tuple[float, float]:
-    """The same of sea water of 35 g/kg of salt.
-
-    Millero and Poisson (1981), Deep-Sea Res. 28A, 625, UNESCO's equation of state of 1980; Sharqawy
-    et al. (2010), Desalin. Water Treat. 16, 354, Eq. 22.
-    """
+    """The same of sea water: Millero and Poisson (1981), UNESCO's; Sharqawy et al. (2010)."""
     density, viscosity = water(t)
     salt = 0.824493 - 4.0899e-3 * t + 7.6438e-5 * t**2 - 8.2467e-7 * t**3 + 5.3875e-9 * t**4
     density += salt * SALINITY + 4.8314e-4 * SALINITY**2

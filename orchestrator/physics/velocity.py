@@ -77,18 +77,15 @@ def measurable_speeds(
 ) -> dict[str, FloatArray]:
     """Speeds of an undisturbed flow that are measured, by the column of a table, m/s.
 
-    They are the wind of a gas 1 and 10 m above the bed, the current of a liquid at 1 m, and the
-    mean velocity of a flow of a `depth`, m, which is NaN where there is none. Not a number is what
-    the flow has not: a height above its top, the mean velocity of one that may be laminar.
+    NaN is what it has not: wind of a liquid, current of a gas, a height above its `depth` (m; NaN:
+    none), a mean velocity without a depth or where it may be laminar.
     """
-    rho, nu, deep = (np.asarray(each, float) for each in (density, viscosity, depth))
+    nu, deep, rho = (np.asarray(x, float) for x in (viscosity, depth, density))
+    is_gas = rho < GAS_BELOW
     with np.errstate(divide="ignore", invalid="ignore"):  # without a flow, and without a depth
         z0 = outer_roughness(roughness, ustar, nu)
-        at_1, at_10 = (
-            np.where(deep < height, np.nan, log_law_speed(ustar, height, z0)) for height in (1, 10)
-        )
+        at_1, at_10 = (np.where(deep < z, np.nan, log_law_speed(ustar, z, z0)) for z in (1, 10))
         mean = depth_mean_speed(ustar, deep, z0, closed=closed)
-        is_gas = rho < GAS_BELOW
         return {
             "wind_1m_m_s": np.where(is_gas, at_1, np.nan),
             "wind_10m_m_s": np.where(is_gas, at_10, np.nan),

@@ -126,7 +126,7 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
     [
         (["--diameter", "0.2"], "0.2 m: did you mean 0.2 mm, --diameter 0.0002?"),
         ([*D, "--fluid-density", "1000"], "1e-05 m2/s, or 0.01 Pa s, is unusual"),
-        ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "water, seawater, air: --fluid"),
+        ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "is it right? --fluid names water"),
         ([*D, "--density", "2.65"], "2.65 g/cm3, --density 2650?"),
         ([*D, "--slope", "0.26"], "0.26 rad, --slope 14.9?"),
         ([*D, "--gravity", "981"], "981 cm/s2, --gravity 9.81?"),
