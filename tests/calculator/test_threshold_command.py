@@ -164,8 +164,6 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
         ([*D, "--fluid", "air", "--viscosity", "1"], ["--viscosity: air has its own"]),
-        ([*D, "--temperature", "5"], ["--fluid", "choose water, seawater, air"]),
-        ([*D, "--fluid", "seawater", "--temperature", "60"], ["--temperature", "0 ... 40 deg C"]),
         (["--diam", "1e-3"], ["there is no option --diam: did you mean --diameter?"]),
         ([*D, "--csv", "--json"], ["--json", "not allowed with"]),
     ],
