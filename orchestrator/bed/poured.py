@@ -57,19 +57,23 @@ LOCAL = 5.0
 """Length of bed before and behind a grain that its height is compared with, d."""
 
 
-def drawn(sizes: Sizes | None, diameter: float, count: int, seed: int) -> FloatArray:
+def drawn(
+    sizes: Sizes | None, diameter: float, count: int, seed: int, dimensions: int
+) -> FloatArray:
     """Diameters of some grains over one diameter, in random order, shape (count,).
 
-    They are evenly spread over the distribution by number: no bed has more of a size by chance.
+    They are evenly spread over the distribution by number: no bed has more of a size by chance. In
+    3 dimensions a size has its part of the volume. In 2 it has that part of the area, as on the
+    face of any bed and on every cut through it.
     """
     part = (np.arange(count) + 0.5) / count
     if sizes is None:
         return np.ones(count)
     if isinstance(sizes, LogNormal):
-        each = sizes.quantile(part, power=3)
+        each = sizes.quantile(part, power=dimensions)
     else:
         diameters, fractions = np.array(sizes).T
-        number = fractions / diameters**3
+        number = fractions / diameters**dimensions
         classes = np.searchsorted(np.cumsum(number) / number.sum(), part)
         each = diameters[np.minimum(classes, len(diameters) - 1)] / diameter
     return np.random.default_rng(seed).permutation(each)
@@ -97,7 +101,7 @@ class PouredBed(Case):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 3
+    recipe: ClassVar[int] = 4
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
@@ -137,11 +141,15 @@ class PouredBed(Case):
     @cached_property
     def _count(self) -> int:
         """Number of grains that rain into the mould."""
-        sizes = drawn(self.sizes, self.diameter, 1000, 0)
+        sizes = self._drawn(1000, 0)
         mean = float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
         part = FILLED_IN_SPACE * self.width if self.width else FILLED
         length = self.ends[1] - self.ends[0]
         return int(np.ceil((self.depth + self.surface + HEAP) * length * part / mean))
+
+    def _drawn(self, count: int, seed: int) -> FloatArray:
+        """Diameters of so many of its grains, d."""
+        return drawn(self.sizes, self.diameter, count, seed, 3 if self.width else 2)
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -216,7 +224,7 @@ class PouredBed(Case):
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
         floor = self.floor
-        sizes = drawn(self.sizes, self.diameter, self._count, self.seed)
+        sizes = self._drawn(self._count, self.seed)
         places = self.rain(sizes)
         return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), sizes])
 

@@ -324,6 +324,9 @@ class PileCase(GrainCase):
             thresholds, step = loads.leaving(), rules.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
             rising = deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
+            if self.scene.is_poured:
+                # poured without a flow, it rests without one: some go at once that were hidden
+                rising[0] = 0.0
         packed = geometry.packing
         enough = int((1 - rules.final_fraction) * packed.count + 1e-9)
         if rules.update:

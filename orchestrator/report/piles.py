@@ -183,11 +183,14 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         number = np.rint(np.log(sizes) / np.log(np.sqrt(2)))
         for (fraction,), group in split(part, "fraction"):
             logs = group[["size_over_d", "hiding"]].map(np.log).groupby(number[group.index])
-            mean, low, high = (np.exp(item) for item in (logs.mean(), logs.min(), logs.max()))
-            reach = [mean["hiding"] - low["hiding"], high["hiding"] - mean["hiding"]]
+            mean, ends = np.exp(logs.mean()), group.groupby(number[group.index])
+            low, high = ends["hiding_low"].min(), ends["hiding_high"].max()
+            reach = [mean["hiding"] - low, high - mean["hiding"]]
             look: Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
             look["color"] = colours[float(str(fraction))]
             ax.errorbar(mean["size_over_d"], mean["hiding"], yerr=reach, **look)
+            few = mean[ends["few"].any()]
+            ax.plot(few["size_over_d"], few["hiding"], "o", ms=3, color="white", zorder=3)
         ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
         for label, formula, dash in HIDING:
             ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1, label=label)

@@ -110,7 +110,10 @@ class LogNormal(Part):
         return self.smallest or self.sigma_g**-2, self.largest or self.sigma_g**2
 
     def quantile(self, part: ArrayLike, *, power: int) -> FloatArray:
-        """Diameter over the median that a part of the mass (power 0) or number (3) is below."""
+        """Diameter over the median that a part is below, of the mass (power 0) or of the number.
+
+        By number the power is 3 where masses, 2 where areas in a plane are so distributed.
+        """
         from scipy.special import ndtr, ndtri
 
         width = log(self.sigma_g)
@@ -176,10 +179,10 @@ class Grain(Part):
     """pull of a contact over the diameter, of two sizes over their harmonic mean; by pivots and
     peeling alone"""
     sizes: Sizes | None = _poured(None)
-    """mixture of a poured bed: a sieve table, rows of diameter (m, rising) and mass fraction or a
-    CSV file with columns diameter_m and fraction, whose d50 is the diameter; or log-normal by mass,
-    { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by default at two geometric
-    standard deviations"""
+    """mixture of a poured bed, by mass, in one plane by area: a sieve table, rows of diameter
+    (m, rising) and fraction or a CSV file with columns diameter_m and fraction, whose d50 is the
+    diameter; or log-normal, { sigma_g = 1.3, smallest = 0.6, largest = 1.7 }, cut off in d, by
+    default at two geometric standard deviations"""
 
 
 class Forces(Part):

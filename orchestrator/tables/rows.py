@@ -30,6 +30,7 @@ POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "r
 PER_E_FOLD = 0.06
 """Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and 30 deg
 under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in the mean."""
+FEW = 10  # grains of a size class: the interval of its threshold is wide
 # u*/u*_0 at equal parts of the way along the bed from the foot to the top
 WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
 
@@ -169,11 +170,16 @@ class Answer:
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
         self.row_hold = pile.loads(cases).row_hold()
 
-    def at(self, fraction: float, chosen: BoolArray | slice = slice(None)) -> PileThreshold:
-        """The threshold of the pile, or of some of its counted grains, at a fraction."""
-        motion = self.motion if isinstance(chosen, slice) else self.motion.of(chosen)
-        density = self.pile.scene.fluid.density
-        return threshold.of_pile(motion, self.speed[chosen], fraction, density)
+    def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
+        """The threshold of the pile, or of some of its counted grains, at a fraction.
+
+        The interval of some holds how many of so few would have moved by chance.
+        """
+        motion, speed, density = self.motion, self.speed, self.pile.scene.fluid.density
+        if chosen is None:
+            return threshold.of_pile(motion, speed, fraction, density)
+        ends = threshold.sampled(fraction, int(chosen.sum()))
+        return threshold.of_pile(motion.of(chosen), speed[chosen], fraction, density, ends)
 
 
 def shields(scene: Scene, tau: Any) -> Any:
@@ -303,18 +309,23 @@ def size_class(answer: Answer) -> Iterator[Row]:
         middle = shields(scene, each[0].tau) / sizes[0] if 0 in each else np.nan
         for number, size, chosen in classes:
             at = each[number]
-            value, low, high = shields(scene, np.array([at.tau, at.tau_low, at.tau_high])) / size
+            own = shields(scene, np.array([at.tau, at.tau_low, at.tau_high])) / size
+            hiding, hiding_low, hiding_high = own / middle if middle > 0 else own * np.nan
+            value, low, high = own
             yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
                 "size_over_d": size,
                 "count": int(chosen.sum()),
+                "few": bool(chosen.sum() < FEW),
                 "class_moved": motion.moved_by(level)[chosen].mean() if level else np.nan,
                 "ustar0_m_s": at.ustar0,
                 "shields_own": value,
                 "shields_own_low": low,
                 "shields_own_high": high,
-                "hiding": value / middle if middle > 0 else np.nan,
+                "hiding": hiding,
+                "hiding_low": hiding_low,
+                "hiding_high": hiding_high,
                 "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(size) / size),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(size)),
             }

@@ -111,6 +111,9 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {TURBULENT_FROM:g}"
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
+    is_plane = row.get("packing") == "poured" and not (row.get("answered_width") or 0) > 0
+    if is_plane and pd.isna(row.get("sizes")):
+        yield "equal spheres in one plane settle into a crystal: give sizes = { sigma_g = 1.2 }"
     is_renewed = row.get("answered_method") == "peeling" or (row.get("update") or 0) > 0
     if row.get("sheltering") == "balanced" and not is_renewed and row["fraction"] > KEPT_TO + 1e-9:
         yield f"kept balance: beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"

@@ -11,6 +11,7 @@ from orchestrator.grains import pile as pile_of_grains
 from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
+from orchestrator.grains.threshold import sampled
 from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
@@ -148,6 +149,8 @@ def test_a_bed_none_of_whose_grains_is_held_is_refused(
 def test_each_size_class_has_its_threshold(mixed: Results) -> None:
     rows, pile = mixed.tables["size_class"], _pile(mixed, "dem")
     assert (rows.groupby(["scene_id", "fraction"])["count"].sum() == pile.packing.count).all()
+    # of 5 grains 0 to 3 have moved with 80 % where three of ten of all have, so 4 have not
+    assert sampled(0.3, 5) == (0.0, 0.8)
     middle = rows[np.abs(np.log(rows["size_over_d"])) < np.log(2) / 4]
     assert (middle["hiding"].dropna() == 1).all()
     # where the first grains of the class around d lie loose, nothing is hidden

@@ -33,6 +33,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"force_law": "low"}, ["Re* 60 is not below 3"]),
         (None, {"force_law": "high", "reynolds": 20.0}, ["Re* 20 is below 30"]),
         (None, {"force_law": "high", "reynolds": 400.0}, ["Schiller and Naumann"]),
+        (None, {"packing": "poured"}, ["equal spheres in one plane"]),
         (None, {"sheltering": "balanced"}, ["kept balance: beyond n/N = 0.1"]),
         (None, {"reynolds": 1.0}, []),  # a hydraulically smooth bed
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
