@@ -86,6 +86,7 @@ def _parser() -> argparse.ArgumentParser:
         ("budget", _study, "what the choices are worth that all models share"),
         ("stability", _study, "maps of where each method fails"),
         ("validate", _study, "the models beside what was measured"),
+        ("erosion", _study, "what wind takes from a stockpile, by its solved flow and by AP-42"),
         ("doctor", _other, "are the solvers here, can it draw; what to install"),
     ):
         command = commands.add_parser(name, help=text)
@@ -95,8 +96,8 @@ def _parser() -> argparse.ArgumentParser:
             add("directory", type=Path, metavar="DIR")
         if run == _study:
             if name != "stability":
-                default = "first-look" if name == "study" else name
-                add("source", nargs="?", default=default, metavar="FILE|PRESET")
+                preset = {"study": "first-look", "erosion": "stockpile"}.get(name, name)
+                add("source", nargs="?", default=preset, metavar="FILE|PRESET")
             count = os.cpu_count() or 1
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
             add("--workers", type=int, default=count, metavar="N", help="cases at a time")

@@ -90,20 +90,22 @@ def of(
     scenes = (answer.scene for asked, answer in decisions.items() if asked not in piles)
     grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
     cells = tuple(batches(grains.values()))
-    listed: dict[str, Case] = {}
+    runs = (run for pile in (*piles.values(), *checks.values()) for run in pile.runs)
+    return Plan(dict(decisions), piles, cells, checks, listed((*runs, *cells)))
+
+
+def listed(cases: Iterable[Case]) -> dict[str, Case]:
+    """Some cases and all whose results they need, each once, by name, behind those it needs."""
+    found: dict[str, Case] = {}
 
     def add(cases: Iterable[Case]) -> None:
-        """Add cases, each behind all whose results it needs."""
         for case in cases:
-            if case.name not in listed:
+            if case.name not in found:
                 add(case.needs)
-                listed[case.name] = case
+                found[case.name] = case
 
-    for pile in (*piles.values(), *checks.values()):
-        add(pile.runs)
-    add(cells)
-    first = {name: case for name, case in listed.items() if not case.needs}
-    return Plan(dict(decisions), piles, cells, checks, {**first, **listed})
+    add(cases)
+    return {name: case for name, case in found.items() if not case.needs} | found
 
 
 def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:

@@ -82,7 +82,8 @@ class Experiment:
                     page.write(self.title, sections, folder, space.page.name, solvers)
         if self.failing is not None:
             failures = {name: error for name, error in failures.items() if name in self.failing}
-        return Finished(space.page, len(todo), failures)
+        answer = "\n".join(p.text.replace("\n\n", "\n") for p in sections if not p.title)
+        return Finished(space.page, len(todo), failures, answer)
 
 
 def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:

@@ -50,13 +50,14 @@ def check_study(study: Study) -> None:
             check(scene, group.where)
 
 
-def check(scene: Scene, where: str) -> None:
+def check(scene: Scene, where: str, *, grains: bool = True) -> None:
     """Refuse a scene outside of the regions in which its answer means something.
 
     An `InputError` names the first limit that it is beyond: field, map and remedy, and `where`, the
-    scene's file. Where the answer is merely worse, a warning is given.
+    scene's file. Where the answer is merely worse, a warning is given. Without `grains` only the
+    flow over a pile counts.
     """
-    for limit in exceeded(scene):
+    for limit in exceeded(scene, grains=grains):
         remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
         if limit.refused:
             raise InputError(limit.what, f"{where}: {limit.field}", remedy)
@@ -68,13 +69,15 @@ def check(scene: Scene, where: str) -> None:
             raise InputError(error.what, f"{where}: {error.where}", error.remedy) from None
 
 
-def exceeded(scene: Scene) -> Iterator[Limit]:
-    """The limits that a scene is beyond."""
+def exceeded(scene: Scene, *, grains: bool = True) -> Iterator[Limit]:
+    """The limits that a scene is beyond; without `grains` those of its flow."""
     bed = scene.bed
     slope, limit, angle = bed.slope_deg, scene.limiting_slope_deg, bed.entrainment_angle_deg
     if isinstance(bed, PileBed):
-        yield from _pile(scene, bed)
+        yield from _pile(scene, bed) if grains else ()
         yield from _solve(scene, bed) if scene.flow.model == "solve" else _theory(scene, bed)
+    if not grains:
+        return
     if (not isinstance(bed, PileBed) or bed.is_wedge) and slope > limit + 1e-9:
         what = f"{slope:g} deg is beyond {ANGLES} = {limit:g} deg: the bed rolls back without flow"
         yield Limit("slope", "bed.slope_deg", what, "lower the slope or the entrainment angle")

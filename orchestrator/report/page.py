@@ -91,7 +91,7 @@ class Guest:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page of an experiment; `limits` say what a reader must not conclude."""
+    """A part of an experiment's page, its answer if untitled; `limits` is what not to conclude."""
 
     title: str
     text: str = ""

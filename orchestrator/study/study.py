@@ -31,6 +31,7 @@ TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
 MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
 Table = dict[str, Any]
+Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
 
 
@@ -47,6 +48,15 @@ class _Tables(Part):
     seeds: int | None = Field(default=None, ge=0, le=1000)
 
 
+class Erosion(Part):
+    """What `orchestrator erosion` asks of a stockpile: winds and the threshold of its surface."""
+
+    fastest_mile: Annotated[tuple[Wind, ...], List, Field(min_length=1)] = (20.0,)
+    """fastest mile of each time between two disturbances, wind at 10 m, m/s; by default a gale"""
+    threshold: float | str | None = None
+    """friction velocity, m/s, or a material in the table of AP-42; by default the closed form"""
+
+
 class _Group(_Tables):
     name: str = ""
 
@@ -57,6 +67,7 @@ class _File(_Tables):
     tolerance: float | None = Field(default=None, ge=0, lt=1)
     cluster: Table = Field(default={})
     profiles: dict[str, str] = Field(default={})
+    erosion: Erosion = Erosion()
     group: Annotated[tuple[_Group, ...], List, Field(min_length=1)] | None = None
 
 
@@ -80,6 +91,7 @@ class Study:
     tolerance: float | None
     """Relative error that tau_c may have; 0: every scene as it is asked for; None: not given."""
     cluster: dict[str, Any]  # settings of the queue that runs the cases
+    erosion: Erosion  # winds and threshold of `orchestrator erosion`
     text: str  # the file itself, and the profiles that it names
     file: str = ""  # absolute path; empty if the text came from elsewhere
 
@@ -147,7 +159,7 @@ def parse(text: str, *, name: str, where: str) -> Study:
         Group(title, tuple(itertools.chain(*itertools.islice(laws, len(scenes)))), place)
         for title, scenes, place in listed
     )
-    settings = (file.time_limit, file.tolerance, file.cluster, text + files.added)
+    settings = (file.time_limit, file.tolerance, file.cluster, file.erosion, text + files.added)
     return Study(name, file.title or name, groups, *settings)
 
 
@@ -237,9 +249,10 @@ def _explained(error: ValidationError, where: str) -> InputError:
     if branch == "grain" and key in PileBed.model_fields:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
     here = str(path[0]) if path[1:] else ""
-    written = {name: f"{name}, above the first table" for name in keys if name not in PARTS}
-    written |= {n: f"{part}.{n}" for part in reversed([*PARTS]) for n in PARTS[part].model_fields}
-    written |= {name: name for name in (PARTS[here].model_fields if here else keys)}
+    tables: dict[str, type[Part]] = {**PARTS, "erosion": Erosion}
+    written = {name: f"{name}, above the first table" for name in keys if name not in tables}
+    written |= {n: f"{part}.{n}" for part in reversed([*tables]) for n in tables[part].model_fields}
+    written |= {name: name for name in (tables[here].model_fields if here else keys)}
     close = difflib.get_close_matches(key, written, n=1)
     listed = "known keys: docs/study-file.md"
     return InputError(

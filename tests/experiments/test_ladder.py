@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.patches import Rectangle
 
 from orchestrator import plan
 from orchestrator.experiments import ladder
 from orchestrator.experiments.experiment import Runs
-from orchestrator.experiments.ladder import FAST, HEADS, REFERENCES
+from orchestrator.experiments.ladder import FAST, REFERENCES
 from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
@@ -124,26 +123,7 @@ def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
 
 
 def test_points_are_the_errors_of_the_pairs() -> None:
-    other: dict[str, Any] = {"scene_id": "b", "packing": "horizontal", "model_floor": math.nan}
-    points = [_point(pair, **other) for pair in (REFERENCE, FLOW_REFERENCE)]
-    hollow = _point(("RNG k-epsilon", "peeling"), 1.2, same_model=False)
-    pairs = ladder.together(ladder.errors(_table(hollow, *points)))
-    for columns in ({"largest": ""}, HEADS):
-        panels = iter(ladder.chart(pairs, columns).axes)
-        for _, rows in pairs.groupby("packing", sort=False):
-            for column in columns:
-                lines = [line for line in next(panels).lines if line.get_gid() == "point"]
-                xy = [np.asarray(line.get_xydata(), float)[0].tolist() for line in lines]
-                size = rows[column].abs().clip(lower=ladder.FLOOR)
-                assert xy == np.column_stack([rows["cost_core_s"], size]).tolist()
-                looks = [(line.get_marker(), line.get_markerfacecolor()) for line in lines]
-                assert [mark == "v" for mark, _ in looks] == (rows[column] < 0).tolist()
-                assert [face != "white" for _, face in looks] == rows["same_model"].tolist()
-
-
-def test_bars_are_the_factors_gained() -> None:
-    routes = {"route": ["naive", "soft"], "core_s": [4.1e8, 4.1e6], "extrapolated": [True, False]}
-    (ax,) = ladder.gains(pd.DataFrame(routes)).axes
-    bars = [bar for bar in ax.patches if isinstance(bar, Rectangle)]
-    assert [bar.get_x() + bar.get_width() for bar in bars] == pytest.approx([1, 100])
-    assert [bool(bar.get_hatch()) for bar in bars] == [True, False]
+    pairs = ladder.together(ladder.errors(_table()))
+    (ax,) = ladder.chart(pairs, {"largest": ""}).axes
+    xy = [np.ravel(line.get_xydata()) for line in ax.lines if line.get_gid() == "point"]
+    np.testing.assert_array_equal(xy, pairs[["cost_core_s", "largest"]].abs().clip(ladder.FLOOR))
