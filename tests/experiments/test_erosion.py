@@ -40,7 +40,6 @@ def test_the_preset_is_run(tmp_path: Path) -> None:
     flat_top, fenced, ridge, behind, *by_epa = table[table["part"] == "all"]["P, g/m²"]
     assert max(fenced / flat_top, behind / ridge) < 0.7
     assert min(by_epa) < flat_top < max(by_epa)
-    assert table[table["part"] == "windward"]["u*/u*₀"].between(0.9, 1.3).all()
     assert f"{flat_top:.3g} g/m²" in ended.answer.split("\n")[0] in ended.page.read_text()
 
 

@@ -51,7 +51,6 @@ def test_verdicts_are_those_of_real_runs(tmp_path: Path) -> None:
 def test_the_limits_were_read_off_the_maps() -> None:
     table = pd.read_csv(levels.FOLDER / "maps.csv")
     noticed = table[table["verdict"].isin(NOTICED)]
-    assert len(noticed) > 20
     assert noticed["caught"].all()
 
     def runs(name: str) -> pd.DataFrame:
