@@ -70,11 +70,10 @@ def test_faults_are_caught_and_named(
         assert re.search(FAULTS[text], str(verdicts.loc[name, "message"])), text
     assert verdicts["passed"].tolist() == [False] * len(FAULTS) + [True]
     assert verdicts["answered"].tolist() == [False] * (len(FAULTS) - 1) + [True] * 2
-    line = f"my solver: {names[5]} and 1 more of kind closed-form: it ended with 3"
-    assert line in outcome.failures
+    caught = f"my solver: {names[5]} and 1 more of kind closed-form: it ended with 3"
+    assert caught in outcome.failures
     assert outcome.failures[-1] == "and 6 more: see verdicts.csv"
-    line = f"FAILED my solver: of {len(FAULTS) + 1} scenes 1 passed, {len(FAULTS) - 1} failed, 1 d"
-    assert line in outcome.summary
+    assert re.search("FAILED my solver: of .* 1 passed, .* failed, 1 declined", outcome.summary)
     assert "\x1b" not in "".join(outcome.failures) + outcome.page.read_text()
     assert not list(folder.iterdir())  # the private directories are removed
 
