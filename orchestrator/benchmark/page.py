@@ -56,9 +56,9 @@ AXES: dict[str, tuple[str, str, Look]] = {
 def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
     """Put the page and its figures into a directory; the tables are those of `compare.judge`."""
     theirs = verdicts[verdicts["solver"] != OURS]
-    text = "\n\n".join([*compare.in_words(theirs), ERRORS])
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
+    scenes = scenes.rename(columns=SHOWN)
     with style.settings(), warnings.catch_warnings():
         # the name of a solver may have letters that the font has not
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
@@ -66,10 +66,10 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
         beds = [_panels(numbers, answered[kind], *of) for kind, *of in BEDS if kind in answered]
         beds += _shields(chosen, numbers)
         sections = [
-            Section("Levels", text, (), (compare.summary(theirs),), LIMITS),
+            Section("", "\n\n".join(compare.in_words(theirs)), (), (compare.summary(theirs),)),
             Section("What failed", tables=(compare.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
-            Section("Time and error", "", _speed(verdicts), (scenes.rename(columns=SHOWN),)),
+            Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"

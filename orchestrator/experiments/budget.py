@@ -25,6 +25,7 @@ from orchestrator.grains.pile import line as bed_line
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
 from orchestrator.report.page import Section
+from orchestrator.report.results import FRACTION
 from orchestrator.report.style import Figure, Look
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
@@ -39,6 +40,7 @@ QUANTITIES = {"shields": "Shields number $θ$", "ustar0": "undisturbed friction 
 ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
 COLOURS = ("#0072b2", "#d55e00")
+ALONE = "What each choice moves, changed alone"
 MOST_PILES = 4  # whose wear is drawn; the table has all
 
 
@@ -191,24 +193,30 @@ def _sections(
 ) -> list[Section]:
     """The page: all choices, the bed that changes, a tornado for each scene, the alternatives."""
     words, rows, tornados = TEXTS["budget"], [], []
-    for number, (_, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
+    piles, bases = runs.planned.piles, {c.scene.id: c.base for c in reversed(listed)}
+    for number, (scene_id, scene) in enumerate(shared.groupby("scene_id", sort=False), 1):
         name, largest = str(scene["scene"].iloc[0]), scene.groupby("choice", sort=False)[ENDS].max()
-        row = {"scene": name}
-        for quantity, symbol in zip(QUANTITIES, ("θ", "u*₀"), strict=True):
+        base, fraction = (
+            piles[bases[str(scene_id)]],
+            min(scene["fraction"], key=lambda n: abs(float(n) - FRACTION)),
+        )
+        (at,) = base.thresholds(runs.cases, [fraction])
+        row, values = {"scene": name}, (shields(base.scene, at.tau), at.ustar0)
+        for quantity, symbol, value in zip(QUANTITIES, ("θ", "u*₀, m/s"), values, strict=True):
             low, high = levels.together(largest, quantity)
-            row[f"{symbol}, %"] = f"−{100 * low:.0f} … +{100 * high:.0f}"
+            row[symbol] = f"{value:#.3g}"
+            row[f"{symbol}: interval"] = f"{value * (1 - low):#.3g} … {value * (1 + high):#.3g}"
             widths = largest[f"{quantity}_low"] + largest[f"{quantity}_high"]
-            row[f"{symbol}: largest share"] = str(widths.idxmax())
+            row[f"{symbol}: most by"] = str(widths.idxmax())
         rows.append(row)
-        ends = zip(100 * scene["shields_low"], 100 * scene["shields_high"], strict=True)
-        share = [f"−{low:.1f} … +{high:.1f}" for low, high in ends]
-        heads = [f"change of θ at {fraction:.0%}, %" for fraction in scene["fraction"]]
-        wide = scene.assign(share=share, head=heads).set_index(["choice", "head"])["share"]
-        chart = Figure(f"tornado-{number}", name, words["scene"], (), tornado(largest))
-        tornados.append(Section(name, "", [chart], [wide.unstack(sort=False).reset_index()]))
+        theta, ends, most, ustar, ustar_ends, _ = list(row.values())[1:]
+        said = f"{name}: {fraction:.0%} of the exposed grains go at θ = {theta} ({ends} with all "
+        said += f"choices together, most by {most}), u*₀ = {ustar} m/s ({ustar_ends})."
+        chart = Figure(f"tornado-{number}", ALONE, words["scene"], (), tornado(largest))
+        tornados.append(Section("", said, [chart]))
     title, all_scenes = "All choices together", [pd.DataFrame(rows)]
     sections = [Section(title, words["together"], (), all_scenes, [words["limit"]])]
-    piles, changed_beds = runs.planned.piles, [c for c in listed if c.choice.name == FROZEN]
+    changed_beds = [c for c in listed if c.choice.name == FROZEN]
     both = [(c.base, c.other) for c in changed_beds if runs.are_done(c.base, c.other)]
     if both:
         frozen = moved[moved["choice"] == FROZEN]
@@ -220,12 +228,8 @@ def _sections(
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     tables = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
-    refused = [change for change in listed if not runs.are_done(change.other)]
-    if lost := [(label(c.scene), c.choice.name, c.alternative) for c in refused]:
-        tables.append(pd.DataFrame(lost, columns=["scene", "choice", "alternative"]))
-    text = "The alternatives of the second table have no answer." * bool(lost)
-    last = Section("The choices and their alternatives", text, (), tables)
-    return [*sections, *tornados, last]
+    last = Section("The choices and their alternatives", "", (), tables)
+    return [tornados[0], *sections, *tornados[1:], last]
 
 
 def tornado(largest: pd.DataFrame) -> Canvas:
@@ -238,6 +242,7 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     for name, offset, colour in zip(QUANTITIES, (bar / 2, -bar / 2), COLOURS, strict=True):
         low, high = 100 * rows[f"{name}_low"], 100 * rows[f"{name}_high"]
         ax.barh(np.arange(len(rows)) + offset, low + high, bar, left=-low, color=colour, lw=0)
+    ax.use_sticky_edges = False  # no bar ends on the frame
     ax.axvline(0.0, color="0.2", lw=0.8)
     ax.axhline(len(largest) - 0.5, color="0.7", lw=0.6)
     ax.set_yticks(range(len(rows)), list(rows.index))

@@ -361,15 +361,15 @@ def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
     every = every.rename("median of the sets in which they differ")
     least, better = float(every.min()), every.idxmin()
     ends = "The default model is kept: none is within." if least > ENOUGH else ""
-    text = (
-        f"{words['sets']} Nearest is “{better}”, a factor {least:.2f}; asked is {ENOUGH:g}. {ends}"
-    )
+    said = f"Of {len(every)} models “{better}” is nearest to the measurements, off by a factor of"
+    said += f" {least:.2f} in the median of their sets; asked is {ENOUGH:g}. {ends}"
     wide = scored.pivot(index="set", columns="model", values="factor").reset_index()
     summary = [every.reset_index(), wide[["set", *(model.name for model in MODELS)]]]
     memory = rows[(rows["sure"] != "read") & (rows["model"] == MODELS[-1].name)]
     memory = memory[["set", "source", "measured", "value", "ratio"]]
     return [
-        Section("Model over measurement", text, (chart,), summary),
+        Section("", said),
+        Section("Model over measurement", words["sets"], (chart,), summary),
         Section("Thresholds", words["thresholds"], (points,), [scored]),
         Section("From memory", words["memory"], (), [memory]),
     ]
