@@ -29,7 +29,6 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	cp results/ladder/tables/levels.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
 	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
-	cp results/ladder/figures/gains.png docs/gains.png
 	cp results/stability/figures/maps.png docs/stability.png
 
 docs:  ## make the site of the documents, site/README.html, which reads offline

@@ -2,15 +2,12 @@
 
 The levels of the grains are run on the flow of the reference, those of the flow with the grains by
 peeling, so that each error is that of one part; a few pairs as they are used show that the errors
-add up. Beside them stands the naive route: a run of the whole pile for each Re*, with every grain
-mobile. It is measured on a small pile with few load steps and extrapolated: the time of a run is
-that of a load step, in proportion to the grains, and the runs are as many as the load steps by
-which the fast level finds the same curve.
+add up.
 """
 
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +24,8 @@ from orchestrator import plan
 from orchestrator.bed.line import of_bed
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, label, piles
 from orchestrator.fidelity import levels, limits
-from orchestrator.fidelity.decision import Decision, as_asked, on_levels
-from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, changed, level
-from orchestrator.grains.pile import Pile
+from orchestrator.fidelity.decision import Decision, on_levels
+from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, level
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
 from orchestrator.report.page import Section
@@ -40,8 +36,7 @@ from orchestrator.study.study import Study
 from orchestrator.tables.rows import point
 from orchestrator.types import Row
 
-FINE, FAST = level("flow", "fine"), level("grains", "1 layer, fast")
-WHOLE = level("grains", "full pile, fast")
+FINE = level("flow", "fine")
 REFERENCES = (
     (("fine", "reference"), ("fine", "soft reference")),
     (("flat", "reference"), ("flat", "soft reference")),
@@ -56,8 +51,6 @@ USED = (  # together
 )
 CURVE = np.arange(0.05, 0.86, 0.05)  # fractions at which whole curves are compared
 HEADS = {f"error_{n}": f"$n/N$ = {n} %" for n in (10, 30, 50, 70)} | {"error_curve": "whole curve"}
-# few load steps, on which the time of one is measured for the naive route
-STEPS = {"protocol.load_increment": 0.2, "protocol.waiting_time": 10.0, "protocol.time_step": 0.2}
 LEVEL_PAIR = ["flow_level", "grain_level"]
 FLOOR = 1e-3  # errors below it are drawn on it
 BANDS = (
@@ -76,19 +69,17 @@ FRONT: Look = {"color": "0.25", "lw": 0.9, "zorder": 1.5}
 def experiment(study: Study, out: Path) -> Experiment:
     """What each level costs and how far it is off, on the piles of a study."""
     limits.check_study(study)
-    routes, pairs = naive_routes(study), decisions(study)
-    planned = plan.of({**pairs, **routes}, cases=out.absolute() / "cases")
+    pairs = decisions(study)
+    planned = plan.of(pairs, cases=out.absolute() / "cases")
 
     def results(runs: Runs) -> Results:
         measured = points(pairs, runs)
         if measured.empty or (compared := errors(measured)).empty:
             return {}, ()
         means = together(compared)
-        fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
         rows = compared.merge(means[["packing", *LEVEL_PAIR, "pareto"]], how="left")
-        known, naive = known_errors(measured), naive_costs(routes, fast, runs)
-        tables = {"points": rows.fillna({"pareto": False}), "levels": known, "naive": naive}
-        return tables, _sections(means, known, naive)
+        known = known_errors(measured)
+        return {"points": rows.fillna({"pareto": False}), "levels": known}, _sections(means, known)
 
     return Experiment("ladder", "Speed against accuracy", planned, results, study.time_limit_s)
 
@@ -236,39 +227,7 @@ def known_errors(points: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(tables)[columns].sort_values(key)
 
 
-def naive_routes(study: Study) -> dict[str, Decision]:
-    """The lowest lattice of a study, in grains, by each naive route; first that of K = 1e6 N/m."""
-    lattices = piles(study, by_dem=True)
-    scene = min(lattices, key=lambda scene: lattices[scene].height / scene.grain.diameter)
-    whole = changed(WHOLE.answer(scene), STEPS)
-    of_paper = level("grains", "paper's K, fast").fields(scene)["grain.stiffness"]
-    stiffness = {"K = 1e6 N/m": of_paper, "K d/W = 1e4": 1e4}
-    return {
-        f"every Re* alone, {name}": as_asked(changed(whole, {"grain.stiffness": value}))
-        for name, value in stiffness.items()
-    }
-
-
-def naive_costs(routes: Iterable[str], fast: str, runs: Runs) -> pd.DataFrame:
-    """Cost of each route for the curve of a pile: route, core_s (NaN if not run), extrapolated.
-
-    The naive routes are of the small pile; `fast` is the pile in question on the level `FAST`.
-    """
-    piles = runs.planned.piles
-    pile, rows = piles[fast], []
-    for route in routes:
-        small, naive_s = piles[route], math.nan
-        if runs.are_done(route, fast):
-            whole = Pile(WHOLE.answer(pile.scene), runs.cases)
-            grains = float(whole.packing.mobile.sum() / small.packing.mobile.sum())
-            steps, of_small = (len(each.motion(runs.cases).flow) - 1 for each in (pile, small))
-            naive_s = runs.cpu_s(small.method.cases) / of_small * grains * steps
-        rows.append((route, naive_s, True))
-    rows.append((FAST.name, runs.cpu_s(pile.method.cases), False))
-    return pd.DataFrame(rows, columns=["route", "core_s", "extrapolated"])
-
-
-def _sections(pairs: pd.DataFrame, known: pd.DataFrame, naive: pd.DataFrame) -> list[Section]:
+def _sections(pairs: pd.DataFrame, known: pd.DataFrame) -> list[Section]:
     words, index = TEXTS["ladder"], ["part", "scene_class", "level", "scenes", "cost_core_s"]
     heads = {name: f"{name.removeprefix('error_')} %" for name in HEADS}
     heads |= {"flow_level": "flow", "grain_level": "grains", "scene_class": "scene class"}
@@ -287,11 +246,9 @@ def _sections(pairs: pd.DataFrame, known: pd.DataFrame, naive: pd.DataFrame) -> 
     charts = [Figure("speed-against-accuracy", title, words["largest"], (), largest)]
     title, each = "The error at each fraction", chart(pairs, HEADS)
     charts.append(Figure("error-at-fractions", title, words["fractions"], (), each))
-    gained = [Figure("gains", "Factors gained", "", (), gains(naive))]
     title = "The fidelity levels, and what is known of them"
     return [
         Section("Speed against accuracy", words["accuracy"], charts, [means]),
-        Section("What is gained over the naive route", words["naive"], gained, [naive]),
         Section(title, words["levels"], (), of_levels, [words["limit"]]),
     ]
 
@@ -366,24 +323,3 @@ def _points(ax: Any, rows: pd.DataFrame, column: str, *, named: bool) -> list[An
         front = shown[shown["pareto"]].sort_values("cost_core_s")
         ax.step(front["cost_core_s"], front["y"], where="post", **FRONT)
     return tags
-
-
-def gains(routes: pd.DataFrame) -> Canvas:
-    """How many times cheaper the routes of `naive_costs` are than the first, the naive one.
-
-    What is extrapolated is hatched; what was not measured has no bar.
-    """
-    canvas, blue = style.canvas(0.34 * len(routes) + 0.75), METHODS["DEM"]
-    ax, factor = canvas.subplots(), routes["core_s"].iloc[0] / routes["core_s"]
-    faces = np.where(routes["extrapolated"], "white", blue)
-    hatches = np.where(routes["extrapolated"], "////", "")
-    bars = ax.barh(routes["route"], factor - 1, 0.62, 1, ec=blue, color=faces, hatch=hatches)
-    costs = zip(factor, routes["core_s"], strict=True)
-    ax.bar_label(bars, [f" {gain:,.0f} × ({cost:,.1f} s)" for gain, cost in costs], fontsize=7)
-    ax.set(xscale="log", xlabel="times cheaper than the naive route")
-    ax.set_xlim(0.8, factor.max() ** 1.5)  # the texts beyond the bars need a third of the width
-    ax.invert_yaxis()
-    ax.spines[["top", "right"]].set_visible(False)
-    sample = Patch(label="extrapolated, not run", fc="white", ec=blue, hatch="////")
-    style.legends(canvas, [], [sample])
-    return canvas

@@ -11,11 +11,12 @@ import pytest
 from orchestrator import plan
 from orchestrator.experiments import ladder
 from orchestrator.experiments.experiment import Runs
-from orchestrator.experiments.ladder import FAST, REFERENCES
+from orchestrator.experiments.ladder import REFERENCES
 from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 
+FAST = "1 layer, fast"
 TAU = {"tau_0.1": 1.0, "tau_0.3": 1.5, "tau_0.5": 2.0, "tau_0.7": 2.5, "curve_0.50": 2.0}
 (REFERENCE, AGAIN), (LEVEL_REFERENCE, LEVEL_AGAIN), (FLOW_REFERENCE, FINER) = REFERENCES
 
@@ -36,25 +37,11 @@ def test_every_level_is_run_and_each_pile_beside_its_reference() -> None:
             assert FLOW_REFERENCE in run
 
 
-def test_the_naive_route_is_measured_on_a_small_pile_with_every_grain_mobile(
-    tmp_path: Path,
-) -> None:
+def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(tmp_path: Path) -> None:
     bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
     text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
-    asked = study.parse(text, name="one", where="one")
-    routes, pairs = ladder.naive_routes(asked), ladder.decisions(asked)
-    dearest, softened = (one.scene for one in routes.values())
-    stiffness = dearest.grain.stiffness * dearest.weight / dearest.grain.diameter
-    assert stiffness == pytest.approx(1e6)  # N/m, the paper's
-    assert softened.grain.stiffness == 1e4
-    planned = plan.of({**pairs, **routes})
-    packing = planned.piles[next(iter(routes))].packing
-    assert packing.mobile.sum() > 5 * packing.count
-    # what did not run costs nothing that is known; what needs no run has no error by itself
-    runs = Runs(planned, tmp_path, {})
-    fast = next(key for key, one in pairs.items() if one.levels and one.levels.grains is FAST)
-    assert ladder.naive_costs(routes, fast, runs)["core_s"].isna().all()
-    points = ladder.points(pairs, runs)
+    pairs = ladder.decisions(study.parse(text, name="one", where="one"))
+    points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
     assert set(points["grain_level"]) == {"pivot", "peeling"}
     assert ladder.errors(points).empty
 
@@ -73,7 +60,7 @@ def _table(*more: dict[str, Any]) -> pd.DataFrame:
         _point(REFERENCE, grains_s=100.0),
         _point(AGAIN, 1.01, grains_s=50.0),
         _point(FLOW_REFERENCE, 0.98, grains_s=0.1),
-        _point(("fine", FAST.name), 1.03, grains_s=2.0),
+        _point(("fine", FAST), 1.03, grains_s=2.0),
         _point(("coarse", "peeling"), 0.98 * 1.05, grains_s=0.1, flow_s=0.1),
         _point(FINER, 0.98, grains_s=0.1, flow_s=9.0),
     ]
@@ -81,13 +68,13 @@ def _table(*more: dict[str, Any]) -> pd.DataFrame:
 
 
 def test_errors_are_relative_to_the_reference_and_the_front_is_not_beaten() -> None:
-    table = ladder.errors(_table(_point(("coarse", FAST.name), **{"tau_0.5": math.nan})))
+    table = ladder.errors(_table(_point(("coarse", FAST), **{"tau_0.5": math.nan})))
     rows = table.set_index(["flow_level", "grain_level"])
     assert rows["error_10"][REFERENCE] == pytest.approx(0.0)
     assert rows["error_50"][FLOW_REFERENCE] == pytest.approx(-0.02)
-    assert rows["error_curve"]["fine", FAST.name] == pytest.approx(0.03)
+    assert rows["error_curve"]["fine", FAST] == pytest.approx(0.03)
     assert rows["cost_core_s"]["coarse", "peeling"] == pytest.approx(0.2)
-    assert math.isnan(rows["error_50"]["coarse", FAST.name])
+    assert math.isnan(rows["error_50"]["coarse", FAST])
     np.testing.assert_allclose(table["reference_error"], 0.01)
     pairs = ladder.together(table).set_index(["flow_level", "grain_level"])
     assert pairs["largest"][FLOW_REFERENCE] == pytest.approx(-0.02)
@@ -105,13 +92,13 @@ def test_known_errors_stand_beside_the_uncertainty_of_the_reference() -> None:
         _point(("flat", "peeling"), 0.7),
     ).reset_index(drop=True)
     # a fraction that only one of the two reaches is infinitely off
-    table.loc[table["grain_level"] == FAST.name, "tau_0.5"] = math.nan
+    table.loc[table["grain_level"] == FAST, "tau_0.5"] = math.nan
     known = ladder.known_errors(table).set_index(["scene_class", "level", "fraction"])
     for place, error, uncertainty in (
         (("aligned", "peeling", 0.5), 0.02, 0.01),
         (("aligned", "reference", 0.1), 0.0, 0.01),
-        (("aligned", FAST.name, 0.1), 0.03, 0.01),
-        (("aligned", FAST.name, 0.5), math.inf, 0.01),
+        (("aligned", FAST, 0.1), 0.03, 0.01),
+        (("aligned", FAST, 0.5), math.inf, 0.01),
         (("wall", "coarse", 0.5), 0.05, 0.0),
         (("wall", "flat", 0.5), 1 - 0.7 / 0.98, 0.0),
         (("poured", "peeling", 0.5), 0.4, 0.05),
