@@ -57,10 +57,10 @@ LIMITS = {
         "merge the finest or the coarsest classes of the sieve",
     ),
     "bed.profile": (
-        f"more than {scene.MOST_GRAINS:g} grains or {profile.MOST_CORNERS} points, a slope above "
-        f"{profile.STEEPEST_DEG:g}°, points nearer than {scene.NARROWEST_OVER_D:g} d or "
-        f"{scene.NARROWEST_OVER_CELL:g} of the first cell",
-        "another method, or a shorter bed; smooth it",
+        f"more than {limits.MOST_GRAINS:g} d of bed, of any shape, that are packed with grains, or "
+        f"{profile.MOST_CORNERS} points, a slope above {profile.STEEPEST_DEG:g}°, points nearer "
+        f"than {scene.NARROWEST_OVER_D:g} d or {scene.NARROWEST_OVER_CELL:g} of the first cell",
+        "the method `local`, or a range of `bed.counted`; smooth it",
     ),
     "bed.slope_deg": (
         f"a pile below {LOW:g}° or above {HIGH:g}°; anything counted beyond {limits.ANGLES}, where "

@@ -41,8 +41,7 @@ class Plan:
     @property
     def drawing_s(self) -> float:
         """Expected time of tables, figures and the grains that move without a run, s."""
-        lines = (pile.line.arc_lengths for pile in self.piles.values() if not pile.method.cases)
-        lengths = sum(float(s[-2] - s[1]) for s in lines)
+        lengths = sum(pile.length for pile in self.piles.values() if not pile.method.cases)
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
     @property
@@ -119,7 +118,7 @@ def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
         more = {
             asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
             for asked, answer in plan.decisions.items()
-            if answer.levels and not answer.is_as_asked and asked in plan.piles
+            if answer.levels and answer.is_chosen and asked in plan.piles
             if any(failure(directory / run.name)[1] for run in plan.piles[asked].runs)
         }
         if study.tolerance:

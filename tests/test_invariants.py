@@ -50,6 +50,7 @@ AS_PROFILE = 'bed.profile = "bed.csv"; bed.counted = "windward"'
         # four times the submerged density
         (f"grain.density = {1000 + 4 * 1650.0}; fluid.viscosity = 2e-6", "", 1e-6),
         ("bed.mobile_layers = 5", "", 1e-9),
+        ('protocol.method = "local"', "", 5e-3),
         ("bed.seed = 3", "", 1e-6),
         (f"bed.roughness = {1e-3 / 30}", 'bed.roughness = "d/30"', 1e-9),
         (f"{DUNE}; bed.lee_slope_deg = 30.0", DUNE, 1e-9),

@@ -59,6 +59,13 @@ class BedLine:
         x = np.union1d(self.x, places)
         return replace(self, x=tuple(x.tolist()), z=tuple(self.height(x).tolist()))
 
+    def part(self, start: float, end: float, beyond: float) -> "BedLine":
+        """The line between two places of its inner part, and some of the bed beyond them."""
+        start, end = max(start, self.x[1]), min(end, self.x[-2])
+        inner = (x for x in self.x[1:-1] if start < x < end)
+        x = np.array([start - beyond, start, *inner, end, end + beyond])
+        return replace(self, x=tuple(x.tolist()), z=tuple(self.height(x).tolist()))
+
     @cached_property
     def corners(self) -> FloatArray:
         """X and z of the corners, shape (n, 2)."""

@@ -49,6 +49,8 @@ FINE = 0.1
 """Between two places of a curve at which a row may be opened, diameters."""
 TURNS = 100
 """How often a row is opened further; grains that overlap then are left out by `cover`."""
+PLACES = 2000
+"""Places along a bed without grains, as many as a figure shows."""
 ROOM = 1 + 1e-9
 """Neighbours of a disordered row are at least this far apart, diameters."""
 
@@ -165,6 +167,30 @@ class Lattice:
         shift = np.random.default_rng(self.seed).uniform(-aside, aside, centres.shape)
         arc_length = line.nearest(centres)[1]
         return Packing(centres + shift, np.ones(len(centres)), mobile, windward, lee, arc_length)
+
+
+def along(line: BedLine, counts: str | Range) -> Packing:
+    """Places on a bed line, none of them mobile: the middles of `PLACES` equal counted lengths.
+
+    `counts` is as `BedLine.counted` takes it; an UnfitError if no bed is counted.
+    """
+    ends = () if isinstance(counts, str) else counts
+    finer = line.with_corners([*ends, *(end for bare in line.bare for end in bare)])
+    x, s = np.array(finer.x), finer.arc_lengths
+    middle = (x[1:] + x[:-1]) / 2
+    chosen = line.counted(counts)[np.searchsorted(line.x, middle) - 1] & within(middle, counts)
+    for start, end in line.bare:
+        chosen &= (middle < start) | (middle > end)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(chosen, finer.lengths, 0.0))])
+    if not sums[-1]:
+        raise UnfitError("bed.counted", "no bed is counted", "choose another part of the bed")
+    ways = (np.arange(PLACES) + 0.5) / PLACES * sums[-1]
+    piece = np.searchsorted(sums, ways, side="right") - 1
+    arc_length = s[piece] + ways - sums[piece]
+    x = np.interp(arc_length, s, x)
+    each, none = np.ones(PLACES), np.zeros(PLACES, bool)
+    centres = np.column_stack([x, line.height(x)])
+    return Packing(centres, each, none, ~none, none, arc_length)
 
 
 def pile(line: BedLine, lattice: Lattice) -> Packing:

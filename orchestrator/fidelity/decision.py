@@ -9,13 +9,14 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 from orchestrator.fidelity import levels
-from orchestrator.fidelity.levels import LEVELS, Known, Level, Pair, changed, level, pair_of
+from orchestrator.fidelity.levels import LEVELS, LOCAL, Known, Level, Pair, changed, level, pair_of
+from orchestrator.grains.loads import LONG, Geometry
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.fields import FIELDS
@@ -27,6 +28,7 @@ Names = tuple[str, ...]
 LEAST_HELD = 6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
 ROUNDS = 4
 ASKED = "as the study asks"
+ALONG = f"more than {LONG:g} grains long: closed form along the bed, checked where motion starts"
 ANSWERS = [q.name.split(".") for q in FIELDS if q.info.about == "answer"]
 
 
@@ -51,6 +53,11 @@ class Decision:
         return self.scene == self.asked
 
     @property
+    def is_chosen(self) -> bool:
+        """Whether its levels are of those that higher ones can follow, and not as asked."""
+        return self.levels is not None and not self.is_as_asked and self.levels[1] != LOCAL
+
+    @property
     def error_estimate(self) -> float | None:
         """The known error with its uncertainty; None where it is not known."""
         return None if math.isinf(self.known.total) else self.known.total
@@ -58,8 +65,7 @@ class Decision:
     @property
     def is_unchecked(self) -> bool:
         """Whether it is a pile that the tool chose to answer without DEM."""
-        by_dem = self.scene.protocol.method == "dem"
-        return not (self.levels is None or self.is_as_asked or by_dem)
+        return self.is_chosen and self.scene.protocol.method != "dem"
 
 
 class Bound(NamedTuple):
@@ -93,6 +99,9 @@ def decide(
     """
     decided, offered = {}, {}
     for scene in scenes:
+        if (along := along_if_long(scene)) is not scene:
+            decided[scene.id] = replace(as_asked(along, ALONG), asked=scene)
+            continue
         pairs, why = _offered(scene, tolerance, above.get(scene.id, NO_BOUND))
         if pairs:
             offered[scene.id] = [_option(scene, pair, why, tolerance is None) for pair in pairs]
@@ -103,6 +112,14 @@ def decide(
             why = "the closed form is exact for a single grain in a held flow"
             decided[scene.id] = Decision(scene, exact, None, levels.UNKNOWN, why)
     return decided | _cheapest(offered)
+
+
+def along_if_long(scene: Scene) -> Scene:
+    """A scene by the closed form along the bed if it leaves the method open on a long lattice."""
+    rules, is_lattice = scene.protocol, isinstance(scene.bed, PileBed) and not scene.is_poured
+    if "method" in rules.model_fields_set or not is_lattice or rules.update:
+        return scene
+    return LOCAL.answer(scene) if Geometry(scene).length > LONG else scene
 
 
 def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Sequence[Pair], str]:

@@ -182,7 +182,9 @@ AS_ASKED = Level("as asked", "numbers of the study file")  # where a scene is on
 FLOW, GRAINS = _load("flow"), _load("grains")
 LEVELS = {"flow": FLOW, "grains": GRAINS}
 """All levels, by the part of a pile that they answer, from cheap to dear."""
-FLAT, PEELING = FLOW[0], GRAINS[1]
+FLAT, PIVOT, PEELING = FLOW[0], *GRAINS[:2]
+LOCAL = Level("local", "closed form along the bed line", {"protocol.method": "local"})
+"""A level without grains, for beds that have too many: its error is that of pivots."""
 
 
 def level(part: str, name: str) -> Level:
@@ -193,7 +195,8 @@ def level(part: str, name: str) -> Level:
 def pair_of(scene: Scene) -> Pair:
     """The levels that a pile is on as it is asked; `AS_ASKED` where it is on none."""
     on = ([level for level in levels if level.describes(scene)] for levels in LEVELS.values())
-    return Pair(*(levels[-1] if levels else AS_ASKED for levels in on))
+    flow, grains = (levels[-1] if levels else AS_ASKED for levels in on)
+    return Pair(flow, LOCAL if LOCAL.describes(scene) else grains)
 
 
 class Known(NamedTuple):
@@ -303,7 +306,7 @@ def known(pair: Pair, scene: Scene) -> Known:
     """
     if unmeasured(scene):
         return UNKNOWN
-    levels = list(pair)
+    levels = [PIVOT if each is LOCAL else each for each in pair]
     for place, part in enumerate(LEVELS.values()):
         if levels[place] is AS_ASKED:
             coarser = (x for x in part[::-1] if x.same_model and x.describes(scene, or_finer=True))

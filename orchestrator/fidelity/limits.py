@@ -6,12 +6,14 @@ says it in words.
 
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
+from orchestrator.fidelity.decision import along_if_long
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.theory import half_length, seen_by_the_flow
@@ -19,11 +21,12 @@ from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study.parts import PileBed, UnfitError
-from orchestrator.study.scene import MOST_GRAINS, Scene
+from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 
+MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
 FROZEN_BED = 0.05  # relative change of a threshold up to which the flow of the whole pile acts on
-PILE_SLOPES_DEG = (10.0, 35.0)  # of piles that the mesh and the packing have been tried for
+PILE_SLOPES_DEG = (1.0, 35.0)  # of piles that the mesh and the packing have been tried for
 TIMESTEPS = ((0.1, 0.4), (0.3, 0.2), (0.6, 0.1), (1.0, 0.05))
 """Largest damping ratio, and the largest safe time step up to it, sqrt(m/K)."""
 LEAST_DAMPING = 0.03
@@ -34,7 +37,7 @@ ANGLES = "min(friction angle, 90 deg - entrainment angle)"
 
 
 class Limit(NamedTuple):
-    """A limit that a scene is beyond: a study is refused, or merely warned."""
+    """A limit that a scene is beyond, and the map of it: a study is refused, or merely warned."""
 
     map: str
     field: str
@@ -57,8 +60,11 @@ def check(scene: Scene, where: str, *, grains: bool = True) -> None:
     scene's file. Where the answer is merely worse, a warning is given. Without `grains` only the
     flow over a pile counts.
     """
+    with suppress(UnfitError):  # which is told below
+        scene = along_if_long(scene)
     for limit in exceeded(scene, grains=grains):
-        remedy = f"{limit.remedy}; map “{limit.map}” of `orchestrator stability`"
+        seen = f"; map “{limit.map}” of `orchestrator stability`" if limit.map else ""
+        remedy = limit.remedy + seen
         if limit.refused:
             raise InputError(limit.what, f"{where}: {limit.field}", remedy)
         warnings.warn(f"{limit.field}: {limit.what} ({remedy})", stacklevel=2)
@@ -97,6 +103,12 @@ def largest_timestep(damping: float) -> float:
 def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     (low, high), angle = PILE_SLOPES_DEG, bed.entrainment_angle_deg
     try:
+        if (count := Geometry(scene).length) > MOST_GRAINS:
+            what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
+            remedy = 'protocol.method = "local", or a range of bed.counted; is a profile in mm?'
+            remedy = "a shorter bed" if scene.is_poured else remedy
+            yield Limit("", "bed", f"{what}, more than {MOST_GRAINS:g}", remedy)
+            return
         what = _unfit(scene, bed, of_bed(bed))
     except UnfitError as error:
         what = str(error)
@@ -116,12 +128,8 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
 
 
 def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:
-    """Why grains cannot lie on a bed line: too many, or too steep; empty if they can."""
-    length = line.x[-2] - line.x[1]
-    count = length / scene.grain.diameter
+    """Why grains cannot lie on a bed line, which is too steep; empty if they can."""
     slopes, limit, why = abs(line.slopes_deg), scene.limiting_slope_deg, ANGLES
-    if count > MOST_GRAINS:
-        return f"{length:g} m of bed are {count:.3g} grains, more than {MOST_GRAINS:g}"
     if bed.packing == "poured":
         if bed.obstacles:
             return "no grains can be poured around obstacles"

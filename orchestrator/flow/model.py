@@ -14,10 +14,12 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
 from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
-from orchestrator.study.scene import BUILDABLE_DEG, Scene
+from orchestrator.study.scene import Scene
 
 NODES_PER_DECADE, NODES = 2, 4
 """Nodes in each tenfold of z0/h, and how many of them a flow in between is interpolated from."""
+FACE_DEG = 2.0
+"""Least slope of a profile whose cells are as fine as on a face."""
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,8 @@ def _case(scene: Scene) -> FlowCase:
     bed, update = scene.bed, {"roughness": scene.solve_roughness}
     assert isinstance(bed, PileBed)
     update |= {"viscosity": scene.solve_viscosity, "first_cell_height": scene.first_cell_height}
-    # on a gentler profile cells are as fine as on flat bed
-    slope = bed.slope_deg if bed.slope_deg >= BUILDABLE_DEG[0] else 0.0
+    # on a gentle profile cells are as fine as on flat bed
+    slope = bed.slope_deg if bed.slope_deg >= FACE_DEG or not bed.profile else 0.0
     settings = scene.flow.model_copy(update=update)
     return _shared(bed.relief, slope, settings, of_bed(bed), bed.profile)
 

@@ -30,6 +30,11 @@ TOE = 0.05
 """Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
 KINDS = 20
 """Kinds of grains in a bed beyond which their tables of forces have fewer places."""
+LONG = 5000.0
+"""Length of a bed, d, beyond which a range that is counted is packed alone, and of which no grain
+is packed where no method is asked for."""
+MARGIN = 20.0
+"""Fixed bed before and behind the grains of such a range, d: twice the way of a grain that goes."""
 DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
@@ -112,6 +117,25 @@ class Geometry:
         counts, d = self.bed.counts, self.scene.grain.diameter
         return counts if isinstance(counts, str) else (counts[0] / d, counts[1] / d)
 
+    @cached_property
+    def packed_line(self) -> BedLine:
+        """The part of the bed line with grains, d: all but of a long bed with a counted range."""
+        line, counts = self.line, self.counts
+        if isinstance(counts, str) or self.scene.is_poured or line.x[-2] - line.x[1] <= LONG:
+            return line
+        return line.part(counts[0] - MARGIN, counts[1] + MARGIN, APRON)
+
+    @property
+    def is_part(self) -> bool:
+        """Whether only a part of the bed is packed."""
+        return self.packed_line is not self.line
+
+    @property
+    def length(self) -> float:
+        """Length of bed that has grains, d."""
+        by_grains = self.scene.protocol.method != "local"
+        return (self.packed_line.x[-2] - self.packed_line.x[1]) * by_grains
+
     @property
     def surface(self) -> float:
         """Height over the bed line of the centre of an exposed grain, d."""
@@ -142,8 +166,28 @@ class Geometry:
 
     @cached_property
     def packing(self) -> Packing:
-        """The grains' places, in diameters; scenes that differ in their forces alone share them."""
+        """The grains' places, in diameters; scenes that differ in their forces alone share them.
+
+        By the method "local" they are places along the bed line, as many as a figure shows. On the
+        windward sides of a profile none is counted where the flow runs back.
+        """
+        packed = self._packing
+        if self.turned and self.cases is not None:
+            ahead = self.felt(self.model.stress(self.cases), packed.arc_length) > 0
+            windward, lee = packed.windward & ahead, packed.lee | packed.windward & ~ahead
+            packed = replace(packed, windward=windward, lee=lee)
+        return packed
+
+    @property
+    def turned(self) -> bool:
+        """Whether the flow has a say in which sides are windward: noise rises in a wake as well."""
+        return self.bed.profile is not None and self.bed.counts == "windward"
+
+    @cached_property
+    def _packing(self) -> Packing:
         bed, d = self.bed, self.scene.grain.diameter
+        if self.scene.protocol.method == "local":
+            return packing.along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
             directory, layers = self.cases / run.name, bed.mobile_layers
@@ -158,6 +202,9 @@ class Geometry:
         )
         ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
         if not bed.is_wedge:
+            if self.is_part:
+                x = self.packed_line.x
+                ground = replace(ground, x=x, z=tuple(ground.height(np.array(x)).tolist()))
             return _covered(self.line, ground, self.counts, lattice)
         packed = _packed(ground, lattice)
         # an obstacle before it makes the way along the bed longer
@@ -273,15 +320,19 @@ class Geometry:
 
         `present`, shape (n,), has the grains that have not left yet; by default all.
         """
-        how, d = self.scene.forces, self.scene.grain.diameter
-        length = max(d, how.averaging_length * self.bed.relief)
         s = self.packing.arc_length
         if line is not None:
             x = np.interp(s, self.line.arc_lengths, self.line.x)
             s = np.interp(x, line.x, line.arc_lengths)
-        tau = stress.mean_over(s * d, length, how.stress)
-        ratio = np.where(self._unloaded, 0, np.sign(tau) * np.sqrt(np.abs(tau)))
+        ratio = np.where(self._unloaded, 0, self.felt(stress, s))
         return Loads(self, ratio, np.ones(len(ratio), bool) if present is None else present)
+
+    def felt(self, stress: WallStress, s: FloatArray) -> FloatArray:
+        """Signed friction velocity over u*_0 of the mean stress around some arc lengths, d."""
+        how, d = self.scene.forces, self.scene.grain.diameter
+        length = max(d, how.averaging_length * self.bed.relief)
+        tau = stress.mean_over(s * d, length, how.stress)
+        return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
 
     def loads(self, cases: Path) -> "Loads":
         """The grains under the flow of the whole bed, from the directory of the finished runs."""
@@ -401,7 +452,8 @@ class Loads:
         same grain moves by itself. It is 1 where the first grain of a row has none before it, as at
         a sharp crest, and on a poured bed.
         """
-        if self.geometry.pouring or self.geometry.bed.is_wedge:
+        by_grains = self.geometry.length > 0
+        if self.geometry.pouring or self.geometry.bed.is_wedge or not by_grains:
             return 1.0
         leaving, alone = self.leaving(), self.alone()
         first = int(leaving.argmin())

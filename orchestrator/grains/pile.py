@@ -26,7 +26,7 @@ from orchestrator.grains import motion
 from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.threshold import PileThreshold, of_pile
+from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.scene import Scene
@@ -52,6 +52,8 @@ SPACING = 0.25
 NEAREST = 0.25
 """Least distance along x of a new corner from those of the bed line, d: corners that nearly
 coincide make cells that are far too short."""
+AROUND = 1000.0
+"""Length of bed that is packed around the place where motion starts, d."""
 LEVEL = 1e-6
 """A bed that is less above the flat bed lies on it, d."""
 FAR = 1e9
@@ -282,7 +284,10 @@ class PileCase(GrainCase):
     @property
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
-        return self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+        asked = self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+        # rules for which grains there are that came after other beds were run
+        new = {"turned": self.geometry.turned, "part": self.geometry.is_part}
+        return {**asked, **{rule: True for rule, holds in new.items() if holds}}
 
     @property
     def cost_s(self) -> float:
@@ -309,8 +314,8 @@ class PileCase(GrainCase):
     @property
     def _length(self) -> float:
         """Length of the bed whose grains may move, d."""
-        line = self.geometry.line
-        return line.crest_s if self.geometry.bed.is_wedge else float(line.x[-2] - line.x[1])
+        bed = self.geometry
+        return bed.line.crest_s if bed.bed.is_wedge else bed.length
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
@@ -331,7 +336,7 @@ class PileCase(GrainCase):
         enough = int((1 - rules.final_fraction) * packed.count + 1e-9)
         if rules.update:
             enough = packed.count - goal(geometry, self.flow)
-        grains, (slope, ridge) = table(loads, worn), geometry.line.roof(MARGIN + 0.5)
+        grains, (slope, ridge) = table(loads, worn), geometry.packed_line.roof(MARGIN + 0.5)
         mobile = grains.kind > deck.FIXED
         smallest = float(grains.sizes[mobile].min())
         density, gravity = self.scene.grain.density, self.scene.reduced_gravity
@@ -457,7 +462,7 @@ class Method:
 
 
 class Pivot(Method):
-    """The closed form: each grain by itself under its own stress. All roll."""
+    """The closed form: each grain, or place on the bed line, by itself under its own stress."""
 
     def motion(self, cases: Path) -> Motion:
         """Motion at the flows of Eq. 3 or 5."""
@@ -521,7 +526,10 @@ class Dem(Method):
         return Worn.from_csv(cases / self.runs[-1].name)
 
 
-METHODS: dict[str, type[Method]] = {"pivot": Pivot, "peeling": Peeling, "dem": Dem}
+METHODS: dict[str, type[Method]] = {
+    **{"local": Pivot, "pivot": Pivot},
+    **{"peeling": Peeling, "dem": Dem},
+}
 """The methods by what a study file calls them, cheap to dear."""
 
 
@@ -578,6 +586,36 @@ class Pile(Geometry):
         changes = bool(self.scene.protocol.update)
         ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
         return np.asarray(ratio[self.packing.windward])
+
+    def first(self, cases: Path) -> tuple[float, float]:
+        """Where motion starts, x in m, and at which undisturbed friction velocity, m/s.
+
+        Grains that lie loose, and go in still fluid, say nothing of it.
+        """
+        flows = of_grains(self.motion(cases)).value
+        flows = np.where(flows > 0, flows, np.nan)
+        least = np.flatnonzero(flows == np.nanmin(flows, initial=np.inf))
+        if not len(least):
+            return np.nan, np.nan
+        at = int(least[len(least) // 2])  # of places that go at one flow the one in the middle
+        x = self.packing.centres[self.packing.windward, 0]
+        return float(x[at]) * self.scene.grain.diameter, float(flows[at])
+
+    def around(self, x: float) -> "Pile":
+        """The same bed by pivots, with grains around a counted place alone, x in m."""
+        d, counts, line = self.scene.grain.diameter, self.bed.counts, self.model.line
+        places, counted = np.array(line.x), line.counted(counts)
+        under = int(np.searchsorted(places, x)) - 1
+        bounds = np.flatnonzero(~counted)
+        # no farther than the counted side that the place is on
+        ends = places[bounds[bounds < under][-1] + 1], places[bounds[bounds > under][0]]
+        low, high = (-np.inf, np.inf) if isinstance(counts, str) else counts
+        reach = AROUND / 2 * d
+        part = (max(ends[0], low, x - reach), min(ends[1], high, x + reach))
+        bed = self.bed.model_copy(update={"counted": tuple(map(float, part))})
+        rules = self.scene.protocol.model_copy(update={"method": "pivot"})
+        parts = {name: getattr(self.scene, name) for name in Scene.model_fields}
+        return Pile(Scene(**{**parts, "bed": bed, "protocol": rules}), self.cases)
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which counted grains move by themselves, sorted, m/s.

@@ -27,15 +27,15 @@ def write(
     `failures` are the cases that failed, with why.
     A figure that fails, such as for memory, costs a line of the page.
     """
-    from orchestrator.report import bed, flows, page, piles, shields, style, words
+    from orchestrator.report import along, bed, flows, page, piles, shields, style, words
 
     figures: list[style.Figure] = []
     faults: list[str] = []
     with style.settings():
         for draw in (
-            *(flows.hills, bed.draw, shields.draw, shields.singles, shields.piles),
+            *(flows.hills, along.draw, bed.draw, shields.draw, shields.singles, shields.piles),
             *(piles.fractions, piles.wear, shields.accuracy, piles.poured),
-            *(flows.stress, flows.flow, flows.mesh, flows.where),
+            *(flows.stress, flows.flow, flows.mesh),
         ):
             try:
                 for figure in draw(results):

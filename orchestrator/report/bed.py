@@ -107,7 +107,8 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     """
     for _, rows in split(results.exemplars, "alpha_deg"):
         each = ((row, results.shown(str(row["scene_id"]))) for _, row in rows.iterrows())
-        yield from itertools.islice(((row, piles[0]) for row, piles in each if piles), 1)
+        grains = ((row, pile) for row, piles in each for pile in piles[:1] if pile.length)
+        yield from itertools.islice(grains, 1)
 
 
 def draw(results: Results) -> Iterator[Figure]:

@@ -1,4 +1,4 @@
-"""Figures of flows: stress along the bed, velocity, mesh, where grains go, measured hills."""
+"""Figures of flows: stress along the bed, velocity, mesh, measured hills."""
 
 from collections.abc import Iterator
 from functools import lru_cache
@@ -220,44 +220,6 @@ def read_edges(case: Path) -> FloatArray:
     ends: FloatArray = np.asarray(edges.points, float)[edges.lines.reshape(-1, 3)[:, 1:]]
     front = (ends[..., 1] < ends[..., 1].mean()).all(axis=1)
     return np.asarray(ends[front][..., [0, 2]])
-
-
-def where(results: Results) -> Iterator[Figure]:
-    """Beds that are more than one triangle, each by its first scene: stress, bed, thresholds."""
-    grains = results.tables.get("pile_grain", pd.DataFrame())
-    scenes = {} if grains.empty else dict(iter(grains.groupby("scene_id")))
-    lines: dict[Any, tuple[Pile, pd.DataFrame]] = {}
-    for scene_id, pile in results.plan.piles.items():
-        if scene_id in scenes and not pile.bed.is_triangle and np.ptp(pile.model.line.z) > 0:
-            lines.setdefault(pile.model.line, (pile, scenes[scene_id]))
-    beds = list(lines.values())[:4]  # more do not fit a page
-    if not beds:
-        return
-    figure = style.canvas(4.4 * len(beds) + 0.9)
-    axes = figure.subplots(2 * len(beds), 1, height_ratios=[1.6, 1] * len(beds))
-    for (top, map_), (pile, rows) in zip(axes.reshape(-1, 2), beds, strict=True):
-        _along(results, pile, top)
-        forms = f"{pile.bed.forms} × " * (pile.bed.forms > 1)
-        shape = f"{forms}{pile.bed.profile or pile.bed.form.label or pile.bed.shape}"
-        parts, h = (shape, *pile.bed.obstacles, _title(results, pile)), pile.bed.height
-        top.set_title(", ".join(map(str, parts)), loc="left")
-        top.set(xlim=(-4, pile.model.line.x[-2] / h + 10), ylabel=USTAR)
-        goes, x = np.isfinite(rows["ustar0_m_s"]), rows["x_m"] / h
-        flow = rows["ustar0_m_s"][goes]
-        look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
-        dots = map_.scatter(x[goes], flow, c=flow.rank(method="first") / len(rows), **look)
-        for at in x[~goes]:
-            map_.axvline(at, color="0.75", lw=0.3, zorder=0)
-        map_.margins(y=0.15)
-        map_.sharex(top)
-        map_.set_yscale("log")
-        style.plain_ticks(map_.yaxis)
-        map_.set(xlabel="$x/h$", ylabel=r"goes at $u^\star_0$, m/s")
-    bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
-    bar.set_label("$n/N$ by then")
-    style.legends(figure, [], style.samples(axes))
-    names = tuple(dict.fromkeys(run.name for pile, _ in beds for run in pile.runs))
-    yield Figure("where", "Where grains go", caption("where"), names, figure)
 
 
 def hills(results: Results) -> Iterator[Figure]:

@@ -88,15 +88,12 @@ def _piles(results: Results) -> list[str]:
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     """Where and at which flow the first grain of a pile moves, and when a fraction of it has."""
-    pile, grains = results.plan.piles[str(row["scene_id"])], results.tables["pile_grain"]
-    grains = grains[(grains["scene_id"] == row["scene_id"]) & (grains["ustar0_m_s"] > 0)]
-    x, z = pile.line.crest * pile.scene.grain.diameter
+    x, z = results.plan.piles[str(row["scene_id"])].model.line.crest
     facts = {"name": ", ".join(labels.told(row, ["alpha_deg"] * bool(z > 0) + ["d_m", *telling]))}
-    if len(grains) and z > 0:  # a level bed has no place that goes first
-        first = grains.loc[grains["ustar0_m_s"].idxmin()]
-        facts |= {"x": labels.amount(first["x_m"], "m"), "crest": labels.amount(x, "m")}
-        facts |= {"first": _flow(row, first["ustar0_m_s"])}
-    flow = _flow(row, row["ustar0_m_s"])
+    if row["first_ustar0_m_s"] > 0 and z > 0:  # a level bed has no place that goes first
+        facts |= {"x": labels.amount(row["first_x_m"], "m"), "crest": labels.amount(float(x), "m")}
+        facts |= {"first": flow_at(row, row["first_ustar0_m_s"])}
+    flow = flow_at(row, row["ustar0_m_s"])
     return f"{caption('pile', row=row, flow=flow, **facts)} {_measured(row)}"
 
 
@@ -110,7 +107,7 @@ def _grains(results: Results) -> list[str]:
     said = []
     for row in rows:
         size, slope = (labels.value(column, row[column]) for column in ("d_m", "alpha_deg"))
-        facts = {"row": row, "size": size, "slope": slope, "flow": _flow(row, row["ustar0_m_s"])}
+        facts = {"row": row, "size": size, "slope": slope, "flow": flow_at(row, row["ustar0_m_s"])}
         said.append(f"{caption('one_grain', **facts)} {_measured(row)}")
     return said
 
@@ -122,7 +119,7 @@ def _measured(row: pd.Series) -> str:
     return f"{said[0].upper()}{said[1:]}."
 
 
-def _flow(row: pd.Series, ustar: float) -> str:
+def flow_at(row: pd.Series, ustar: float) -> str:
     """A friction velocity with speeds that are measured: of the wind, or of a channel."""
     depth, closed = float(row["depth_m"] or np.nan), row["flow_top"] == "closed channel"
     of_flow = row["z0_m"], row["nu_m2_s"], row["rho_f_kg_m3"], depth

@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from orchestrator.study.closed_form import regime_of
 from orchestrator.study.parts import Gusts, Info, LogNormal, Part, PileBed
 from orchestrator.study.profile import Profile
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import CLOSED, Scene
 
 PARTS: Mapping[str, type[Part]] = {
     name: PileBed if name == "bed" else declared.annotation  # type: ignore[misc]
@@ -77,8 +77,8 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
     "DEM": lambda scene: scene.protocol.method == "dem",
     "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method == "dem"),
-    "DEM and peeling": lambda scene: scene.protocol.method != "pivot",
-    "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method != "pivot"),
+    "DEM and peeling": lambda scene: scene.protocol.method not in CLOSED,
+    "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method not in CLOSED),
 }
 """The scenes on which a field has an effect, by the `scope` of its `Info`."""
 

@@ -217,14 +217,16 @@ class Forces(Part):
 class Protocol(Part):
     """How the threshold is found; by DEM the flow rises in load steps."""
 
-    method: Literal["dem", "peeling", "pivot"] = field(
+    method: Literal["dem", "peeling", "pivot", "local"] = field(
         "dem", label="threshold method", about="answer"
     )
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
-    another), or DEM
+    another), DEM, or the closed form along the bed line, without grains and for any length; it is
+    the default of a lattice of more than 5000 grains, with pivots around the first motion
     - dem: DEM
     - peeling: peeling
-    - pivot: pivot"""
+    - pivot: pivot
+    - local: closed form along the bed line"""
     load_increment: float = _dem(0.02, "Δu*/u*", ge=1e-4, le=0.2)
     """relative rise of u* from one load step to the next"""
     waiting_time: float = _dem(10.0, unit="√(d/g′)", ge=1, le=1e4)
@@ -412,9 +414,10 @@ class PileBed(Bed):
     counted: Literal["windward", "all"] | Range | None = _pile(
         None, label="counted grains", since=True
     )
-    """exposed grains that are counted, or their range of x; by default those of windward sides,
-    all of a flat bed, a step down and a profile
-    - windward: on sides that rise
+    """exposed grains that are counted, or their range of x, which on a bed of more than 5000 grains
+    is packed alone; by default those of windward sides, all of a flat bed, a step down and a
+    profile without a slip face
+    - windward: on sides that rise, of a profile where the flow goes up them
     - all: all"""
     packing: Packing = _pile("aligned")
     """pattern of the pile's grains
@@ -459,7 +462,10 @@ class PileBed(Bed):
     @property
     def counts(self) -> str | Range:
         """Which exposed grains are counted."""
-        return self.counted or ("all" if self.profile else self.form.counted)
+        if self.counted or not self.profile:
+            return self.counted or self.form.counted
+        falls = -np.degrees(np.arctan(np.diff(self.profile.z) / np.diff(self.profile.x)).min())
+        return "windward" if falls > 90 - self.entrainment_angle_deg + 1e-6 else "all"
 
     @property
     def is_level(self) -> bool:

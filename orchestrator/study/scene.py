@@ -20,7 +20,7 @@ from orchestrator.study import parts
 from orchestrator.study.parts import Flow, Fluid, Forces, Grain, GrainBed, PileBed, Protocol
 from orchestrator.study.shapes import SHAPES
 
-BUILDABLE_DEG = (2.0, 60.0)  # slopes of piles that can be meshed and packed
+BUILDABLE_DEG = (1.0, 60.0)  # slopes of piles that can be meshed and packed
 SOLVE_VISCOSITY = 1e-5  # at which flows are solved, m2/s, where it is low enough for their cells
 VISCOUS_CELLS = 2.5  # first cell over nu/(kappa u*_0): at its centre the flow is turbulent
 CELLS_OVER_Z0 = 2.5  # first cell over z0: its centre is not within the roughness
@@ -29,7 +29,6 @@ MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in one another by
 1e-3 d are thrown apart by stiffer springs."""
 LEAST_WIDTH = 3.0  # of a strip, in its largest grains: none touches another from both sides
-MOST_GRAINS = 1e5  # largest length of a bed, diameters
 NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 """Least distance of two points of a profile, over the diameter and over the height of the first
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
@@ -42,6 +41,7 @@ OFF_MEDIAN = 0.01
 a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
+CLOSED = ("pivot", "local")  # methods without contacts: nothing that moves changes the bed
 OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
@@ -65,6 +65,7 @@ class Scene(parts.Part):
     def _rules(self) -> Iterator[Rule]:
         grain, bed, update = self.grain, self.bed, self.protocol.update
         d, z0, law, method = grain.diameter, bed.roughness, self.forces.law, self.protocol.method
+        is_balanced = self.forces.sheltering == "balanced"
         if grain.sizes is not None:
             yield from self._rules_of_sizes(grain.sizes)
         light = grain.density <= self.fluid.density
@@ -72,10 +73,11 @@ class Scene(parts.Part):
         size = d / bed.relative_size * parts.extremes(grain.sizes, d)[1]
         what = f"above d, or a third of the bed's grains of {size:g} m"
         yield z0 > ROUGHEST * size * (1 + 1e-9) or z0 >= d, "bed.roughness", what, "typical: d/30"
-        turns = law in LAWS and LAWS[law].turns and method != "pivot"
+        turns = law in LAWS and LAWS[law].turns and method not in CLOSED
         yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
+        packs = self.is_poured or is_balanced
+        yield method == "local" and packs, "protocol.method", "local packs no grains", "pivot does"
         is_raised = self.forces.exposure == "protrusion"
-        is_balanced = self.forces.sheltering == "balanced"
         blind = law in LAWS and not LAWS[law].protrudes
         for name, is_asked in {"exposure": is_raised, "sheltering": is_balanced}.items():
             what = f"the law {law} has none"
@@ -147,13 +149,7 @@ class Scene(parts.Part):
                 foreign = shapes and shape not in shapes and getattr(bed, name) != declared.default
                 yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
             return
-        count, cell = profile.x[-1] / d, self.first_cell_height
-        yield (
-            count > MOST_GRAINS,
-            "bed.profile",
-            f"{count:.0f} grains long",
-            "is it in mm? Or cut it",
-        )
+        cell = self.first_cell_height
         steps = np.hypot(np.diff(profile.x), np.diff(profile.z))
         cells = NARROWEST_OVER_CELL * cell if self.flow.model == "solve" else 0.0
         near, least = int(np.argmin(steps)), max(NARROWEST_OVER_D * d, cells)
@@ -172,7 +168,7 @@ class Scene(parts.Part):
         yield topped, "flow.model", "the theories have no top", 'choose "solve" or "flat"'
         coarse = solved and cell > height / 4
         yield coarse, "flow.first_cell_height", "above a quarter of the pile", "lower it"
-        frozen = flow.nodes or not solved or self.protocol.method == "pivot"
+        frozen = flow.nodes or not solved or self.protocol.method in CLOSED
         what = 'it needs a flow that is solved, without nodes, and the method "dem"'
         yield update and frozen, "protocol.update", what, OUT
         coarse, what = bool(update) and cell > self.grain.diameter, "higher than a grain"

@@ -1,12 +1,14 @@
 """The rows of the tables: scenes, single grains, flows, and piles with their grains."""
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import suppress
 from math import ceil, log
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, levels, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
@@ -21,6 +23,7 @@ from orchestrator.physics.velocity import measurable_speeds, outer_roughness
 from orchestrator.plan import Plan
 from orchestrator.study import fields
 from orchestrator.study.closed_form import closed_form, law_holds
+from orchestrator.study.parts import UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
 from orchestrator.types import BoolArray, Row
@@ -169,6 +172,10 @@ class Answer:
         self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
         self.row_hold = pile.loads(cases).row_hold()
+        self.first, self.checked = pile.first(cases), (np.nan, np.nan)
+        if decision.levels and decision.levels.grains is levels.LOCAL and not decision.is_as_asked:
+            with suppress(InputError, UnfitError):  # where no grains can lie there is no check
+                self.checked = pile.around(self.first[0]).first(cases)
 
     def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
         """The threshold of the pile, or of some of its counted grains, at a fraction.
@@ -270,6 +277,8 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "ustar0_m_s": found.ustar0,
             "u_e_m_s": found.ustar0 * pile.model.lid_speed_ratio,
             **_speeds(scene, found.ustar0),
+            **dict(zip(("first_x_m", "first_ustar0_m_s"), answer.first, strict=True)),
+            **dict(zip(("pivot_x_m", "pivot_first_m_s"), answer.checked, strict=True)),
             "pivot_ustar0_m_s": pivot[ceil(fraction * motion.count - 1e-9) - 1],
             "count": motion.count,
             "highest_fraction": motion.fraction[-1],

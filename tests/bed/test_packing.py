@@ -97,16 +97,6 @@ def test_aligned_grains_cover_the_windward_face_one_by_one(slope: float, height:
     assert [_pile(15.0, height).count for height in (20.0, 200.0)] == [78, 773]
 
 
-@pytest.mark.parametrize("pattern", ["aligned", "horizontal"])
-def test_shifts_of_a_billionth_of_a_diameter_decide_nothing(pattern: Pattern) -> None:
-    for slope, seed in ((11.0, 1), (20.0, 2), (29.0, 3)):
-        lattice, replica = _pile(slope, 15.0, pattern), _pile(slope, 15.0, pattern, seed=seed)
-        np.testing.assert_array_equal(replica.windward, lattice.windward)
-        np.testing.assert_array_equal(replica.mobile, lattice.mobile)
-        aside = np.abs(replica.centres - lattice.centres)
-        assert 0 < aside[lattice.windward].min() <= aside.max() <= packing.PERTURBATION
-
-
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(pattern: Pattern) -> None:
     faces = []

@@ -6,15 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator.errors import InputError
-from orchestrator.grains import pile as pile_of_grains
-from orchestrator.grains.loads import Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import sampled
 from orchestrator.report import piles
 from orchestrator.report.results import Results
 from orchestrator.study import study
+from orchestrator.study.closed_form import closed_form
 from orchestrator.tables.rows import Answer, size_class
 from tests import small_study
 
@@ -73,6 +71,18 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="row", where="test").scenes
     assert least <= Pile(scene).loads(tmp_path).row_hold() <= most
+
+
+@pytest.mark.parametrize(("shape", "slope"), [("flat", 0.0), ("step up", 15.0)])
+def test_along_a_plane_the_closed_form_is_that_of_a_grain_on_it(
+    tmp_path: Path, shape: str, slope: float
+) -> None:
+    text = SMALL.format(step=0.05).replace("slope_deg = 20.0", f'shape = "{shape}"')
+    text = text.replace('"pile"', f'"pile"\nslope_deg = {slope}') + 'method = "local"\n'
+    text = text.replace("cells_per_face = 20", 'model = "flat"')
+    (scene,) = study.parse(text, name="plane", where="test").scenes
+    exact = closed_form(scene).friction_velocity
+    np.testing.assert_allclose(Pile(scene).loads(tmp_path).alone(), exact, rtol=1e-9)
 
 
 STUDY = """
@@ -134,16 +144,6 @@ def test_each_method_answers_on_one_shared_bed(request: pytest.FixtureRequest, n
     drawn = piles.poured(results)
     names = {f"poured-{method}" for method in early.index}
     assert {figure.name for figure in drawn} >= names | {"pivots"}
-
-
-def test_a_bed_none_of_whose_grains_is_held_is_refused(
-    mixed: Results, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pile = _pile(mixed, "dem")
-    for name in ("alone", "leaving"):
-        monkeypatch.setattr(Loads, name, lambda loads: np.zeros(pile.packing.count))
-    with pytest.raises(InputError, match="lets it go"):
-        pile_of_grains.flows(pile.loads(mixed.cases))
 
 
 def test_each_size_class_has_its_threshold(mixed: Results) -> None:

@@ -1,0 +1,111 @@
+"""Beds that are more than one triangle: the stress along each, and where motion starts."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+
+from orchestrator.grains.pile import Pile
+from orchestrator.report import labels, style
+from orchestrator.report.flows import FELT, REVERSED, USTAR
+from orchestrator.report.page import caption
+from orchestrator.report.results import Results
+from orchestrator.report.style import Figure, Look
+from orchestrator.report.words import flow_at
+
+BEDS = 4  # more do not fit a page
+FIRST = "#c1121f"  # colour of the place where motion starts
+
+
+def draw(results: Results) -> Iterator[Figure]:
+    """Each bed by its first scene: stress, threshold of each place or grain, bed line, in m."""
+    grains = results.tables.get("pile_grain", pd.DataFrame())
+    scenes = {} if grains.empty else dict(iter(grains.groupby("scene_id")))
+    lines: dict[Any, str] = {}
+    for scene_id, pile in results.plan.piles.items():
+        if scene_id in scenes and not pile.bed.is_triangle and np.ptp(pile.model.line.z) > 0:
+            lines.setdefault(pile.model.line, scene_id)
+    if not lines:
+        return
+    shown = list(lines.values())[:BEDS]
+    figure = style.canvas(5.0 * len(shown) + 0.9)
+    axes = figure.subplots(3 * len(shown), 1, height_ratios=[1.5, 1.3, 0.7] * len(shown))
+    for (top, middle, below), scene_id in zip(axes.reshape(-1, 3), shown, strict=True):
+        pile = results.plan.piles[scene_id]
+        dots = _thresholds(middle, scenes[scene_id])
+        _stress(results, pile, scenes[scene_id], top)
+        x, z = pile.model.line.corners.T
+        below.fill_between(x, z, z.min() - 0.1 * np.ptp(z), color=style.BED, lw=0)
+        below.plot(x, z, color="0.2", lw=0.8, gid="bed")
+        below.set(xlabel="x, m, from the foot of the first form", ylabel="z, m")
+        low, high = pile.model.line.x[1], pile.model.line.x[-2]
+        reach = 0.1 * (high - low)
+        for ax in (top, middle, below):
+            ax.set_xlim(low - reach, high + reach)
+        for ax in (top, middle):
+            ax.tick_params(labelbottom=False)
+        _first(results, scene_id, (top, middle, below))
+    bar = figure.colorbar(dots, ax=list(axes), location="bottom", aspect=60, pad=0.02)
+    bar.set_label("part that has gone by then, n/N")
+    style.legends(figure, [], style.samples([*axes]))
+    piles = [results.plan.piles[scene_id] for scene_id in shown]
+    names = tuple(dict.fromkeys(run.name for pile in piles for run in pile.runs))
+    local = any(pile.length == 0 for pile in piles)
+    text, leads = caption("where", local=local), local or bool(piles[0].bed.profile)
+    yield Figure("where", "Where motion starts", text, names, figure, leads=leads)
+
+
+def _stress(results: Results, pile: Pile, rows: pd.DataFrame, ax: Axes) -> None:
+    """Friction velocity along a bed: of the flow that was solved, and as the grains feel it."""
+    if pile.model.cases:
+        table = results.tables["wall_stress"]
+        wall = table[table["flow_case"] == pile.flow.name]
+        x, ustar = wall["x_m"].to_numpy(), wall["ustar_over_ustar0_wall"].to_numpy()
+        ax.plot(x, ustar, color="black", lw=1.1, label="wall stress", gid="wall")
+        ax.fill_between(x, ustar, 0, where=(ustar < 0).tolist(), **REVERSED)
+    label = "averaged, where the bed is counted"
+    ax.plot(rows["x_m"], rows["ustar_over_ustar0"], label=label, **FELT)
+    ax.axhline(0, color="0.4", lw=0.6)
+    bed, names = pile.bed, ["alpha_deg", "d_m", *results.flow_fields]
+    forms = f"{bed.forms} × " * (bed.forms > 1)
+    shape = bed.profile.name if bed.profile else forms + (bed.form.label or bed.shape)
+    values = pd.Series([results.beds("pile")[name].iloc[0] for name in names], names, dtype=object)
+    values["alpha_deg"], values["d_m"] = bed.slope_deg, pile.scene.grain.diameter
+    title = [shape, f"h = {bed.height:.3g} m", *map(str, bed.obstacles)]
+    ax.set_title(f"{', '.join(title)}, {labels.panel(values, names)}", loc="left")
+    ax.set_ylabel(USTAR)
+
+
+def _thresholds(ax: Axes, rows: pd.DataFrame) -> Any:
+    """The undisturbed friction velocity at which each place or grain goes."""
+    goes = np.isfinite(rows["ustar0_m_s"])
+    flow = rows["ustar0_m_s"][goes]
+    look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
+    dots = ax.scatter(rows["x_m"][goes], flow, c=flow.rank(method="first") / len(rows), **look)
+    for at in rows["x_m"][~goes]:
+        ax.axvline(at, color="0.75", lw=0.3, zorder=0)
+    ax.margins(y=0.15)
+    ax.set(yscale="log", ylabel=r"threshold $u^\star_0$, m/s")
+    style.plain_ticks(ax.yaxis)
+    return dots
+
+
+def _first(results: Results, scene_id: str, axes: tuple[Axes, ...]) -> None:
+    """Mark the place where motion starts, with its numbers."""
+    table = results.joined("pile_threshold")
+    row = table[table["scene_id"] == scene_id].iloc[0]
+    x, ustar = row["first_x_m"], row["first_ustar0_m_s"]
+    if not np.isfinite(ustar):
+        return
+    for ax in axes:
+        ax.axvline(x, color=FIRST, lw=0.8, zorder=0.5)
+    text = f"x = {x:.4g} m\n{flow_at(row, ustar)}".replace(" (", "\n").replace(", ", "\n")
+    text = text.rstrip(")").replace("u*₀", r"$u^\star_0$")
+    low, high = axes[1].get_xlim()
+    has_room = x < low + 0.8 * (high - low)
+    look: Look = {"textcoords": "offset points", "va": "bottom", "color": FIRST, "fontsize": 7}
+    look |= {"ha": "left" if has_room else "right", "xytext": (8 if has_room else -8, 0)}
+    axes[1].annotate(text, (x, ustar), gid="first", **look)
+    axes[1].plot([x], [ustar], "o", color=FIRST, mfc="none", label="motion starts", gid="start")
