@@ -48,7 +48,7 @@ class GrainCase(Case):
     template: ClassVar[str] = "liggghts/bed"
     results: ClassVar[tuple[str, ...]] = ("settling.csv", "samples.csv", "passage.dump", "bed.dump")
     derived: ClassVar[tuple[str, ...]] = ("load_steps.csv", "motion.csv")
-    made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
+    made: ClassVar[tuple[str, ...]] = ("log.liggghts", "counted.csv")
     bulky: ClassVar[tuple[str, ...]] = ("passage.dump", "bed.dump")
 
     def versions(self) -> dict[str, str]:

@@ -269,7 +269,7 @@ def draw(results: Results) -> Iterator[Figure]:
     draw_published(ax, scenes.assign(alpha_deg=0.0))
     shades: dict[Any, str] = style.palette("alpha_deg", results.values("alpha_deg"))
     points: dict[str, list[list[str]]] = {}
-    kinds = ((grains, "single grain", DEM, "o", 2.4), (piles, "pile", PILE, "s", 3.6))
+    kinds = ((grains, "single grain", DEM, "o", 2.4), (piles, "bed", PILE, "s", 3.6))
     for rows, name, columns, shape, size in kinds:
         if rows.empty:
             continue
@@ -374,7 +374,7 @@ def piles(results: Results) -> Iterator[Figure]:
     colours = style.palette("fraction", sorted(set(reached["fraction"]))) if len(reached) else {}
     for (ratio,), rows in split(reached, "z0_over_d"):
         written = labels.ratio_of(float(str(ratio)), "d")
-        name, title = f"extended-shields-{written}", f"Thresholds of piles by slope, z₀ = {written}"
+        name, title = f"extended-shields-{written}", f"Thresholds of beds by slope, z₀ = {written}"
         for figure in _diagrams(rows, "fraction", colours, name, title):
             yield replace(figure, fold=figure.fold or ratio != reached["z0_over_d"].min())
 

@@ -15,6 +15,7 @@ from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.grains.threshold import STEP
 from orchestrator.physics.beside import COLUMNS, sentence
+from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import labels, theory
@@ -145,6 +146,8 @@ def doubts(results: Results) -> list[str]:
     table = piles if len(piles) else _single(results)
     count, usable = len(table), table["usable"].sum() if len(table) else 0
     said = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
+    if (results.scenes[["rho_f_kg_m3", "nu_m2_s"]] == PAPER).all(axis=1).any():
+        said.append("The fluid is the paper's, 1 kg/m³, 1e-5 m²/s; real air: fluid.kind = 'air'.")
     if piles.empty:
         return said
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
@@ -335,7 +338,7 @@ def levels(results: Results) -> pd.DataFrame | None:
         meaning = "; ".join(about[name] for name in (str(flow), str(grain)) if name in about)
         error = group["error_estimate"].max()
         rows.append((f"{flow} | {grain}", meaning, why, group["scene_id"].nunique(), 100 * error))
-    head = ["flow | grains", "description", "reason", "piles", "known error of τ_c, at most, %"]
+    head = ["flow | grains", "description", "reason", "beds", "known error of τ_c, at most, %"]
     return pd.DataFrame(rows, columns=head) if rows else None
 
 
