@@ -146,7 +146,7 @@ def doubts(results: Results) -> list[str]:
     table = piles if len(piles) else _single(results)
     count, usable = len(table), table["usable"].sum() if len(table) else 0
     said = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
-    if (results.scenes[["rho_f_kg_m3", "nu_m2_s"]] == PAPER).all(axis=1).any():
+    if PAPER in zip(results.scenes["rho_f_kg_m3"], results.scenes["nu_m2_s"], strict=True):
         said.append("The fluid is the paper's, 1 kg/m³, 1e-5 m²/s; real air: fluid.kind = 'air'.")
     if piles.empty:
         return said

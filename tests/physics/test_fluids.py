@@ -4,8 +4,7 @@ import pytest
 
 from orchestrator.physics.fluids import numbers_of
 
-# CRC Handbook of Chemistry and Physics; Tupper, Introduction to Naval Architecture, Table 5.1;
-# U.S. Standard Atmosphere 1976
+# CRC Handbook; Tupper, Introduction to Naval Architecture, Table 5.1; U.S. Standard Atmosphere
 TABLES: dict[str, list[tuple[float, float, float]]] = {
     "water": [(0, 999.84, 1.793e-6), (20, 998.21, 1.0034e-6), (100, 958.4, 2.94e-7)],
     "seawater": [(10, 1026.9, 1.354e-6), (20, 1024.7, 1.054e-6)],

@@ -91,7 +91,6 @@ BAD = [
     (GRAIN + "[bed]\nroughness = 'd'\n", "bed.roughness", "d/30"),
     (GRAIN + "[bed]\nkind = 'flatt'\n", "bed.kind", "write grain, pile, or a shape: "),
     ("fluid = { kind = 'air', density = 1.2 }\n", "fluid.density", "air has its own"),
-    ("fluid = { kind = 'aire' }\n", "fluid.kind", "did you mean air?"),
     ("fluid.temperature_deg_c = 5\n", "fluid.kind", "choose water, seawater, air"),
     ("fluid = { kind = 'air', temperature_deg_c = 288 }\n", "fluid.temperature_deg_c", "-80"),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
