@@ -18,7 +18,6 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import ArrayLike
 
 from orchestrator import plan
-from orchestrator.bed.line import LEVEL_DEG
 from orchestrator.errors import InputError
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs, piles
 from orchestrator.fidelity import limits
@@ -45,6 +44,7 @@ WIND_HEIGHT = 10.0  # of the fastest mile and of u_r, m
 OVER_FLAT = log(WIND_HEIGHT / 0.005) / log(0.25 / 0.005)  # u*/u*_0 over u_s/u_r, by the log laws
 PILE, FLAT = 0.10, 0.053  # AP-42: u* over u_s on a pile, and over the wind on flat ground
 FLAT_BELOW = 0.2  # height over base below which AP-42 takes a pile for flat ground
+LEVEL_DEG = 5.0  # slope up to which a surface is neither windward nor lee
 GROUND = 0.01  # height of the bed over the pile's up to which it is the ground around
 COLOURS, LINES, GREY = ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), ("-", "--", "-.", ":"), "0.3"
 
@@ -93,7 +93,8 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
     z0, base, level = scene.solve_roughness, float(np.ptp(x[on])), single_grain(scene)
     own = float(thresholds_of(scene.forces.law, [level._replace(slope_deg=0)])[0].friction_velocity)
     over_wind, is_flat = float(log_law_ustar(1.0, WIND_HEIGHT, z0)), line.h < FLAT_BELOW * base
-    name = f"{bed.profile or bed.shape}, {line.h:g} m, {bed.slope_deg:g}°, z₀ {1e3 * z0:g} mm"
+    form = f"{bed.profile.name if bed.profile else bed.shape}, {line.h:g} m high"
+    name = f"{form}, {bed.slope_deg:g}°, z₀ {1e3 * z0:g} mm"
     obstacles = ", ".join(map(str, bed.obstacles)) or "no obstacle"
     return Surface(name, obstacles, faces, over_wind, threshold or own, is_flat or not rises)
 
@@ -134,7 +135,8 @@ def rows(surfaces: Sequence[Surface], winds: ArrayLike) -> pd.DataFrame:
     by_epa = {(each.pile, each.threshold): each for one in surfaces for each in one.by_epa()}
     found = []
     for one in (*surfaces, *by_epa.values()):
-        for part, faces in [("all", one.faces), *one.faces.groupby("part", sort=False)]:
+        parts = {"all": one.faces, **dict(iter(one.faces.groupby("part", sort=False)))}
+        for part, faces in parts.items():
             ratio, share = faces["ratio"].to_numpy(), 100 * faces["share"].to_numpy()
             share = share / one.faces["share"].sum()
             nearest = np.abs(ratio[:, None] - OVER_FLAT * CLASSES).argmin(axis=1)
@@ -149,18 +151,18 @@ def rows(surfaces: Sequence[Surface], winds: ArrayLike) -> pd.DataFrame:
 
 def sentences(alike: Groups, winds: Sequence[float], source: str) -> Iterator[str]:
     """The answer in words: each pile by both, and what its obstacles take away."""
-    speeds = " and ".join(map("{:g}".format, winds))
+    speeds = ", ".join(map("{:g}".format, winds))
     for first, *others in alike:
         lost, *epa = (each.potential(winds).sum() for each in (first, *first.by_epa()))
         ends = " to ".join(dict.fromkeys(f"{end:.3g}" for end in (min(epa), max(epa))))
         told = (
             f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of a pile "
-            f"({first.pile}; {first.obstacles}); by AP-42 {ends} g/m². u*ₜ is "
+            f"({first.pile}; {first.obstacles}), by AP-42 {ends} g/m². Its threshold u*ₜ is "
             f"{first.threshold:.3g} m/s{source}."
         )
         for one in others:
             change = f" ({one.potential(winds).sum() / lost - 1:+.0%})" if lost else ""
-            told += f" With {one.obstacles}: {one.potential(winds).sum():.3g} g/m²{change}."
+            told += f" With a {one.obstacles}: {one.potential(winds).sum():.3g} g/m²{change}."
         yield told
 
 

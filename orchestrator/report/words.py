@@ -89,10 +89,12 @@ def _piles(results: Results) -> list[str]:
 
 def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     """Where and at which flow the first grain of a pile moves, and when a fraction of it has."""
-    x, z = results.plan.piles[str(row["scene_id"])].model.line.crest
+    line = results.plan.piles[str(row["scene_id"])].model.line
+    x, z = line.crest
     facts = {"name": ", ".join(labels.told(row, ["alpha_deg"] * bool(z > 0) + ["d_m", *telling]))}
     if row["first_ustar0_m_s"] > 0 and z > 0:  # a level bed has no place that goes first
         facts |= {"x": labels.amount(row["first_x_m"], "m"), "crest": labels.amount(float(x), "m")}
+        facts["top"] = "obstacle" if any(a <= x <= b for a, b in line.bare) else "bed"
         facts |= {"first": flow_at(row, row["first_ustar0_m_s"])}
     flow = flow_at(row, row["ustar0_m_s"])
     return f"{caption('pile', row=row, flow=flow, **facts)} {_measured(row)}"
