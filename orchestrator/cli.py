@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
         ("prune", _other, "drop the large files of finished cases; a rerun makes them anew"),
         ("ladder", _study, "what each model costs and how far it is off"),
         ("budget", _study, "what the choices are worth that all models share"),
-        ("stability", _study, "maps of where each method fails"),
+        ("stability", _study, "for developers: maps of where each method fails"),
         ("validate", _study, "the models beside what was measured"),
         ("erosion", _study, "what wind takes from a stockpile, by its solved flow and by AP-42"),
         ("doctor", _other, "are the solvers here, can it draw; what to install"),

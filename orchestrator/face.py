@@ -66,7 +66,7 @@ def threshold(
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
     points = {name: each.ravel().tolist() for name, each in zip(given, arrays, strict=True)}
-    names = {name: name for name in OPTIONS}
+    names = dict(zip(OPTIONS, OPTIONS, strict=True))
     table, asked = answered(points, law or "bridged", fluid, temperature, names)
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)

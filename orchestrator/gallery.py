@@ -27,8 +27,8 @@ def write(directory: Path) -> Path:
             title, says = study.name, [error.what]
         figures = [path for name in PICTURES for path in sorted((study / FIGURES).glob(name))]
         image = figures[0].read_bytes() if figures else b""
-        link = quote(f"{study.name}/{PAGE}")
-        cards.append({"title": title, "link": link, "says": says, "image": image})
+        about = {"title": title, "directory": study.name, "link": quote(f"{study.name}/{PAGE}")}
+        cards.append({**about, "says": says, "image": image})
     if not cards:
         remedy = "name the directory that holds directories of studies, such as results"
         raise InputError("there is no study with a page", where=str(directory), remedy=remedy)

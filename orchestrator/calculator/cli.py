@@ -135,13 +135,12 @@ def answered(
 
     asked: list[str] = []
     try:
-        given: dict[str, Any] = {"kind": fluid, TEMPERATURE: degrees}
-        given |= {field: points.get(name) for name, field in OF_FLUID.items()}
-        numbers = numbers_of({field: value for field, value in given.items() if value is not None})
+        asks: dict[str, Any] = {"kind": fluid, TEMPERATURE: degrees}
+        asks |= {field: points.get(name) for name, field in OF_FLUID.items()}
+        table = numbers_of({field: value for field, value in asks.items() if value is not None})
         if fluid is not None:
             count = len(points["diameter"])
-            both = {name: [numbers[field]] * count for name, field in OF_FLUID.items()}
-            points = {**points, **both}
+            points = {**points, **{n: [table[k]] * count for n, k in OF_FLUID.items()}}
         asked = questions(points, names)
         return thresholds(points, law), asked
     except InputError as error:
@@ -157,10 +156,8 @@ def answered(
 def questions(points: Mapping[str, Sequence[Value]], names: Mapping[str, str]) -> list[str]:
     """Questions on parameters whose largest value, or smallest diameter, looks wrong."""
     given = {name: points.get(name, (each.default,)) for name, each in PARAMETERS.items()}
-    numbers = {
-        name: [x for x in of_name if isinstance(x, int | float)] for name, of_name in given.items()
-    }
-    top = {name: max(of_name, default=0.0) for name, of_name in numbers.items()}
+    numbers = {n: [x for x in xs if isinstance(x, int | float)] for n, xs in given.items()}
+    top = {name: max(values, default=0.0) for name, values in numbers.items()}
     asked = [
         f"{question.format(top[name])}, {names[name]} {top[name] * factor:.4g}?"
         for name, low, high, question, factor in UNITS
@@ -174,8 +171,7 @@ def questions(points: Mapping[str, Sequence[Value]], names: Mapping[str, str]) -
     is_of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
     if rho > 0 and nu > 0 and (is_of_air or not low <= rho * nu <= high):
         unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3"
-        known = f"{names['fluid']} names water, seawater, air"
-        asked.append(f"{unusual}: is it right? {known}")
+        asked.append(f"{unusual}: is it right? {names['fluid']} names water, seawater, air")
     return asked
 
 

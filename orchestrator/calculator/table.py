@@ -43,7 +43,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
     if "depth" in points and not ((depth > d).all() and (rho >= GAS_BELOW).any()):
         what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
         what = what if not (depth > d).all() else f"{rho[0]:g} kg/m3 is a gas"
-        remedy = "give the depth of a liquid in m; water: fluid.density 1000, fluid.viscosity 1e-6"
+        remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
         raise InputError(what, "threshold: depth", remedy)
     exposure = Exposure(
         d, grains["roughness"], rho, grains["viscosity"], grains["lift_coefficient"]
@@ -62,9 +62,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
         picked = [LAWS_OF[each] if answer == PAPER else (answer,) for each in regimes]
         for name, at in by_law.items():
-            numbers: Table = {
-                column: getattr(at, key, rho) for column, (key, _) in QUANTITIES.items()
-            }
+            numbers: Table = {c: getattr(at, key, rho) for c, (key, _) in QUANTITIES.items()}
             numbers |= measurable_speeds(at.friction_velocity, *flow)
             numbers |= {"stress_pa": rho * at.friction_velocity**2}
             reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)

@@ -60,7 +60,7 @@ def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
     if len(rest) == len(table):
         return rest
     kind, t = table.get("kind"), table.get(TEMPERATURE, STANDARD_DEG_C)
-    if kind not in FLUIDS:
+    if kind not in [*FLUIDS]:
         what = "a temperature needs it" if kind is None else f"no formulas of {kind!r} are here"
         near = difflib.get_close_matches(str(kind), FLUIDS, 1)
         names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"

@@ -159,7 +159,7 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
         (["--diameter", "1e-4:1e-3:400", "--slope", "0:30:400"], ["160000 points", "COUNT"]),
         ([*D, "--density", "2.65", *WATER], ["--density 2650?"]),
         ([*D, "--density", "900", *WATER], ["--density", "lower --fluid-density"]),
-        ([*D, "--depth", "1"], ["--depth", "gas", "--fluid-density"]),
+        ([*D, "--depth", "1"], ["--depth", "gas", "--fluid water"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
