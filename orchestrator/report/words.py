@@ -30,8 +30,8 @@ SPEEDS = {
     "mean_velocity_m_s": "mean velocity",
 }
 """Speeds of a flow that are measured in the field, by their columns."""
-MIXED, LEAST_GRAINS = 2.0, 10
-"""Least ratio of sizes that are told apart; exposed grains below which a size is marked."""
+MIXED = 2.0
+"""Least ratio of sizes that are told apart."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
 PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
@@ -91,7 +91,8 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     """Where and at which flow the first grain of a pile moves, and when a fraction of it has."""
     line = results.plan.piles[str(row["scene_id"])].model.line
     x, z = line.crest
-    facts = {"name": ", ".join(labels.told(row, ["alpha_deg"] * bool(z > 0) + ["d_m", *telling]))}
+    told = labels.told(row, ["alpha_deg", "d_m", *telling])
+    facts = {"name": ", ".join(told if z > 0 else ["level bed", *told[1:]])}
     if row["first_ustar0_m_s"] > 0 and z > 0:  # a level bed has no place that goes first
         facts |= {"x": labels.amount(row["first_x_m"], "m"), "crest": labels.amount(float(x), "m")}
         facts["top"] = "obstacle" if any(a <= x <= b for a, b in line.bare) else "bed"
@@ -192,18 +193,16 @@ def sizes(results: Results) -> pd.DataFrame | None:
     rows = results.joined("size_class")
     if rows.empty or rows["size_over_d"].max() < MIXED * rows["size_over_d"].min():
         return None
-    rows = rows[rows["fraction"] == results.at_fraction["fraction"].iloc[0]]
-    keys, number = (
-        labels.varying(rows, "fraction"),
-        np.rint(np.log(rows["size_over_d"]) / np.log(STEP)),
-    )
-    size = rows["size_over_d"] * rows["d_m"]
-    stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(rows["size_over_d"], axis=0)
-    rows = rows.assign(size=1e3 * size, **stress)
+    fraction = results.at_fraction["fraction"].iloc[0]
+    rows = rows[rows["fraction"] == fraction]
+    keys, size = labels.varying(rows, "fraction"), rows["size_over_d"]
+    number = np.rint(np.log(size) / np.log(STEP))
+    stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
+    rows = rows.assign(size=1e3 * size * rows["d_m"], **stress)
     groups = rows.groupby([*(rows[key] for key in keys), number], dropna=False, sort=False)
     low, high = groups.min(numeric_only=True), groups.max(numeric_only=True)
     spans = {
-        "u*₀, m/s": ["ustar0_m_s"],
+        f"u*₀ at n/N = {fraction:.0%}, m/s": ["ustar0_m_s"],
         "stress over that of d50": ["hiding"],
         "measured (Wilcock & Crowe 2003)": ["hiding_wilcock_crowe"],
         "θ of its own size": ["shields_own"],
@@ -215,19 +214,19 @@ def sizes(results: Results) -> pd.DataFrame | None:
         "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
         **_spans(low, high, spans),
     }
-    count = groups["count"].sum()
-    grains = [f"{n}" if n >= LEAST_GRAINS else f"{n}: too few" for n in count]
-    return pd.DataFrame({**table, "exposed grains": grains})
+    counts = zip(_ranges(low["count"], high["count"], "g"), groups["few"].any(), strict=True)
+    grains = [f"{n}: under ten" if few else n for n, few in counts]
+    return pd.DataFrame({**table, "exposed grains of a bed": grains})
 
 
 def piles(results: Results) -> pd.DataFrame | None:
-    """The thresholds of the piles at every fraction, with the name of the case last."""
+    """The thresholds of the piles at every fraction, with the name of the case first."""
     rows = results.joined("pile_threshold")
     if rows.empty:
         return None
     keys, seeds = [*EACH, "z0_over_d", "nu_m2_s"], ["seed"] * (rows["seed"].nunique() > 1)
     keys += [*labels.varying(rows, *keys, "fraction"), *seeds, "fraction"]
-    return _thresholds(rows, keys, more=("count", "case"))
+    return _thresholds(rows, keys, more=("case", "count"))
 
 
 def _single(results: Results) -> pd.DataFrame:
@@ -257,26 +256,29 @@ def _thresholds(
     shown = rows[rows["usable"] | ~usable.transform("any")].groupby(number)
     low, high = (end(numeric_only=True).astype(float) for end in (shown.min, shown.max))
     first = shown.first()
-    table: dict[str, Any] = labels.cells(first, keys)
+    table: dict[str, Any] = {**first[[*more]], **labels.cells(first, keys)}
     if ranges:
         low[~usable.any()] = np.nan
         table["diameter, mm"] = _ranges(1e3 * d.min(), 1e3 * d.max(), "g")
-    known = set(rows.columns[rows.notna().any()])
+    known = set() if more else set(rows.columns[rows.notna().any()])
     spans = {f"{text}, m/s": [name] for name, text in SPEEDS.items() if name in known}
     spans = {"u*₀, m/s": ["ustar0_m_s"], **spans, tau: ["shields"]}
     spans |= {"interval": ["shields_low", "shields_high"]}
+    if "shields_model_low" in known and not ranges:
+        share = ", ".join(first["model_share"].dropna().unique())
+        spans |= {f"model's interval, most by {share}": ["shields_model_low", "shields_model_high"]}
     if "measured_low" in known:
         spans |= {"measured": ["measured_low", "measured_high"]}
     table |= _spans(low, high, spans)
-    if "shields_model_low" in known and not ranges:
-        wide = _ranges(low["shields_model_low"], high["shields_model_high"])
-        shares = zip(wide, first["model_share"], strict=True)
-        table["model's interval"] = [f"{a}, most by {b}" if a != "—" else a for a, b in shares]
     table["usable"] = [
-        f"{n} of {of}" if ranges or of > 1 else "yes" if n else f"no: {why}"
+        f"{n} of {of}{' seeds' * (not ranges)}"
+        if ranges or of > 1
+        else "yes"
+        if n
+        else f"no: {why}"
         for n, of, why in zip(usable.sum(), usable.size(), first["why_not"], strict=True)
     ]
-    return pd.DataFrame({**table, **{name: first[name] for name in more}})
+    return pd.DataFrame(table)
 
 
 def _spans(

@@ -92,7 +92,7 @@ def test_seeds_are_one_row_with_their_range(results: Results) -> None:
     study = copies(results, *seeds)
     sheet = words.short(study)
     assert sheet is not None
-    assert set(sheet["usable"]) == {"3 of 3"}
+    assert set(sheet["usable"]) == {"3 of 3 seeds"}
     assert set(sheet["τ_c"]) == {"0.0400 … 0.0900"}
     (first,) = words.answer(study).sentences
     assert "the mean of 3 seeds: τ_c = 0.0600 (0.0400 … 0.0900)" in first
