@@ -88,7 +88,7 @@ def test_every_how_to_names_studies_that_are_accepted(tmp_path: Path) -> None:
             assert plan.make(study.load(str(file))).decisions
 
 
-@pytest.mark.parametrize("page", ["beach", "water", "stockpile"])
+@pytest.mark.parametrize("page", ["beach", "water", "dune", "stockpile"])
 def test_a_question_is_answered_as_its_page_says(
     page: str, tmp_path: Path, orchestrator: Command
 ) -> None:
