@@ -10,7 +10,7 @@ from orchestrator.runs.files import Folder
 from orchestrator.runs.workspace import STUDY
 
 NAME = "gallery.html"
-PICTURES = ("bed-*.svg", "shields.svg")
+PICTURES = ("bed-*.svg", "shields.svg", "*.svg")
 """The figure that a card shows: the first that there is."""
 
 

@@ -98,8 +98,8 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if np.isnan(row["reynolds"]):
-        highest = f"at most {row.get('highest_fraction', 0):.0%} of {row.get('count', 1)} grains"
-        yield f"not reached: {highest} moved"
+        highest = f"at most {row.get('highest_fraction', 0):.0%} of {row.get('count')} grains"
+        yield f"not reached: {highest if 'count' in row else 'the grain has not'} moved"
     elif row["law"]:
         yield row["law"]
     if row["standing_out"] < EXPOSED_FROM:
