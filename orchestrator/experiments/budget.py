@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from matplotlib import colormaps
 from matplotlib.figure import Figure as Canvas
 
 from orchestrator import plan
@@ -20,13 +19,11 @@ from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import FROZEN, PEELING, Fields, Pair, changed, level, value_of
-from orchestrator.grains.pile import Pile
-from orchestrator.grains.pile import line as bed_line
 from orchestrator.physics.laws import LAWS
 from orchestrator.report import style
 from orchestrator.report.page import Section
 from orchestrator.report.results import FRACTION
-from orchestrator.report.style import Figure, Look
+from orchestrator.report.style import Figure
 from orchestrator.study.closed_form import law_holds
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
@@ -41,7 +38,6 @@ ENDS = [f"{name}_{end}" for name in QUANTITIES for end in ("low", "high")]
 BASE = "as asked"
 COLOURS = ("#0072b2", "#d55e00")
 ALONE = "What each choice moves, changed alone"
-MOST_PILES = 4  # whose wear is drawn; the table has all
 
 
 @dataclass(frozen=True)
@@ -216,15 +212,11 @@ def _sections(
         tornados.append(Section("", said, [chart]))
     title, all_scenes = "All choices together", [pd.DataFrame(rows)]
     sections = [Section(title, words["together"], (), all_scenes, [words["limit"]])]
-    changed_beds = [c for c in listed if c.choice.name == FROZEN]
-    both = [(c.base, c.other) for c in changed_beds if runs.are_done(c.base, c.other)]
-    if both:
-        frozen = moved[moved["choice"] == FROZEN]
+    frozen = moved[moved["choice"] == FROZEN]
+    if len(frozen):
         table = frozen[["scene", "fraction"]].rename(columns={"fraction": "n/N"})
         table = table.assign(**{"θ, %": 100 * frozen["shields"], "u*₀, %": 100 * frozen["ustar0"]})
-        drawn = curves([(piles[one], piles[other]) for one, other in both[:MOST_PILES]], runs.cases)
-        chart = Figure("wear", "Frozen bed and bed that changes", words["wear"], (), drawn)
-        sections.append(Section("The bed that changes", words["changing"], [chart], [table]))
+        sections.append(Section("The bed that changes", words["changing"], (), [table]))
     tried = moved.groupby("choice")["alternative"].agg(lambda x: ", ".join(dict.fromkeys(x)))
     kept = [(c.name, tried[c.name], c.why) for c in CHOICES if c.name in tried]
     tables = [pd.DataFrame(kept, columns=["choice", "alternatives", "why"])]
@@ -250,31 +242,4 @@ def tornado(largest: pd.DataFrame) -> Canvas:
     ax.grid(axis="x", lw=0.4, color="0.85")
     looks = zip(QUANTITIES.values(), COLOURS, strict=True)
     style.legends(canvas, [style.entry(text, colour) for text, colour in looks], [])
-    return canvas
-
-
-def curves(shown: Sequence[tuple[Pile, Pile]], cases: Path) -> Canvas:
-    """A row for each pile, frozen and changing: θ at each n/N, and its bed line in each round."""
-    canvas = style.canvas(1.9 * len(shown) + 0.6)
-    grid = canvas.subplots(len(shown), 2, squeeze=False)
-    whole: Look = {"color": "0.5", "ls": "--", "label": "flow of the whole pile"}
-    drawn_anew: Look = {"color": COLOURS[0], "label": "flow of the bed as it is"}
-    for (left, right), (frozen, changing) in zip(grid, shown, strict=True):
-        last = max(changing.scene.protocol.fractions)
-        for pile, look in ((frozen, whole), (changing, drawn_anew)):
-            n_over_N = np.arange(1, round(last * pile.packing.count) + 1) / pile.packing.count
-            tau = np.array([row.tau for row in pile.thresholds(cases, n_over_N.tolist())])
-            left.plot(n_over_N, shields(pile.scene, tau), **look)
-        left.set(xlim=(0, last), ylim=(0, None), ylabel="Shields number $θ$")
-        left.set_title(label(frozen.scene), loc="left", fontsize=8)
-        h, rounds = changing.line.h, changing.flows
-        for number, flow in enumerate(rounds):
-            line = bed_line(changing, flow, cases)
-            shade = colormaps["YlGnBu"](0.35 + 0.65 * number / len(rounds))
-            right.plot(np.array(line.x) / h, np.array(line.z) / h, color=shade, lw=0.9)
-        end = float(changing.line.crest[0]) / h + 0.4
-        right.set(xlim=(changing.line.x[1] / h, end), ylabel="z / h")
-    grid[-1, 0].set_xlabel("n/N")
-    grid[-1, 1].set_xlabel("x / h")
-    style.legends(canvas, grid[0, 0].get_lines(), [])
     return canvas
