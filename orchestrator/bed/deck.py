@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.errors import SolverError
-from orchestrator.study.parts import Grain, Protocol, extremes
+from orchestrator.study.parts import Grain, Gusts, Protocol, extremes
 from orchestrator.types import FloatArray, IntArray
 
 MEANING = {
@@ -25,6 +25,8 @@ MEANING = {
     "waiting_time": "time without a passage that ends a load step without rest, sqrt(d/g')",
     "rest_energy": "kinetic energy of all grains that have not passed, below which is rest, W d",
     "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
+    "events": "gusts in each load step, whose forces are in gusts.txt; 0: none",
+    "event_samples": "samples of the grains in each of them",
     "settle": "time before the first load step, sqrt(d/g')",
     "settle_drag": "drag of a still fluid in that time, m sqrt(g/d)",
     "displacement_criterion": "displacement along the bed that counts as motion, d",
@@ -62,6 +64,8 @@ those of the pouring, and without a drag a pile of 25 degrees was not at rest at
 SETTLE_FLOW = math.sqrt(0.5)
 """Flow of the settling over that of the first load step: about half of its force. Without any, a
 bed at its limiting slope would not come to rest."""
+STEADY = np.ones(1)
+"""The gusts of a deck without any."""
 START = 0.9
 """Flow of the first load step over that of the first threshold by the pivot law."""
 BEYOND = 1.2
@@ -75,13 +79,15 @@ have left before it."""
 
 
 def protocol(
-    grain: Grain, rules: Protocol, enough: int = 0, smallest: float = 1.0, is_poured: bool = False
+    grain: Grain, rules: Protocol, enough: int = 0, smallest: float = 1, gusts: Gusts | None = None
 ) -> dict[str, float | int]:
     """Variables of the contact law, of the settling, and of how the deck holds a load step.
 
     The load steps end early when no more than `enough` counted grains have not moved. `smallest` is
-    the diameter of the smallest grain that may move, d. A poured bed was on springs of its own.
+    the diameter of the smallest grain that may move, d. A gust lasts a whole number of samples.
     """
+    event = gusts.duration if gusts else SAMPLING_INTERVAL
+    samples = max(round(event / SAMPLING_INTERVAL), 1)
     return {
         "friction": math.tan(math.radians(grain.friction_angle_deg)),
         "stiffness": grain.stiffness,
@@ -89,9 +95,11 @@ def protocol(
         "time_step": rules.time_step,
         "waiting_time": rules.waiting_time,
         "rest_energy": REST_ENERGY,
-        "sampling_interval": SAMPLING_INTERVAL,
+        "sampling_interval": event / samples,
+        "events": gusts.events if gusts else 0,
+        "event_samples": samples,
         "settle": SETTLE,
-        "settle_drag": POURED_DRAG if is_poured else 0.0,
+        "settle_drag": 0.0,
         "displacement_criterion": rules.displacement_criterion,
         "stir": min(STIR, rules.displacement_criterion * smallest / 2),
         "away": AWAY,
@@ -170,13 +178,16 @@ def write(
     force: FloatArray,
     margin: float,
     ranks: int = 1,
+    gusts: FloatArray = STEADY,
 ) -> None:
     """Write grains, parameters, flows and forces into a copy of the template ``liggghts/bed``.
 
     Each parameter becomes a variable of the deck. `flows` has the flow of the settling, then of
     each of s load steps, `force` the flow's force on each grain at these flows, N, shape
     (s + 1, n, 2); only pushed grains feel one. `margin` is the distance from the outermost grains
-    to the walls of the box, m; beyond them a grain is gone. `ranks` processes share the grains.
+    to the walls of the box, m; beyond them a grain is gone. `ranks` processes share the grains. By
+    `gusts` the force is multiplied: in the settling, then for each load step in each event and
+    after the last.
     """
     present = np.flatnonzero(grains.kind != GONE)
     places = grains.position[present]
@@ -188,7 +199,8 @@ def write(
         directory, grains.position, grains.kind, diameters, grains.density, bounds, present
     )
     write_parameters(directory, {**parameters, "width": grains.width, "ranks": ranks})
-    (directory / "load_steps.txt").write_text("".join(f"{flow!r}\n" for flow in flows.tolist()))
+    for name, values in {"load_steps": flows, "gusts": gusts}.items():
+        (directory / f"{name}.txt").write_text("".join(f"{each!r}\n" for each in values.tolist()))
     pushed = np.flatnonzero(grains.kind >= COUNTED)
     counted = np.flatnonzero(grains.kind == COUNTED)
     for place, axis in enumerate("xz"):

@@ -25,7 +25,7 @@ from orchestrator.fidelity.levels import Fields, changed
 from orchestrator.flow.stress import WallStress, bubble
 from orchestrator.grains import peeling, sheltering, threshold
 from orchestrator.grains.loads import Geometry
-from orchestrator.grains.peeling import ForceTable
+from orchestrator.grains.peeling import PLACES, RANGE, ForceTable
 from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
@@ -223,10 +223,10 @@ def sphere(fields: Fields, galileo: float, *, clear: bool) -> float:
         return Exposure(d, *fluid, gap=raised - level(ustar))
 
     drags, lifts = (lambda u: law.drag(u, around(u)), lambda u: law.lift(u, around(u)))
-    (table,) = ForceTable.of(drags, lifts, np.array([submerged]), unit)
+    ustar = unit * np.geomspace(*RANGE, PLACES)
+    (table,) = ForceTable.of(drags, lifts, np.array([submerged]), ustar)
     pivot = np.arctan(np.sqrt(1 / 8)) if clear else np.radians(30)
-    ustar = table.reaching(np.cos(pivot), np.sin(pivot), np.sin(pivot))
-    return float(ustar**2 / galileo**2)
+    return float(table.reaching(np.cos(pivot), np.sin(pivot), np.sin(pivot)) ** 2 / galileo**2)
 
 
 def speed_of(density: float, tangent: float) -> float:

@@ -17,7 +17,7 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, sheltering
-from orchestrator.grains.peeling import FEWER, PLACES, ForceTable, Loading
+from orchestrator.grains.peeling import FEWER, PLACES, RANGE, ForceTable, Loading
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import thresholds_of
@@ -262,9 +262,8 @@ class Geometry:
     @cached_property
     def patches(self) -> tuple[IntArray, FloatArray]:
         """Number of each grain's patch, and the areas of the patches, d^2."""
-        relief = self.bed.relief / self.scene.grain.diameter
-        length = max(1.0, self.scene.forces.averaging_length * relief)
-        return sheltering.patches(self.packing, length)
+        length = self.scene.forces.averaging_length * self.bed.relief / self.scene.grain.diameter
+        return sheltering.patches(self.packing, max(1.0, length))
 
     def sheltered(self, exposed: BoolArray, chosen: BoolArray) -> Shelter:
         """The levels at which the flow begins on the patches of some of the exposed grains."""
@@ -293,13 +292,12 @@ class Geometry:
         kinds, place = np.unique(rows, axis=0, return_inverse=True)
         sizes, gaps, patch = kinds[:, :1], kinds[:, 1:2], kinds[:, 2:].astype(int)
         level: Force = np.zeros_like
-        table = (PLACES if len(kinds) <= KINDS else FEWER, peeling.RANGE)
+        ustar = unit * np.geomspace(*RANGE, PLACES if len(kinds) <= KINDS else FEWER)
         if self.is_balanced:
-            # at the very friction velocities of the tables
-            known = self.sheltered(exposed, chosen).levels.T[patch[:, 0]]
-            level, table = lambda _: known, (sheltering.PLACES, sheltering.RANGE)
+            shelter = self.sheltered(exposed, chosen)
+            ustar, level = shelter.ustar, lambda _: shelter.levels.T[patch[:, 0]]
         laws = forces(scene, sizes, gaps, level)
-        tables = ForceTable.of(*laws, scene.weight * sizes[:, 0] ** 3, unit, *table)
+        tables = ForceTable.of(*laws, scene.weight * sizes[:, 0] ** 3, ustar)
         each = zip(np.flatnonzero(pushed).tolist(), place.tolist(), strict=True)
         return {number: tables[kind] for number, kind in each}
 
@@ -442,7 +440,7 @@ class Loads:
 
         given = packed.places, packed.sizes, loading, self.tables
         criterion, bond = bed.scene.protocol.displacement_criterion, bed.scene.bond
-        flows = peeling.flows(*given, criterion, self.present, bond, renew, packed.windward)
+        flows = peeling.flows(*given, criterion, self.present, bond, renew)
         return np.asarray(flows[packed.windward])
 
     def row_hold(self) -> float:

@@ -84,22 +84,15 @@ class ForceTable:
 
     @classmethod
     def of(
-        cls,
-        drag: Force,
-        lift: Force,
-        weights: FloatArray,
-        unit: float,
-        places: int = PLACES,
-        span: tuple[float, float] = RANGE,
+        cls, drag: Force, lift: Force, weights: FloatArray, ustar: FloatArray
     ) -> "list[ForceTable]":
         """The tables of n grains; the weights (N) are of the shape (n,).
 
-        Drag and lift are laws that take friction velocities of the shape (places,) for all grains,
-        and give forces (N) of the shape (n, places) or alike for all. `unit` is the friction
-        velocity in the middle of the tables, m/s, `span` has their ends over it.
+        Drag and lift are laws that take the friction velocities `ustar` (m/s) of the tables, shape
+        (places,), for all grains, and give forces (N), shape (n, places), or alike for all.
         """
-        ustar = unit * np.geomspace(*span, places)
-        each = (np.broadcast_to(law(ustar), (len(weights), places)) for law in (drag, lift))
+        shape = len(weights), len(ustar)
+        each = (np.broadcast_to(law(ustar), shape) for law in (drag, lift))
         forces = np.stack(list(each), axis=1) / weights[:, None, None]
         # a law without lift has none anywhere
         logs = np.log(np.where(forces > 0, forces, 1e-300))
@@ -236,7 +229,6 @@ def flows(
     present: BoolArray | None = None,
     bond: float = 0.0,
     renew: Renew | None = None,
-    wanted: BoolArray | None = None,
 ) -> FloatArray:
     """The flow (u*_0, m/s) at which each of n grains in one plane leaves by peeling, shape (n,).
 
@@ -245,8 +237,7 @@ def flows(
     law over their own submerged weight. The criterion is the displacement along the bed that counts
     as motion, of the grain's own diameter. `present`, shape (n,), has the grains that have not left
     yet; by default all. `bond` is the pull of a contact between two grains of d over their weight.
-    `renew` gives the tables that change when a grain has left. The search ends when the `wanted`
-    grains, shape (n,), have left; by default all.
+    `renew` gives the tables that change when a grain has left, also of others.
     """
     present = np.ones(len(sizes), bool) if present is None else present.copy()
     rollers, known = dict(_rollers(places, sizes, loading, present, bond)), dict(tables)
@@ -260,8 +251,7 @@ def flows(
     for i in rollers.keys() & known:
         sample(i)
     reached = 0.0
-    asked = slice(None) if wanted is None else wanted
-    while present[asked].any() and np.isfinite(lowest := float(next_flow.min())):
+    while present[list(tables)].any() and np.isfinite(lowest := float(next_flow.min())):
         i = int(next_flow.argmin())
         # a grain that is freed late leaves at once
         reached = max(reached, lowest)

@@ -27,8 +27,10 @@ from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
+from orchestrator.physics.gusts import gust_stresses, peak_over_mean
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
+from orchestrator.study.parts import Gusts
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray
 
@@ -319,8 +321,8 @@ class PileCase(GrainCase):
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains with their forces, and the load steps of the protocol."""
-        loads, worn, rules = *self._state(cases), self.scene.protocol
-        geometry, d = loads.geometry, self.scene.grain.diameter
+        scene, rules, (loads, worn) = self.scene, self.scene.protocol, self._state(cases)
+        geometry, d = loads.geometry, scene.grain.diameter
         if self.before is None:
             rising = flows(loads)
         else:
@@ -329,7 +331,7 @@ class PileCase(GrainCase):
             thresholds, step = loads.leaving(), rules.load_increment
             last = thresholds[np.isfinite(thresholds)].max(initial=reached)
             rising = deck.flows(reached, max(deck.BEYOND * last, reached * (1 + step)), step)
-            if self.scene.is_poured:
+            if scene.is_poured:
                 # poured without a flow, it rests without one: some go at once that were hidden
                 rising[0] = 0.0
         packed = geometry.packing
@@ -339,16 +341,20 @@ class PileCase(GrainCase):
         grains, (slope, ridge) = table(loads, worn), geometry.packed_line.roof(MARGIN + 0.5)
         mobile = grains.kind > deck.FIXED
         smallest = float(grains.sizes[mobile].min())
-        density, gravity = self.scene.grain.density, self.scene.reduced_gravity
+        density, gravity = scene.grain.density, scene.reduced_gravity
         behind = grains.position[mobile, 0].max() + deck.AWAY * d
         numbers = {
             **{"diameter": d, "smallest": smallest, "density": density, "gravity": gravity},
-            **deck.protocol(self.scene.grain, rules, enough, smallest, self.scene.is_poured),
+            **deck.protocol(scene.grain, rules, enough, smallest, scene.flow.gusts),
+            "settle_drag": deck.POURED_DRAG if scene.is_poured else 0.0,
             **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
             "behind": behind,
         }
-        force = loads.loading.in_steps(rising.tolist())
-        deck.write(directory, grains, numbers, rising, force, margin=MARGIN * d, ranks=self.ranks)
+        force, gusts = loads.loading.in_steps(rising.tolist()), deck.STEADY
+        if scene.flow.gusts:
+            mean = loads.loading.in_steps((rising / np.sqrt(scene.gust)).tolist())
+            gusts = in_time(scene.flow.gusts, force[1:], mean[1:], geometry.bed.seed)
+        deck.write(directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts)
 
     def collect(self, directory: Path) -> None:
         """Check the run and write what each counted grain did to ``motion.csv``."""
@@ -409,7 +415,23 @@ def flows(loads: Loads) -> FloatArray:
     last = thresholds[place]
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
-    return deck.flows(deck.START * first, deck.BEYOND * last, rules.load_increment)
+    # gusts that are too short do nothing: then the mean stress moves the grains
+    beyond = deck.BEYOND * np.sqrt(geometry.scene.gust)
+    return deck.flows(deck.START * first, beyond * last, rules.load_increment)
+
+
+def in_time(gusts: Gusts, peak: FloatArray, mean: FloatArray, seed: int) -> FloatArray:
+    """Force in each event and after the last over that of the largest, for `deck.write`.
+
+    `peak` and `mean` are the forces under that and under the mean stress in each load step, N,
+    shape (steps, n, 2). Between them the force is a power of the stress.
+    """
+    stress = gust_stresses(gusts.intensity, gusts.events, len(peak), seed)
+    over = peak_over_mean(gusts.intensity, gusts.events)
+    ratio = np.abs(peak).sum(axis=(1, 2)) / np.abs(mean).sum(axis=(1, 2))
+    power = np.log(ratio)[:, None] / np.log(over)
+    each = (np.pad(stress, ((0, 0), (0, 1)), constant_values=1.0) / over) ** power
+    return np.concatenate([over ** -power[0], each.ravel()])
 
 
 def _first(thresholds: FloatArray, geometry: Geometry) -> float:

@@ -33,21 +33,9 @@ Drag = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def patches(packing: Packing, length: float) -> tuple[IntArray, FloatArray]:
-    """Divide a bed into patches, one after another along it.
+    """Number of each of n grains' patch along a bed, (n,), and area of each patch, d^2.
 
-    Parameters
-    ----------
-    packing : Packing
-        The bed, n grains.
-    length : float
-        Least length of a patch, d; it has at least `GRAINS` exposed grains, too.
-
-    Returns
-    -------
-    patch : ndarray, shape (n,)
-        Number of each grain's patch.
-    area : ndarray, shape (patches,)
-        Area of bed that each patch has, d^2. In one plane the bed is one d wide.
+    A patch has at least a length (d), and `GRAINS` exposed grains; in one plane it is one d wide.
     """
     s = np.sort(packing.arc_length[packing.windward | packing.lee])
     # half of the way to the next grain belongs to each
@@ -101,17 +89,9 @@ def balanced(
 ) -> Shelter:
     """Find the levels at which the drags on each patch add up to the stress on its area.
 
-    Parameters
-    ----------
-    drag : callable
-        Drag (N) of a force law at local friction velocities (m/s), sizes (d) and gaps (m).
-    patch, sizes, gaps : ndarray, shape (n,)
-        Of each exposed grain: number of its patch, diameter (d), height of its lowest point over
-        the bed's own level (m).
-    areas : ndarray, shape (patches,)
-        Area of each patch, m2.
-    diameter, unit, density : float
-        d, m; middle of the local friction velocities, m/s; fluid density, kg/m3.
+    Exposed grains, n, have the number of their `patch`, `sizes` (d) and `gaps` (m) from the bed's
+    own level to their lowest points, shape (n,). `areas`, m2, are those of all patches, `diameter`
+    is d, m, `unit` the middle of the local friction velocities, m/s, `density` the fluid's, kg/m3.
     """
     order = np.argsort(patch, kind="stable")
     sizes, gaps = sizes[order], gaps[order]

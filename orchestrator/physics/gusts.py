@@ -3,6 +3,10 @@
 from math import exp, log1p, sqrt
 from statistics import NormalDist
 
+import numpy as np
+
+from orchestrator.types import FloatArray
+
 
 def peak_over_mean(intensity: float, events: float) -> float:
     """The stress that is exceeded once in n independent events, over the mean stress.
@@ -24,3 +28,14 @@ def peak_over_mean(intensity: float, events: float) -> float:
         return 1.0
     variance = log1p(intensity**2)
     return exp(sqrt(variance) * NormalDist().inv_cdf(1 - 1 / events) - variance / 2)
+
+
+def gust_stresses(intensity: float, events: int, load_steps: int, seed: int) -> FloatArray:
+    """Stress of each event over the mean, in random order for each load step, (steps, events).
+
+    They are evenly spread over the log-normal distribution up to `peak_over_mean`.
+    """
+    parts = np.linspace(1 / events, 1 - 1 / events, events).tolist()
+    variance, normal = log1p(intensity**2), NormalDist()
+    stress = np.exp([sqrt(variance) * normal.inv_cdf(part) - variance / 2 for part in parts])
+    return np.random.default_rng(seed).permuted(np.tile(stress, (load_steps, 1)), axis=1)

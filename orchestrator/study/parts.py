@@ -255,9 +255,11 @@ class Gusts(Part):
     """standard deviation of the stress over its mean"""
     events: Annotated[int, Field(ge=2, le=10**9)]
     """how many independent events there are while the bed is watched"""
+    duration: Annotated[float, Field(ge=0.05, le=1e4, exclude_if=lambda value: value == 1.0)] = 1.0
+    """how long each lasts, √(d/g′); by default as an eddy of 3 d takes to pass in water"""
 
     def __str__(self) -> str:
-        return f"{self.events} of intensity {self.intensity:g}"
+        return f"{self.events} of intensity {self.intensity:g}, {self.duration:g} √(d/g′) long"
 
 
 class Flow(Part):
@@ -306,9 +308,9 @@ class Flow(Part):
     convection_scheme: Literal["linearUpwind", "upwind", "limitedLinear"] = _solved("linearUpwind")
     """OpenFOAM's scheme for the convection of U"""
     gusts: Gusts | None = field(None, since=True)
-    """peaks of the turbulent stress, { intensity = 0.4, events = 100 }: the largest of some
-    independent, log-normal ones moves the grains, by default the mean stress; the number of events
-    is the time for which the bed is watched over that of an event; by pivots and peeling alone"""
+    """peaks of the turbulent stress, { intensity = 0.4, events = 100, duration = 1 }: independent,
+    log-normal events, by default none; by pivots and peeling the largest acts, by DEM of piles all
+    in each load step, each for a duration in √(d/g′), by default 1, of an eddy of 3 d in water"""
     top: Literal["open water", "closed channel", "boundary layer"] = field(
         "boundary layer", "", "", "flow_top", "top of the flow", since=True
     )

@@ -82,13 +82,10 @@ class Scene(parts.Part):
         for name, is_asked in {"exposure": is_raised, "sheltering": is_balanced}.items():
             what = f"the law {law} has none"
             yield is_asked and blind, f"forces.{name}", what, 'choose "bridged"'
-        steady: dict[str, object] = {
-            "flow.gusts": self.flow.gusts,
-            "grain.cohesion": grain.cohesion,
-        }
-        for name, value in steady.items():
-            remedy = 'protocol.method = "pivot" or "peeling"'
-            yield value and method == "dem", name, "DEM knows none", remedy
+        remedy, is_dem = 'protocol.method = "pivot" or "peeling"', method == "dem"
+        yield grain.cohesion and is_dem, "grain.cohesion", "DEM knows none", remedy
+        alone, remedy = is_dem and isinstance(bed, GrainBed), 'protocol.method = "pivot"'
+        yield self.flow.gusts and alone, "flow.gusts", "DEM of single grains knows none", remedy
         width = bed.width if isinstance(bed, PileBed) else 0.0
         poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
         for name, value in poured.items():

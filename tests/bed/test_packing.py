@@ -107,19 +107,9 @@ def test_the_grains_on_the_face_do_not_depend_on_how_many_layers_may_move(patter
     np.testing.assert_array_equal(faces, [faces[0]] * 3)
 
 
-@pytest.mark.parametrize("name", ["curved dune", "cosine", "gaussian", "flat", "train"])
-def test_exposed_grains_follow_the_bed_one_by_one(name: str) -> None:
-    covered, line = _covered(name), of_bed(bed(**BEDS[name])).scaled(1 / D)
-    centres = covered.centres[covered.windward]
-    segment, along = line.nearest(centres)
-    np.testing.assert_allclose(line.over(centres, segment), 0.5 + GAP, atol=0.1)
-    assert np.median(np.diff(np.sort(along))) == pytest.approx(1.0, abs=0.02)
-
-
 def test_which_part_is_counted() -> None:
     windward, everything = _covered("triangle"), _covered("triangle", counted="all")
     part = _covered("triangle", counted=(0.02, 0.04))
-    assert abs(windward.count - _pile(15.0, H / D).count) <= 1
     assert windward.centres[windward.windward, 0].max() < H / np.tan(np.radians(15)) / D + 1
     assert everything.count > 1.8 * windward.count
     assert part.count == pytest.approx(20 / np.cos(np.radians(15)), abs=1)
@@ -137,9 +127,9 @@ def test_which_part_is_counted() -> None:
 def test_beds_that_no_row_of_grains_fits_are_refused() -> None:
     with pytest.raises(UnfitError, match=r"bed.counted: no grain is counted"):
         _covered("step down", counted="windward")
-    trough = bed(forms=40, shape="cosine", height=2e-3, slope_deg=50.0)
+    trough = of_bed(bed(forms=40, shape="cosine", height=2e-3, slope_deg=50.0)).scaled(1 / D)
     with pytest.raises(UnfitError, match="more sharply than a grain at"):
-        packing.offset(of_bed(trough).scaled(1 / D), 3.0)
+        packing.offset(trough, 3.0)
 
 
 def _unshadowed(x: FloatArray, z: FloatArray, r: FloatArray, y: Any = 0.0, w: Any = 0) -> BoolArray:

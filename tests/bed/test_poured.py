@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -64,7 +63,6 @@ def test_the_same_seed_gives_the_same_bytes_by_hand(
     request: pytest.FixtureRequest, name: str, tmp_path: Path
 ) -> None:
     case = request.getfixturevalue(name)
-    # and the template runs as it lies
     for number, folder in enumerate((case, templates() / "liggghts" / "poured")):
         copy = Path(shutil.copytree(folder, tmp_path / str(number)))
         (copy / DUMP).unlink(missing_ok=True)
@@ -79,12 +77,10 @@ def test_grains_rest_on_one_another_under_the_line(mixed: Path) -> None:
     lying = np.arange(len(sizes)) >= len(_plane().floor)
     assert np.mean(number[lying] >= 2) > 0.98
     x, _, z = places.xyz.T
-    # settled again after the cut, a grain may have come up by a little, never by a layer
     assert z.max() < SURFACE + 0.3
     first, second, apart = places.contacts(sizes)
     overlap = (sizes[first] + sizes[second]) / 2 - np.linalg.norm(apart, axis=1)
     assert overlap[lying[first] | lying[second]].max() < 0.01
-    # discs in the plane: three contacts hold a frictional packing, four one without friction
     inner = (z > -2.5) & (z < -1) & (np.abs(x - 7) < 14)
     assert 3.0 < number[inner].mean() < 4.0
 
@@ -100,27 +96,6 @@ def test_packing_and_contacts_of_a_strip_are_those_of_spheres_in_space(strip: Pa
     number = number[inner & (z > low) & (z < high)]
     assert 4 < number.mean() < 6
     assert np.mean(number >= 3) > 0.98
-
-
-class Lattice(PouredBed):
-    """Equal grains that rain row by row, each above its pocket."""
-
-    @cached_property
-    def grains(self) -> tuple[FloatArray, FloatArray]:
-        floor = self.floor
-        rows = [floor[: len(floor) - row] + np.array([row / 2, 0.0, 1.1 * row]) for row in range(5)]
-        centres = np.vstack(rows)
-        return centres, np.ones(len(centres))
-
-
-def test_equal_grains_that_rain_onto_a_lattice_reproduce_it(tmp_path: Path) -> None:
-    lattice = Lattice(_plane().line, 3.0, SURFACE, None, 1.0, 35.0, 0)
-    x, _, z = _grains(_run(lattice, tmp_path))[0].xyz.T
-    row = np.rint((z + 3) / np.sin(np.pi / 3))
-    np.testing.assert_allclose(z + 3, row * np.sin(np.pi / 3), atol=2e-3)
-    place = x - row / 2 - lattice.floor[0, 0]
-    np.testing.assert_allclose(place, np.rint(place), atol=5e-3)
-    assert row.max() == 4
 
 
 @pytest.mark.parametrize("width", [0.0, 8.0])

@@ -18,6 +18,7 @@ from orchestrator.physics.laws import LAWS, Exposure, ForceLaw
 from tests.grains.test_motion import copied
 
 WHERE = Exposure(diameter=1e-3, roughness=1e-4, fluid_density=1.0, viscosity=1e-5)
+TABLE = np.geomspace(5e-5, 5e3, 4001)
 ALONG = np.tile([np.cos(0.3), np.sin(0.3)], (2, 1))
 OUTWARD = np.tile([-np.sin(0.3), np.cos(0.3)], (2, 1))
 
@@ -39,7 +40,7 @@ def test_a_grain_feels_the_closed_forms_force_at_its_own_stress(
     exact = np.sign(ratio) * float(drag(local)) * ALONG[0] + float(lift(local)) * OUTWARD[0]
     np.testing.assert_allclose(loading.at(ustar0), [exact, [0, 0]], rtol=1e-12, atol=0)
     # and the table of forces finds the flow at which a moment is reached
-    ustar = ForceTable.of(drag, lift, np.array([1e-5]), 0.5)[0].reaching(*arms, goal)
+    ustar = ForceTable.of(drag, lift, 1e-5 * np.ones(1), TABLE)[0].reaching(*arms, goal)
     moment = arms[0] * float(drag(ustar)) + arms[1] * float(lift(ustar))
     assert moment / 1e-5 == pytest.approx(goal, rel=1e-10)
 

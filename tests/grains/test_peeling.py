@@ -4,6 +4,7 @@ import math
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,8 @@ from orchestrator.bed.packing import Places
 from orchestrator.grains import motion, peeling, threshold
 from orchestrator.grains.peeling import Force, ForceTable, Loading
 from orchestrator.runs.case import templates
-from orchestrator.study.parts import Grain, Protocol
-from orchestrator.types import FloatArray
+from orchestrator.study.parts import Grain, Gusts, Protocol
+from orchestrator.types import BoolArray, FloatArray
 
 
 def _along(slope_deg: float, count: int) -> tuple[FloatArray, FloatArray]:
@@ -32,7 +33,8 @@ def _law(lift: float) -> tuple[Force, Force]:
 
 
 def _tables(count: int, lift: float = 0.0, unit: float = 1.0) -> dict[int, ForceTable]:
-    return dict(enumerate(ForceTable.of(*_law(lift), np.ones(count), unit)))
+    ustar = unit * np.geomspace(*peeling.RANGE, peeling.PLACES)
+    return dict(enumerate(ForceTable.of(*_law(lift), np.ones(count), ustar)))
 
 
 def _flows(
@@ -146,25 +148,61 @@ def test_the_pyramid_of_three_contacts_is_the_closed_form() -> None:
     np.testing.assert_allclose(np.tan(np.radians(angles)), ustar**2, rtol=1e-9)
 
 
+def _moved_by_dem(
+    copy: Path, grains: deck.GrainTable, force: FloatArray, rules: Protocol, **given: Any
+) -> motion.Motion:
+    """Motion of grains of 1 mm under forces (W) at the friction velocities of load steps."""
+    d, weight = grains.diameter, 2500.0 * np.pi / 6 * grains.diameter**3 * 9.81
+    numbers = {
+        **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
+        **deck.protocol(Grain(diameter=d, stiffness=3e4), rules, gusts=given.pop("asked", None)),
+        **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
+    }
+    shutil.copytree(templates() / "liggghts" / "bed", copy)
+    deck.write(copy, grains, numbers, given.pop("rising"), force * weight, 3 * d, **given)
+    subprocess.run(["./Allrun"], cwd=copy, check=True)
+    return motion.read(copy, grains, rules.displacement_criterion, falls_out=False)
+
+
 def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) -> None:
     places, d = _grains(), 1e-3
     kind = np.tile([deck.FIXED] * 3 + [deck.COUNTED], len(TURNED))
     along, sizes = _loading().along, np.ones(len(places.xyz))
     grains = deck.GrainTable(places.xyz * d, kind, along, sizes, d, 2500.0, WIDTH)
-    grain, rules = Grain(diameter=d, stiffness=1e4), Protocol(waiting_time=8.0)
     rising = deck.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
-    weight = 2500.0 * np.pi / 6 * d**3 * 9.81
-    numbers = {
-        **{"diameter": d, "smallest": 1.0, "density": 2500.0, "gravity": 9.81},
-        **deck.protocol(grain, rules),
-        **{"slope": 0.0, "ceiling_x": 0.0, "ceiling_z": 5 * d, "behind": 30 * d},
-    }
-    copy = tmp_path / "bed"
-    shutil.copytree(templates() / "liggghts" / "bed", copy)
-    force = _loading().in_steps(rising.tolist()) * weight
-    deck.write(copy, grains, numbers, rising, force, margin=3 * d)
-    subprocess.run(["./Allrun"], cwd=copy, check=True)
-    ustar = threshold.of_grains(motion.read(copy, grains, 0.3, falls_out=False)).value
+    force = _loading().in_steps(rising.tolist())
+    moved = _moved_by_dem(tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising)
+    ustar = threshold.of_grains(moved).value
     np.testing.assert_allclose(ustar, np.sqrt([_drag(turned) for turned in TURNED]), rtol=0.005)
     # the same pocket elsewhere across the flow, here on the seam of the sides, changes nothing
     assert ustar[1] == pytest.approx(ustar[3], rel=1e-12)
+
+
+def _leaves(push: FloatArray, duration: float) -> BoolArray:
+    """Which spheres roll over a pivot of 30 deg under a drag, over the least, that ends."""
+    start, step, speed = -math.pi / 6, duration / 10_000, np.zeros(len(push))
+    angle, over = np.full(len(push), start), np.zeros(len(push), bool)
+    for _ in range(10_000):
+        torque = np.sin(angle) + push * math.tan(math.pi / 6) * np.cos(angle)
+        speed = speed + 5 / 7 * torque * step
+        angle = np.maximum(angle + speed * step, start)
+        speed = np.where(angle > start, speed, 0.0)
+        over |= angle > 0
+    return np.asarray(over | ((speed > 0) & (0.7 * speed**2 > 1 - np.cos(angle))))
+
+
+@pytest.mark.parametrize("duration", [0.5, 1.0, 2.0, 20.0])
+def test_a_gust_moves_a_grain_by_its_impulse(tmp_path: Path, duration: float) -> None:
+    push, rules = np.linspace(0.98, 4.0, 303), Protocol(displacement_criterion=0.5)
+    x, z = np.tile([[-0.5, 0.5, 0.0], [0.0, 0.0, math.sqrt(0.75)]], len(push))
+    places = np.column_stack([x, np.repeat(3.0 * np.arange(len(push)), 3), z])
+    kind = np.tile([deck.FIXED, deck.FIXED, deck.COUNTED], len(push))
+    ways, ones = np.tile([1.0, 0.0], (len(x), 1)), np.ones(len(x))
+    grains = deck.GrainTable(places * 1e-3, kind, ways, ones, 1e-3, 2500.0)
+    force = np.tile(np.where(kind == deck.COUNTED, np.repeat(push, 3), 0.0)[:, None], (2, 1, 2))
+    force *= [math.tan(math.pi / 6), 0.0]
+    gust = Gusts(intensity=0.4, events=2, duration=duration / 2)
+    gusts = {"asked": gust, "gusts": np.array([0.0, 1.0, 1.0, 0.0])}
+    level = _moved_by_dem(tmp_path / "b", grains, force, rules, rising=np.ones(2), **gusts).level
+    exact = push[_leaves(push, duration)].min()
+    assert push[level > 0].min() == pytest.approx(exact, rel=0.015)

@@ -107,7 +107,8 @@ def test_cohesion_is_shao_and_lu_s(gamma: float, method: str) -> None:
         centres = np.array([[0.0, math.cos(phi)], [-0.5, 0], [0.5, 0]])
         ways = np.tile(np.eye(2), (3, 1, 1)).transpose(1, 0, 2)
         loading = Loading(np.square, np.zeros_like, np.array([1.0, 0, 0]), *ways)
-        tables = dict(enumerate(ForceTable.of(np.square, np.zeros_like, np.ones(3), 1.0)))
+        ustar = np.geomspace(*peeling.RANGE, peeling.PLACES)
+        tables = dict(enumerate(ForceTable.of(np.square, np.zeros_like, np.ones(3), ustar)))
         bonds = cohesion * d / (math.pi / 6 * d**3 * (density - 1.2) * g)
         given = Places.of(centres), np.ones(3), loading, tables
         with_it = np.array([find(*given, bond=bond)[0] for bond in bonds])

@@ -80,9 +80,7 @@ def test_springs_that_throw_poured_grains_apart_are_refused_in_dem() -> None:
     text = f"grain = {{ diameter = 1e-3, stiffness = 2e5 }}\n{BED % 'd/30'}\n"
     with pytest.raises(InputError, match=r"such springs throw poured grains"):
         _parse(text)
-    for other in ("peeling", "pivot"):
-        _parse(f'{text}protocol = {{ method = "{other}" }}')
-    _parse(text.replace('packing = "poured", ', ""))
+    _parse(f'{text}protocol = {{ method = "pivot" }}')
 
 
 FILES = {
