@@ -102,14 +102,15 @@ def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
 def experiment(study: Study, out: Path) -> Experiment:
     """The erosion potential of the piles of a study, by the solved flow and by AP-42."""
     winds, asked = study.erosion.fastest_mile, study.erosion.threshold
+    where = study.file or study.name
     least = USTAR_T.get(asked, -1.0) if isinstance(asked, str) else asked
     if least is not None and not 0 < least <= 10:
         remedy = f"a value in m/s up to 10, or one of: {', '.join(USTAR_T)}"
-        raise InputError(f"{asked!r} is not accepted", f"{study.name}: erosion.threshold", remedy)
+        raise InputError(f"{asked!r} is not accepted", f"{where}: erosion.threshold", remedy)
     source = f" (AP-42, {asked})" * isinstance(asked, str) or " (closed form)" * (asked is None)
     flows = {scene: FlowModel(scene) for scene in piles(study)}
     for scene in flows:
-        limits.check(scene, study.name, grains=False)
+        limits.check(scene, where, grains=False)
 
     def results(runs: Runs) -> Results:
         done = (s for s, flow in flows.items() if all(run.name in runs.done for run in flow.cases))
