@@ -146,8 +146,12 @@ def _draw(
     with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
-        report.write(results, causes, space, guests)
-    answer = report.said(results, guests)
+        answer = report.said(results, guests)
+        try:
+            report.write(results, causes, space, guests)
+        except BaseException:  # no memory for a picture, or an interrupt: the answer is found
+            print(answer, file=sys.stderr)
+            raise
     terminal.check()
     if not failures:
         space.note(STATE, text_of({**space.drawn_of(planned.ids), "answer": answer}))

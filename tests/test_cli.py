@@ -52,7 +52,7 @@ def test_a_study_of_single_grains_and_the_same_again(
     assert not (tmp_path / "out").exists()
     first = orchestrator("study", grains, "--out", "out")
     assert first.returncode == 0, first.stderr
-    head, row, *_, last = first.stdout.splitlines()
+    (head, row, *_), last = first.stdout.split("\n\n")[1].splitlines(), first.stdout.split("\n")[-2]
     assert "τ_c" in head
     assert "DEM" in row
     assert re.search(r"\[1/1\] done .* of the work, about \d+ s left", first.stderr)
