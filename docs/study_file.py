@@ -94,7 +94,8 @@ LIMITS = {
     "grain.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
     "protocol.time_step": (f"above {DAMPED}", "lower it"),
     "forces.law": ("`zeng-torque` by peeling or DEM", "the method `pivot`"),
-    "flow.gusts, grain.cohesion": ("by DEM", "the method `pivot` or `peeling`"),
+    "flow.gusts": ("DEM of single grains", "the method `pivot`"),
+    "grain.cohesion": ("by DEM", "the method `pivot` or `peeling`"),
 }
 """What is refused within the ranges of the fields, and the remedy."""
 SIGNS = {Gt: ("gt", "({:g},"), Ge: ("ge", "[{:g},"), Lt: ("lt", "{:g})"), Le: ("le", "{:g}]")}
