@@ -100,12 +100,15 @@ def of_pile(
     def stress(at: int, ustar0: float) -> float:
         return fluid_density * float(ustar0) ** 2 * _mean(motion, speed**2, at)
 
+    tau = stress(level, flow)
+    # under a higher flow grains move where its stress is lower: their mean may fall
+    held = tau, stress(below, motion.low[below]), stress(above, motion.flow[above])
     return PileThreshold(
         fraction=fraction,
         ustar0=flow,
-        tau=stress(level, flow),
-        tau_low=stress(below, motion.low[below]),
-        tau_high=stress(above, motion.flow[above]),
+        tau=tau,
+        tau_low=min(held),
+        tau_high=max(held),
         carried_off=float(motion.carried_off[level] / motion.moved[level]),
         against_the_flow=_mean(motion, speed < 0, level),
     )
