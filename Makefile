@@ -26,8 +26,11 @@ calibration: setup  ## measure the fidelity levels and the maps anew, for the pa
 	$(PYTHON) -m orchestrator ladder
 	$(PYTHON) -m orchestrator stability
 	$(PYTHON) -m orchestrator budget
+	$(PYTHON) -m orchestrator validate
 	cp results/ladder/tables/levels.csv results/stability/tables/maps.csv orchestrator/fidelity/calibration/
 	cp results/budget/tables/budget.csv orchestrator/fidelity/calibration/
+	$(PYTHON) tools/tested.py results/validate/tables/measured.csv > tested.csv
+	mv tested.csv orchestrator/physics/tested.csv
 	cp results/ladder/figures/speed-against-accuracy.png docs/ladder.png
 	cp results/stability/figures/maps.png docs/stability.png
 

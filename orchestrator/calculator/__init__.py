@@ -58,5 +58,3 @@ QUANTITIES = {
     "lift_n": ("lift", "lift, N"),
 }
 """Columns of a threshold, each with its name in JSON and its symbol and unit for people."""
-MEASURED = tuple(f"measured_{name}" for name in ("curve", "median", "low", "high", "rows"))
-"""Columns of what was measured beside it, `physics.beside.Beside`; names in JSON, too."""

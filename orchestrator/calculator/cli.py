@@ -10,7 +10,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import GEOMETRIC, MEASURED, MOST_POINTS, PARAMETERS, QUANTITIES
+from orchestrator.calculator import (
+    GEOMETRIC,
+    MOST_POINTS,
+    PARAMETERS,
+    QUANTITIES,
+)
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE, numbers_of
@@ -181,10 +186,11 @@ def _is_nan(value: object) -> bool:
 
 def as_json(rows: Sequence["Row"]) -> str:
     """A record for one point, or a list of records: parameters, rules, an object for each law."""
+    from orchestrator.physics.beside import MEASURED, TESTED
     from orchestrator.physics.threshold import LAWS_OF
 
     names = {column: name for column, (name, _) in QUANTITIES.items()}
-    names |= {name: name for name in ("valid", "why_not", *MEASURED)}
+    names |= {name: name for name in ("valid", "why_not", *MEASURED, *TESTED)}
     count = len({row["law"] for row in rows})
     records = []
     for start in range(0, len(rows), count):
@@ -204,7 +210,7 @@ def as_text(
     rows: Sequence["Row"], answer: str, varied: Sequence[str], fluid: str | None
 ) -> Iterator[str]:
     """Lines for people: of one point the answer and every law, of many points the answer's rows."""
-    from orchestrator.physics.beside import COLUMNS, sentence
+    from orchestrator.physics.beside import sentences
     from orchestrator.physics.threshold import LAWS_OF
 
     chosen = [row for row in rows if row["answer"]]
@@ -226,8 +232,7 @@ def as_text(
         yield ""
         for row in chosen:
             of_law = f"{row['law']}: " if len(chosen) > 1 else ""
-            facts = {name: row[column] for name, column in COLUMNS.items()}
-            yield of_law + sentence(row["shields"], row["reynolds"], **facts)
+            yield from (of_law + said for said in sentences(row))
         yield ""
         rows = sorted(rows, key=lambda row: not row["answer"])
         shown.pop("wind_1m_m_s", None)

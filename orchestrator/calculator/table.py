@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.calculator import MEASURED, PARAMETERS, QUANTITIES
+from orchestrator.calculator import PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
-from orchestrator.physics.beside import COLUMNS, beside
+from orchestrator.physics.beside import beside
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.laws import LAWS, Exposure, law
 from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, why_not
@@ -49,7 +49,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
         d, grains["roughness"], rho, grains["viscosity"], grains["lift_coefficient"]
     )
     rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
-    known = {name: grains[name] for name in COLUMNS}
+    known = {each.column: grains[name] for name, each in PARAMETERS.items()}
     beta, blocks = grains["entrainment_angle_deg"], []
     flow = (grains["roughness"], grains["viscosity"], rho, np.where(rho < GAS_BELOW, np.nan, depth))
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
@@ -68,8 +68,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
             reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)
             block: Table = {"law": np.full(count, name, object), **numbers}
             block |= {"valid": at.valid, "why_not": np.array(reasons, object), "regime": regimes}
-            measured = beside(at.reynolds, **known)
-            block |= dict(zip(MEASURED, measured, strict=True))
+            block |= beside({**known, **block, "force_law": block["law"]})
             blocks.append({**block, "answer": np.array([name in laws for laws in picked])})
     table = {each.column: np.repeat(grains[name], len(LAWS)) for name, each in PARAMETERS.items()}
     for column in blocks[0]:

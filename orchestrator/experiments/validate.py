@@ -30,7 +30,7 @@ from orchestrator.physics.constants import GRAVITY
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, Exposure
 from orchestrator.physics.measured import kirchner_pivot
-from orchestrator.physics.threshold import LAWS_OF, PAPER, weight
+from orchestrator.physics.threshold import LAWS_OF, PAPER, Threshold, weight
 from orchestrator.physics.threshold import threshold as threshold_of
 from orchestrator.report import style
 from orchestrator.report.page import Section
@@ -45,7 +45,6 @@ MOVED = 0.1
 """Part of the exposed grains that has moved at the threshold of a bed."""
 INTENSITY, EVENTS = 0.4, 100
 """Of the gusts: intensity of the wall stress, and one event in so many."""
-BETA = {"entrainment_angle_deg": 60.0}
 GALILEO = np.geomspace(0.3, 1e5, 12)
 SLOPES = np.array([0.0, 0.1, 0.2, 0.3, 0.4])
 """Tangents of beds that fall with the flow."""
@@ -239,15 +238,20 @@ def speed_of(density: float, tangent: float) -> float:
 
 def by_paper(beds: pd.DataFrame) -> FloatArray:
     """Threshold of a single grain by Eq. 2 or Eq. 4, where one holds; NaN in the transition."""
+    answers = []
+    for name in LAWS_OF["transition"]:
+        at, (low, high) = single(beds, name), LAWS[name].reynolds
+        answers.append(np.where((at.reynolds >= low) & (at.reynolds < high), at.shields, np.nan))
+    return np.asarray(np.fmax(*answers))
+
+
+def single(beds: pd.DataFrame, law: str, beta_deg: float = 60, ratio: float = 30) -> Threshold:
+    """Thresholds of single grains of the diameters of some beds, with z0 = d/ratio."""
     names = ("d_m", "rho_f_kg_m3", "nu_m2_s", "rho_sol_kg_m3", "slope", "cohesion_n_m")
     d, fluid, nu, density, slope, cohesion = (beds[name].to_numpy(float) for name in names)
     grain = {"density": density, "slope_deg": -np.degrees(np.arctan(slope)), "cohesion": cohesion}
-    answers = []
-    for name in LAWS_OF["transition"]:
-        at = threshold_of(LAWS[name], Exposure(d, d / 30, fluid, nu), **BETA, **grain)
-        low, high = LAWS[name].reynolds
-        answers.append(np.where((at.reynolds >= low) & (at.reynolds < high), at.shields, np.nan))
-    return np.asarray(np.fmax(*answers))
+    around = Exposure(d, d / ratio, fluid, nu)
+    return threshold_of(LAWS[law], around, entrainment_angle_deg=beta_deg, **grain)
 
 
 def over_hump(stress: WallStress) -> pd.DataFrame:

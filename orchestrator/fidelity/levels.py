@@ -22,7 +22,7 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.study.closed_form import closed_form, outer_roughness
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import PileBed, extremes
-from orchestrator.study.scene import CELLS_OVER_Z0, LEAST_WIDTH, Scene, default_first_cell_height
+from orchestrator.study.scene import LEAST_WIDTH, Scene, default_first_cell_height
 from orchestrator.study.study import make_scene
 from orchestrator.types import FloatArray
 
@@ -94,7 +94,7 @@ class Level:
         """The scene as this level answers it."""
         fields = self.fields(scene)
         if self.sets.get("flow.model", "flat") != "flat":
-            fields = {**fields, "flow.roughness": _outer_roughness(scene)}
+            fields = {**fields, "flow.roughness": outer_roughness(scene)}
         return changed(scene, fields)
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
@@ -139,15 +139,6 @@ class Pair(NamedTuple):
     def answer(self, scene: Scene) -> Scene:
         """The scene as both levels answer it."""
         return self.grains.answer(self.flow.answer(scene))
-
-
-def _outer_roughness(scene: Scene) -> float | None:
-    """The z0 (m) at which levels find the flow over a bed; None for that of the bed.
-
-    A sublayer that is thicker than the first cells bears no turbulent flow.
-    """
-    outer, most = outer_roughness(scene), scene.first_cell_height / CELLS_OVER_Z0
-    return outer and max(min(outer, most), scene.bed.roughness)
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -292,7 +283,7 @@ def unmeasured(scene: Scene) -> str:
         default = default_first_cell_height(scene.bed.relief, scene.solve_roughness)
         if abs(scene.first_cell_height / default - 1) > SAME_CELL:
             return f"first cells of {scene.first_cell_height:.3g} m in place of {default:.3g} m"
-    near = (scene.bed.roughness, _outer_roughness(scene) or scene.bed.roughness)
+    near = (scene.bed.roughness, outer_roughness(scene) or scene.bed.roughness)
     if roughness and all(abs(math.log2(roughness / z0)) > 0.5 + 1e-6 for z0 in near):
         return f"flow.roughness = {roughness:.3g} m"
     return ""
@@ -307,11 +298,19 @@ def known(pair: Pair, scene: Scene) -> Known:
     if unmeasured(scene):
         return UNKNOWN
     levels = [PIVOT if each is LOCAL else each for each in pair]
-    for place, part in enumerate(LEVELS.values()):
+    for place, part in enumerate(LEVELS):
         if levels[place] is AS_ASKED:
-            coarser = (x for x in part[::-1] if x.same_model and x.describes(scene, or_finer=True))
-            levels[place] = next(coarser, AS_ASKED)
+            levels[place] = _coarser(part, scene)
     return known_of_classes(*levels, classes("flow", scene), classes("grains", scene))
+
+
+def _coarser(part: str, scene: Scene) -> Level:
+    """The most expensive level that is no finer than a scene and was measured; or `AS_ASKED`."""
+    for one in LEVELS[part][::-1]:
+        is_known = all((part, one.name, name) in measured() for name in classes(part, scene))
+        if one.same_model and is_known and one.describes(scene, or_finer=True):
+            return one
+    return AS_ASKED
 
 
 @cache  # a study has thousands of scenes of a few classes

@@ -1,8 +1,10 @@
 """Measured thresholds, pivots of natural beds, hiding in mixtures, flows over hills."""
 
+import csv
 import math
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,15 +32,13 @@ class Bin:
         return float(np.sqrt(self.low * self.high))
 
 
-BUFFINGTON_MONTGOMERY = (
-    Bin(0.1, 0.3, 12, 0.1125, 0.063, 0.165),
-    Bin(0.3, 1.0, 16, 0.1265, 0.062, 0.226),
-    Bin(1.0, 3.0, 23, 0.059, 0.039, 0.113),
-    Bin(3.0, 10.0, 51, 0.041, 0.024, 0.059),
-    Bin(10.0, 30.0, 27, 0.038, 0.020, 0.172),
-    Bin(30.0, 100.0, 45, 0.030, 0.022, 0.092),
-    Bin(100.0, 300.0, 66, 0.037, 0.023, 0.069),
-)
+def _bins(rows: str) -> tuple[Bin, ...]:
+    text = Path(__file__).with_name("flumes.csv").read_text(encoding="utf-8")
+    read = [[float(x) for x in row[1:]] for row in csv.reader(text.split()) if row[0] == rows]
+    return tuple(Bin(low, high, int(count), *rest) for low, high, count, *rest in read)
+
+
+BUFFINGTON_MONTGOMERY = _bins("all")
 """Flume measurements in water by many authors, binned by Re*.
 
 Compiled by J. M. Buffington and D. R. Montgomery, Water Resour. Res. 33, 1997,
@@ -48,16 +48,7 @@ Shields_compilation_flume.csv), Re* from their Shields number, median diameter a
 nu = 1e-6 m2/s and g = 9.81 m/s2. Visual thresholds and those by a reference transport are together.
 """
 
-VISUAL = (
-    Bin(0.1, 0.3, 12, 0.1125, 0.063, 0.165),
-    Bin(0.3, 1.0, 16, 0.1265, 0.062, 0.226),
-    Bin(1.0, 3.0, 23, 0.059, 0.039, 0.113),
-    Bin(3.0, 10.0, 46, 0.0395, 0.023, 0.062),
-    Bin(10.0, 30.0, 21, 0.037, 0.020, 0.141),
-    Bin(30.0, 100.0, 38, 0.0285, 0.021, 0.106),
-    Bin(100.0, 300.0, 56, 0.037, 0.023, 0.069),
-    Bin(300.0, 1000.0, 25, 0.047, 0.032, 0.060),
-)
+VISUAL = _bins("visual")
 """Those of them by eye alone: the first motion, as a model has it."""
 MEASURED_SOURCE = "flumes, compiled by Buffington & Montgomery 1997"
 """For legends."""

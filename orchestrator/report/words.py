@@ -14,7 +14,7 @@ from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
 from orchestrator.grains.threshold import STEP
-from orchestrator.physics.beside import COLUMNS, sentence
+from orchestrator.physics.beside import sentences
 from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import measurable_speeds
@@ -118,9 +118,8 @@ def _grains(results: Results) -> list[str]:
 
 def _measured(row: pd.Series) -> str:
     """What was measured beside a threshold."""
-    grain = {name: row[column] for name, column in COLUMNS.items()}
-    said = sentence(row["shields"], row["reynolds"], **grain)
-    return f"{said[0].upper()}{said[1:]}."
+    said = sentences(row.to_dict())[: 1 + (row["tested_rows"] > 0)]
+    return " ".join(f"{one[0].upper()}{one[1:]}." for one in said)
 
 
 def flow_at(row: pd.Series, ustar: float) -> str:

@@ -17,7 +17,7 @@ from orchestrator.physics.threshold import (
     regime,
     thresholds_of,
 )
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import CELLS_OVER_Z0, Scene
 
 
 def single_grain(scene: Scene) -> SingleGrain:
@@ -45,16 +45,16 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
 
 
 def outer_roughness(scene: Scene) -> float | None:
-    """Roughness length (m) of the flow over the bed of a scene; None if that is the bed's own.
+    """Roughness length (m) of the flow over the bed of a pile; None if that is the bed's own.
 
-    Where the bed is not rough viscosity adds to its own, by the friction velocity at which the
-    grain moves. The flows of Eqs. 2 and 4 are the paper's, over a rough wall.
+    Where the bed is not rough viscosity adds to its own, by the friction velocity at which a single
+    grain moves; a sublayer that is thicker than the first cells bears no turbulent flow. The flows
+    of Eqs. 2 and 4 are the paper's, over a rough wall.
     """
-    if scene.forces.law in LAWS_OF["transition"]:
-        return None
     z0, ustar = scene.bed.roughness, closed_form(scene).friction_velocity
     outer = float(velocity.outer_roughness(z0, ustar, scene.fluid.viscosity))
-    return float(f"{outer:.3g}") if outer > z0 else None
+    outer = min(float(f"{outer:.3g}"), scene.first_cell_height / CELLS_OVER_Z0)
+    return outer if outer > z0 and scene.forces.law not in LAWS_OF["transition"] else None
 
 
 def regime_of(scene: Scene) -> Regime:

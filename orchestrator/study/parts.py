@@ -438,7 +438,7 @@ class PileBed(Bed):
     """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
     up to 1e-9 d aside"""
     mobile_layers: int = _answer(2, ge=1, le=1000)
-    """layers of the windward face that may move; below them the grains are fixed"""
+    """layers that may move, of a poured bed by default 4; those below are fixed"""
 
     @property
     def form(self) -> Shape:

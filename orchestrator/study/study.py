@@ -200,6 +200,8 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
         raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
     if bed.get("shape") == "flat" and not (bed.get("profile") or bed.get("obstacles")):
         flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
+    if bed.get("packing") == "poured":
+        bed.setdefault("mobile_layers", 4)  # the cheapest near the reference: docs/poured.md
     try:
         fluid = fluids.numbers_of(fluid)
     except InputError as error:

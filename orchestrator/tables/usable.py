@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
-from orchestrator.physics.beside import COLUMNS, beside
+from orchestrator.physics.beside import beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import depth_mean_speed
@@ -75,10 +75,9 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
         rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
     texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
-    grain = {name: rows[column].to_numpy() for name, column in COLUMNS.items()}
-    measured = beside(rows["reynolds"].to_numpy(), **grain)._asdict()
-    made = {"usable": [not text for text in texts], "why_not": texts}
-    made |= {f"measured_{name}": values for name, values in measured.items()}
+    if "shields" not in rows:
+        rows["shields"] = rows["shields_closed_form"]
+    made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
 

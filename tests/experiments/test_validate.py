@@ -1,6 +1,8 @@
 """Validation: exact pockets of laid grains, scores, the paper's rule, and measured rows."""
 
 import math
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -9,7 +11,10 @@ import pytest
 from orchestrator.bed.packing import Packing
 from orchestrator.experiments import validate
 from orchestrator.flow.stress import WallStress
-from orchestrator.physics.curves import Air, iversen_white
+from orchestrator.physics import beside
+
+TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
+FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
 
 
 def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
@@ -35,11 +40,28 @@ def test_a_score_is_of_rows_that_were_read_alone() -> None:
     assert (score["ratio"], score["factor"], score["worst"]) == (2.0, 2.0, 4.0)
 
 
-def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
-    air = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
-    tunnel = pd.read_csv(validate.FOLDER / "beds.csv").query("set == 'wind tunnel, curve'")
-    d, shields = tunnel[["d_m", "shields"]].to_numpy().T
-    assert shields == pytest.approx(air.shields_diagram(d, iversen_white(d, air))[1], rel=1e-3)
+def test_an_interval_is_the_widest_without_one_of_the_sets() -> None:
+    ends = runpy.run_path(str(TOOL))["ends"]
+    ratio = pd.Series([*np.arange(1.0, 12), *np.arange(21.0, 32), 100.0])
+    sets = pd.Series(["a"] * 11 + ["b"] * 11 + ["c"])
+    # the percentiles of 12 ratios without b, of all and without a: that of c alone is too few
+    assert ends(ratio, sets) == (2.0, 31.0)
+    assert ends(ratio[:11], sets[:11]) == (2.0, 10.0)
+
+
+def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv").query("set in @FLUMES")
+    at = validate.single(beds, "bridged")
+    here = (at.reynolds >= 1) & (at.reynolds < 10)
+    grain = {"force_law": "bridged", "beta_deg": 60.0, "d_m": 3e-4, "z0_m": 1e-5, "alpha_deg": 0.0}
+    grain |= {"alpha_s": 1.615, "cohesion_n_m": 0.0, "rho_f_kg_m3": 1000.0}
+    low, high, rows, held = beside.interval(beside.kind_of(grain), 5.0)
+    ratio = (beds["shields"] / at.shields)[here]
+    assert len(ratio) == rows
+    assert ratio.between(low, high).mean() == pytest.approx(held)
+    # nothing was measured on slopes, of another angle or with cohesion
+    for other in ({"alpha_deg": 5.0}, {"beta_deg": 52.0}, {"cohesion_n_m": 1e-4}):
+        assert not beside.interval(beside.kind_of({**grain, **other}), 5.0)[2]
 
 
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:

@@ -3,8 +3,6 @@
 import math
 import re
 
-import numpy as np
-import pandas as pd
 import pytest
 
 from orchestrator.errors import InputError
@@ -20,7 +18,9 @@ from orchestrator.fidelity.levels import (
     changed,
     level,
     pair_of,
+    value_of,
 )
+from orchestrator.study import study
 from orchestrator.study.closed_form import closed_form
 from tests.fidelity.conftest import MakePile
 
@@ -87,17 +87,6 @@ def test_errors_of_the_parts_add_up_by_their_squares(pile: MakePile) -> None:
     assert known.cost_core_s == pytest.approx(flow[2, 0] + grains[2, 0])
 
 
-def test_a_slope_between_the_measured_ones_has_the_larger_error(pile: MakePile) -> None:
-    theory = Pair(level("flow", "waves"), level("grains", "peeling"))
-    below, between, limiting = (
-        levels.known(theory, pile(slope_deg=slope)).total for slope in (25.0, 28.0, 30.0)
-    )
-    assert between == pytest.approx(max(below, limiting), rel=0.05)
-    # of 40 thresholds of level rows at the limiting slope 11 lay beyond an error from one pile
-    at_limit = levels.classes("grains", pile(packing="horizontal", slope_deg=30.0))
-    assert at_limit == levels.classes("grains", pile(packing="horizontal"))
-
-
 @pytest.mark.parametrize(
     "fields",
     [
@@ -131,25 +120,14 @@ def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: Mak
     known = levels.known(pair_of(scene), scene)
     assert known == levels.known(Pair(FLAT, level("grains", "2 layers, fast")), scene)
     assert 0.4 < known.total < 2.0
+    # four layers are the default, and of a pile on no level a coarser one was measured
+    text = 'grain.diameter = 1e-3\nbed = { kind = "pile", slope_deg = 15.0, packing = "poured" }'
+    (mound,) = study.parse(text, name="mound", where="test").scenes
+    assert value_of(mound, "bed.mobile_layers") == 4
+    assert levels.known(pair_of(mound), mound).total < 0.5
     finer = changed(scene, {"bed.mobile_layers": 4})
     assert levels.known(pair_of(finer), finer).total < known.total
     softer = changed(scene, {"grain.stiffness": 100.0})
     assert levels.known(pair_of(softer), softer) == UNKNOWN
     pivot = changed(scene, {"protocol.method": "pivot"})
     assert math.isinf(levels.known(pair_of(pivot), pivot).total)
-
-
-def test_the_spread_of_the_model_is_known_at_every_fraction(pile: MakePile) -> None:
-    spreads = [levels.spread(pile(), fraction) for fraction in (0.1, 0.3, 0.42, 0.7)]
-    assert all(0 < spread.low <= 1 and spread.high > 0 and spread.dominant for spread in spreads)
-    assert math.isnan(levels.spread(pile(shape="dune"), 0.3).low)
-    # a frozen bed moves a row, but nothing changes until the first update
-    assert 0 <= spreads[0].frozen_bed < 0.05 < spreads[-1].frozen_bed
-    others = {"flow.model": "hill"}, {"protocol.update": 0.1, "flow.first_cell_height": 5e-4}
-    assert np.isnan([levels.spread(pile(fields), 0.7).frozen_bed for fields in others]).all()
-
-
-def test_independent_shares_add_as_squares_and_lower_nothing_below_zero() -> None:
-    shares = pd.DataFrame({"shields_low": [0.3, 0.4], "shields_high": [0.1, 0.0]})
-    assert levels.together(shares) == pytest.approx((0.5, 0.1))
-    assert levels.together(3 * shares)[0] == 1.0

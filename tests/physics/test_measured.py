@@ -1,6 +1,7 @@
 """Measured thresholds and pivots, published curves, and how the laws compare with them."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,7 +9,7 @@ import pytest
 
 from orchestrator.experiments.validate import FOLDER
 from orchestrator.physics import curves
-from orchestrator.physics.beside import FIELD, beside, sentence
+from orchestrator.physics.beside import FIELD, MEASURED, beside, sentences
 from orchestrator.physics.measured import (
     BUFFINGTON_MONTGOMERY,
     VISUAL,
@@ -35,20 +36,26 @@ def test_the_bins_follow_each_other_and_are_those_of_the_rows() -> None:
 
 
 def test_what_was_measured_stands_beside_a_threshold() -> None:
-    sand = {"density": 2650.0, "gravity": 9.81}
-    fluids = {
-        "fluid_density": [1000.0, 1000.0, 1.22, 0.02],
-        "viscosity": [1e-6, 1e-6, 1.5e-5, 5e-4],
+    fluids = {"rho_f_kg_m3": [1e3, 1e3, 1.22, 0.02], "nu_m2_s": [1e-6, 1e-6, 1.5e-5, 5e-4]}
+    rows = {"reynolds": [5.0, 2e3, 10.0, 1.0], "d_m": [3.5e-4, 0.05, 3.5e-4, 1e-4], **fluids}
+    bed: dict[str, Any] = {
+        "rho_sol_kg_m3": 2650.0,
+        "g_m_s2": 9.81,
+        "shields": 0.02,
+        "force_law": "none",
     }
-    at = beside([5.0, 2e3, 10.0, 1.0], diameter=[3.5e-4, 0.05, 3.5e-4, 1e-4], **fluids, **sand)
-    np.testing.assert_array_equal(at.rows, [46, 0, 3, 0])
-    np.testing.assert_array_equal(at.median, [0.0395, np.nan, 0.0126, np.nan])
+    bed |= {"alpha_deg": 0.0, "beta_deg": 60.0, "z0_m": 1e-5, "alpha_s": 1.0, "cohesion_n_m": 0.0}
+    table = pd.DataFrame(rows).assign(**bed)
+    curve, median, *_, count = (beside(table)[name] for name in MEASURED)
+    np.testing.assert_array_equal(count, [46, 0, 3, 0])
+    np.testing.assert_array_equal(median, [0.0395, np.nan, 0.0126, np.nan])
     # Soulsby and Whitehouse at D* 8.853; Shao and Lu's u* is 0.317 m/s for this sand in air
     water = float(curves.soulsby_whitehouse(np.array(8.853)))
     air = 1.22 * 0.317**2 / ((2650 - 1.22) * 9.81 * 3.5e-4)
-    assert at.curve[[0, 2]] == pytest.approx([water, air], rel=0.01)
-    mars = sentence(0.02, 1.0, diameter=1e-4, fluid_density=0.02, viscosity=5e-4, **sand)
-    assert "no field rows are near it" in mars
+    assert curve[[0, 2]] == pytest.approx([water, air], rel=0.01)
+    mars = sentences(table.assign(**beside(table)).iloc[3].to_dict())
+    assert "no field rows are near it" in mars[0]
+    assert "no tested interval" in mars[1]
 
 
 def test_pivots_and_hiding_of_a_natural_bed() -> None:
