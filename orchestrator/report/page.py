@@ -6,19 +6,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
+from importlib import metadata
 from pathlib import Path
+from platform import python_version
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from orchestrator import __version__
 from orchestrator.runs.files import Folder
 
 if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
+PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
 
 
 def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:
@@ -100,13 +104,20 @@ class Section:
     limits: Sequence[str] = ()
 
 
+def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
+    """Solvers with their versions, this package, and the libraries that are not among them."""
+    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
+    rows += [(name, metadata.version(name)) for name in PACKAGES if name not in solvers]
+    return pd.DataFrame(rows, columns=["program", "version"])
+
+
 def write(
     title: str, sections: Sequence[Section], folder: Folder, name: str, solvers: Mapping[str, str]
 ) -> None:
     """Put the page of an experiment, a file `name`, with its figures as PNG and SVG beside it."""
-    from orchestrator.report import style, words  # style imports matplotlib
+    from orchestrator.report import style  # it imports matplotlib
 
     images = ([style.saved(item, folder, png=True) for item in part.figures] for part in sections)
     shown = [replace(part, figures=each) for part, each in zip(sections, images, strict=True)]
-    values = {"sections": shown, "programs": words.versions(solvers), "links": {}}
+    values = {"sections": shown, "programs": versions(solvers), "links": {}}
     folder.put(name, fill("document.html.j2", title=title, **values))

@@ -1,15 +1,12 @@
 """The answer of a study in sentences and tables, and all other words of its page."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import metadata
-from platform import python_version
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
 
-from orchestrator import __version__
 from orchestrator.errors import OrchestratorError
 from orchestrator.fidelity import levels as fidelity
 from orchestrator.fidelity.limits import FROZEN_BED
@@ -19,7 +16,7 @@ from orchestrator.physics.fluids import PAPER
 from orchestrator.physics.laws import LAWS
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.report import labels, theory
-from orchestrator.report.page import Guest, caption
+from orchestrator.report.page import Guest, caption, versions
 from orchestrator.report.results import Results, measured_hills, split, valid
 from orchestrator.runs import case
 from orchestrator.study import fields
@@ -34,7 +31,6 @@ MIXED = 2.0
 """Least ratio of sizes that are told apart."""
 FEW = 12
 """Piles, or values of a parameter, that are listed each; of more the range is told."""
-PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
 EACH, RANGES = ("alpha_deg", "d_m", "force_law"), ("alpha_deg", "force_law")
 """Columns that each row of a table tells, of single piles and of ranges."""
 
@@ -324,13 +320,6 @@ def _values(column: pd.Series) -> str:
     values = sorted(column.dropna().unique(), key=lambda value: (isinstance(value, str), value))
     texts = list(dict.fromkeys(v if isinstance(v, str) else f"{v:.6g}" for v in values))
     return ", ".join(texts if len(texts) <= FEW else [*texts[:2], "…", texts[-1]])
-
-
-def versions(solvers: Mapping[str, str]) -> pd.DataFrame:
-    """Solvers with their versions, this package, and the libraries that are not among them."""
-    rows = [*sorted(solvers.items()), ("orchestrator", __version__), ("Python", python_version())]
-    rows += [(name, metadata.version(name)) for name in PACKAGES if name not in solvers]
-    return pd.DataFrame(rows, columns=["program", "version"])
 
 
 def levels(results: Results) -> pd.DataFrame | None:

@@ -117,7 +117,7 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if row.get("sheltering") == "balanced" and not is_renewed and row["fraction"] > KEPT_TO + 1e-9:
         yield f"kept balance: beyond n/N = {KEPT_TO} grains that have gone still bear a part of it"
     if pd.isna(error):
-        yield "no interval: the error of its levels on such a bed is not known"
+        yield "the error of its levels on such a bed is not known"
     elif tolerance and error > tolerance * (1 + 1e-9):
         yield f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
     if row["fraction"] * row["count"] < 1 - 1e-9:

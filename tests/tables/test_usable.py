@@ -39,7 +39,7 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"count": 3}, ["0.3 of 3 grains is less than one"]),
         (None, {"row_hold": 2.3}, ["hold the first grain up to 2.3 times"]),
         (None, {"share_carried_off": 0.76}, ["lift carried off 76% of the moved grains"]),
-        (None, {"error_estimate": NAN}, ["no interval"]),
+        (None, {"error_estimate": NAN}, ["is not known"]),
         (0.02, {}, ["known error 3.0% is above the tolerance of 0.02"]),
         (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
     ],
