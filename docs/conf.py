@@ -56,9 +56,9 @@ def _parts() -> list[str]:
 
 
 def _pages(part: str) -> tuple[str, list[str]]:
-    """The heading of a part of the index, and the pages that its table lists."""
+    """The heading of a part of the index, and the pages that it names."""
     title, text = part.split("\n", 1)
-    return title, re.findall(r"(?m)^\| \[[^]]+\]\(([^)#]+\.md)\)", text)
+    return title, [*dict.fromkeys(re.findall(r"\]\(([^)#]+\.md)\)", text))]
 
 
 def _tree(title: str, pages: list[str]) -> str:
