@@ -94,6 +94,8 @@ def _parser() -> argparse.ArgumentParser:
         add = command.add_argument
         if run == _other and name != "doctor":
             add("directory", type=Path, metavar="DIR")
+        if name == "report":
+            add("--all", action="store_true", help="draw the figures too that it folds away")
         if run == _study:
             if name != "stability":
                 preset = {"study": "first-look", "erosion": "stockpile"}.get(name, name)
@@ -159,7 +161,7 @@ def _other(options: Namespace) -> int:
     from orchestrator import gallery, pipeline
 
     if options.command == "report":
-        return _end(pipeline.redraw(options.directory))
+        return _end(pipeline.redraw(options.directory, every=options.all))
     print((gallery.write if options.command == "gallery" else pipeline.prune)(options.directory))
     return 0
 

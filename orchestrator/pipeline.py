@@ -20,6 +20,7 @@ from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed, read_m
 from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
+States = Mapping[str, Any]
 
 
 class Finished(NamedTuple):
@@ -60,7 +61,7 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         if started or answer is None:
             failures = {name: error for name, error in failures.items() if name in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
-            answer = _draw(study, planned, space, states, failures)
+            answer = _draw(study, planned, space, states, failures, False)
         if changed and (left := space.left(planned.cases)):
             what = f"the study file has changed: {len(left)} cases are not asked for any more"
             print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
@@ -109,8 +110,8 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     return study, plan.settled(study, space.cases)
 
 
-def redraw(out: Path) -> Finished:
-    """Make tables, figures and page again from the cases that are done."""
+def redraw(out: Path, *, every: bool = False) -> Finished:
+    """Make tables, figures and page anew from the cases that are done; `every` figure, or most."""
     space = Workspace(out.absolute())
     study, planned = reopen(space)
     with claimed(space.root, STUDY, study.name, new=False):
@@ -118,7 +119,8 @@ def redraw(out: Path) -> Finished:
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        return Finished(space.page, 0, failures, _draw(study, planned, space, states, failures))
+        answer = _draw(study, planned, space, states, failures, every)
+        return Finished(space.page, 0, failures, answer)
 
 
 def prune(directory: Path) -> str:
@@ -134,7 +136,7 @@ def prune(directory: Path) -> str:
 
 
 def _draw(
-    study: Study, planned: Plan, space: Workspace, done: Mapping[str, Any], failures: Failures
+    study: Study, planned: Plan, space: Workspace, done: States, failures: Failures, every: bool
 ) -> str:
     """Write tables, figures and page, and last the marker of what they are made of; the answer."""
     space.drop(STATE)
@@ -148,7 +150,7 @@ def _draw(
         tables.write({"timings": times}, space, "timings")
         answer = report.said(results, guests)
         try:
-            report.write(results, causes, space, guests)
+            report.write(results, causes, space, guests, every)
         except BaseException:  # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)
             raise

@@ -120,7 +120,7 @@ def _panels(
     looks = _looks(numbers)
     del looks[OURS]
     x_label, y_label, limits = AXES[quantity]
-    canvas, axes = style.grid(len(drawn), 2.0, x_label, y_label, columns=3)
+    canvas, axes = style.grid(drawn, 1.7, x_label, y_label, columns=3)
     for ax, scene in zip(axes, drawn, strict=True):
         rows = numbers[numbers["scene"] == scene]
         last = rows[rows["solver"] == OURS].groupby("quantity")["value"].last()
@@ -132,7 +132,6 @@ def _panels(
                 ax.plot(x, of["value"] / count, color=EXPECTED)
             else:
                 ax.plot(x, of["answer"] / count, "o", **looks[str(solver)])
-        ax.set_title(scene, size=6.5)
         ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
     caption = f"{len(drawn)} of {len(scenes)} scenes: expected answers, and rings of the solvers."

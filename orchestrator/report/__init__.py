@@ -21,11 +21,12 @@ def write(
     failures: Mapping[str, str],
     folder: "Folder",
     guests: Sequence["Guest"] = (),
+    every: bool = False,
 ) -> None:
     """Draw the figures of a study and write its page into its directory.
 
-    `failures` are the cases that failed, with why.
-    A figure that fails, such as for memory, costs a line of the page.
+    `failures` are the cases that failed, with why. A figure that fails, such as for memory, costs a
+    line of the page. Those that the page folds away are drawn only if `every` one is asked for.
     """
     from orchestrator.report import along, bed, flows, page, piles, shields, style, words
 
@@ -39,7 +40,8 @@ def write(
         ):
             try:
                 for figure in draw(results):
-                    figures.append(style.saved(figure, folder))
+                    now = every or not (figure.fold and figure.drawing)
+                    figures.append(style.saved(figure, folder) if now else figure)
             except Exception as error:
                 faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
                 print(f"a figure could not be drawn: {faults[-1]}", file=sys.stderr)

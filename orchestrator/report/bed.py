@@ -232,8 +232,9 @@ def _flow(pile: Pile, cases: Path, frame: flows.Window) -> str:
     """The flow's speed as a pale picture, PNG in base64."""
     velocity = flows.over_u_e(pile, cases, frame, pile.scene.grain.diameter)
     speed = np.linalg.norm(velocity, axis=-1)[::-1]
-    colours = colormaps["Blues"](0.6 * np.clip(np.nan_to_num(speed), 0, 1), bytes=True)
-    colours[np.isnan(speed), 3] = 0
-    out = BytesIO()
-    Image.fromarray(colours).quantize(200).save(out, "PNG", optimize=True)
+    levels = np.where(np.isnan(speed), 255, 254 * np.clip(np.nan_to_num(speed), 0, 1))
+    shades = colormaps["Blues"](0.1 + 0.5 * np.arange(256) / 254, bytes=True)[:, :3]
+    picture = Image.fromarray(levels.astype(np.uint8))
+    picture.putpalette(shades.tobytes())
+    picture.save(out := BytesIO(), "PNG", transparency=255)
     return base64.b64encode(out.getvalue()).decode("ascii")

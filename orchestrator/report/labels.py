@@ -10,8 +10,8 @@ import pandas as pd
 from orchestrator.study import fields
 from orchestrator.study.parts import Info
 
-RE_AXIS = r"$Re^\star = u^\star d/\nu$"
-TAU_AXIS = r"$\tau = \tau_c^\star/\left((\rho_{sol}-\rho_f)\,g\,d\right)$"
+RE_AXIS = "Re* = u* d/ν"
+TAU_AXIS = r"threshold Shields number $τ_c$"
 WIDTH = 52
 """Letters of a line over a panel."""
 OTHERS = {

@@ -1,6 +1,7 @@
 """Figures of piles: fractions that moved, beds that change, and poured beds with their sizes."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure as Canvas
 
 from orchestrator.grains.pile import Pile
 from orchestrator.physics import measured
@@ -38,38 +40,40 @@ def fractions(results: Results) -> Iterator[Figure]:
     curves = {str(item): group for (item,), group in split(curve, "scene_id")}
     scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
     # of the piles alone: single grains have more diameters than there are colours
-    colours = style.palette("d_m", sorted(set(results.beds("pile")["d_m"])))
+    piles = results.beds("pile")
+    sizes = scenes.groupby("alpha_deg")["d_m"].nunique()
+    by = "nu_m2_s" if (sizes == 1).all() and piles["nu_m2_s"].nunique() > 1 else "d_m"
+    colours = style.palette(by, sorted(set(piles[by])))
+
+    def draw(sheet: shields.Sheet) -> Canvas:
+        for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
+            for _, pile in part.iterrows():
+                line, colour = curves[pile["scene_id"]], colours[float(pile[by])]
+                look: Look = {"marker": str(pile[shields.SHAPE]), "ms": 3, "mew": 0.7, "lw": 0.8}
+                look |= {"markevery": -(-len(line) // MARKERS), "gid": str(pile["scene_id"])}
+                look |= {"color": colour, "label": pile[shields.LABEL]}
+                if not pile["law_holds"]:
+                    look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
+                ax.plot(line["shields"], line["fraction_moved"], **look)
+        # the last grains of a pile may wait for a hundred times the stress of the others
+        stress = pd.concat([curves[item] for item in sheet.rows["scene_id"]])
+        last = max(SHOWN_UP_TO, stress["fraction_moved"].min())
+        early = stress[stress["fraction_moved"] <= last]["shields"]
+        reach = early.min() / 1.2, 1.2 * early.max()
+        sheet.panels()[1][0].set(xscale="log", xlim=reach, ylim=(0, 1))  # the panels share them
+        for ax in sheet.panels()[1]:
+            style.plain_ticks(ax.xaxis)
+        return shields.legends(sheet, by, colours)
+
     for (alpha,), rows in split(scenes, "alpha_deg"):
-        choices, rows = shields.parted(rows, *shields.SHOWN)
-        for sheet in shields.sheets(rows, ["z0_over_d", *choices], 2.3, labels.TAU_AXIS, "$n/N$"):
-            for ax, part in zip(sheet.axes, sheet.parts, strict=True):
-                for _, pile in part.iterrows():
-                    line, colour = curves[pile["scene_id"]], colours[float(pile["d_m"])]
-                    look: Look = {
-                        "marker": str(pile[shields.SHAPE]),
-                        "ms": 3,
-                        "mew": 0.7,
-                        "lw": 0.8,
-                    }
-                    look |= {"markevery": -(-len(line) // MARKERS), "gid": str(pile["scene_id"])}
-                    look |= {"color": colour, "label": pile[shields.LABEL]}
-                    if not pile["law_holds"]:
-                        look |= {"mfc": "white", "label": "hollow: the force law does not hold"}
-                    ax.plot(line["shields"], line["fraction_moved"], **look)
-            # the last grains of a pile may wait for a hundred times the stress of the others
-            stress = pd.concat([curves[item] for item in sheet.rows["scene_id"]])
-            last = max(SHOWN_UP_TO, stress["fraction_moved"].min())
-            early = stress[stress["fraction_moved"] <= last]["shields"]
-            reach = early.min() / 1.2, 1.2 * early.max()
-            sheet.axes[0].set(xscale="log", xlim=reach, ylim=(0, 1))  # the panels share them
-            for ax in sheet.axes:
-                style.plain_ticks(ax.xaxis)
-            shields.legends(sheet, "d_m", colours)
+        choices, rows = shields.parted(rows, "alpha_deg", "z0_over_d", "force_law", by)
+        for sheet in shields.sheets(rows, ["z0_over_d", *choices], 2.3, labels.TAU_AXIS, "n/N"):
             name, where = f"fractions-alpha{alpha:g}{sheet.name}", labels.plain("alpha_deg", alpha)
             title = f"Fraction of moving grains, {where}{sheet.title}"
             text = caption("fractions", about=shields.about(sheet.rows))
             fold = bool(sheet.name) or alpha != scenes["alpha_deg"].min()
-            yield Figure(name, title, text, case_names(sheet.rows), sheet.canvas, fold=fold)
+            drawing = partial(draw, sheet)
+            yield Figure(name, title, text, case_names(sheet.rows), drawing, fold=fold)
 
 
 def wear(results: Results) -> Iterator[Figure]:
@@ -81,20 +85,20 @@ def wear(results: Results) -> Iterator[Figure]:
     frozen: Look = {"ls": "--", "lw": 0.9, "label": "flow of the whole pile"}
     worn: Look = {"lw": 1.3, "label": "flow of the bed as it is"}
     apart: Look = {"ls": "", "marker": "o", "ms": 4, "label": "first 5 % apart"}
-    keys, axes = ["alpha_deg", "packing", "method"], ("$n/N$", "Shields number $θ$")
+    keys, axes = ["alpha_deg", "packing", "method"], ("n/N", labels.TAU_AXIS)
     for sheet in shields.sheets(rows, keys, 2.1, *axes):
-        for ax, part in zip(sheet.axes, sheet.parts, strict=True):
+        for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
             for (d, _), group in split(part, "d_m", "scene_id"):
                 x, colour = group["fraction_moved"], colours[float(str(d))]
                 ax.plot(x, group["shields_frozen"], color=colour, **frozen)
                 ax.plot(x, group["shields"], color=colour, **worn)
                 end = group[x == group["holds_until"]]
                 ax.plot(end["fraction_moved"], end["shields"], color=colour, **apart)
-        sheet.axes[0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
-        shields.legends(sheet, "d_m", colours)
+        sheet.panels()[1][0].set(xlim=(0, None), ylim=(0, None))  # the panels share both
+        canvas = shields.legends(sheet, "d_m", colours)
         cases = tuple(results.plan.piles[i].runs[-1].name for i in sheet.rows["scene_id"].unique())
         title = f"Frozen bed and bed that changes{sheet.title}"
-        yield Figure(f"wear{sheet.name}", title, caption("wear"), cases, sheet.canvas)
+        yield Figure(f"wear{sheet.name}", title, caption("wear"), cases, canvas)
 
 
 def poured(results: Results) -> Iterator[Figure]:
@@ -140,10 +144,10 @@ def _poured_bed(pile: Pile, grains: pd.DataFrame, norm: LogNorm) -> Figure:
     look: Look = {"facecolors": list(colours[order]), "edgecolors": EDGE, "lw": 0.3}
     look |= {"offsets": places[order], "offset_transform": ax.transData}
     ax.add_collection(EllipseCollection(sizes, sizes, np.zeros_like(x), units="xy", **look))
-    up = "$y/d$" if packed.width else "$z/d$"
-    ax.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="$x/d$", ylabel=up)
+    up = "y/d" if packed.width else "z/d"
+    ax.set(xlim=(left, right), ylim=(low, high), aspect="equal", xlabel="x/d", ylabel=up)
     bar = figure.colorbar(scale, ax=ax, location="bottom", aspect=60)
-    bar.set_label(r"$u^\star_0$ at which the grain goes, m/s; the same colours by every method")
+    bar.set_label("u*₀ at which the grain goes, m/s; the same colours by every method")
     style.plain_ticks(bar.ax.xaxis)
     title = f"Where grains go, by {method}, {labels.plain('d_m', pile.scene.grain.diameter)}"
     text = caption("poured", width=packed.width, count=len(flows), method=method)
@@ -162,10 +166,10 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
         colour = "#d55e00" if width else "black"
         ax.plot(angles, percent, color=colour, label=f"{beds}, {len(angles)} grains")
     percent = np.linspace(0.5, 99.5, 100)
-    natural = "Kirchner et al. (1990), $D = D_{50}$"
+    natural = "Kirchner et al. (1990), D = D₅₀"
     ax.plot(measured.kirchner_pivot(percent), percent, color="0.5", ls="--", label=natural)
     ax.axvline(30, color=style.WATER, lw=1, label="lattice, β = 60°")
-    ax.set(xlabel="pivot angle of an exposed grain, degrees", xlim=(0, 120))
+    ax.set(xlabel="pivot angle of an exposed grain, degrees", xlim=(0, 180))
     ax.set(ylabel="percentile", ylim=(0, 100))
     ax.legend(loc="lower right")
     cases = case_names(results.scenes)
@@ -174,10 +178,10 @@ def _pivots(results: Results, rows: pd.DataFrame) -> Figure:
 
 def _hiding(rows: pd.DataFrame) -> Figure:
     """Thresholds of size classes over that of the median size, a panel for each method."""
-    axes = "$d_i/d_{50}$", r"$\theta_i/\theta_{50}$"
+    axes = "dᵢ/d₅₀", "$τ_c$ of the size over that of d₅₀"
     (sheet,) = shields.sheets(rows, ["answered_method"], 2.7, *axes, columns=3)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
-    for ax, part in zip(sheet.axes, sheet.parts, strict=True):
+    for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
         part = part[part["hiding"] > 0]
         sizes = part["size_over_d"]
         number = np.rint(np.log(sizes) / np.log(np.sqrt(2)))
@@ -197,6 +201,6 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         ax.set(xscale="log", yscale="log")
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
-    shields.legends(sheet, "fraction", colours)
+    canvas = shields.legends(sheet, "fraction", colours)
     title, cases = "Hiding and exposure of sizes", case_names(rows)
-    return Figure("hiding", title, caption("hiding"), cases, sheet.canvas)
+    return Figure("hiding", title, caption("hiding"), cases, canvas)

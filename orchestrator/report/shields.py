@@ -1,8 +1,8 @@
 """Shields diagrams: that of a study, those of single grains and of piles; DEM over closed form."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
-from scipy.ndimage import grey_closing, grey_opening
 
 from orchestrator.physics import curves
 from orchestrator.physics.laws import LAWS
@@ -27,8 +26,6 @@ SHAPE, LABEL = "marker", "label"
 """The columns that hold a row's marker and its meaning."""
 REYNOLDS = np.geomspace(1e-4, 1e6, 601)
 """Re* at which lines are drawn; axes cut them."""
-SPIKE = 33
-"""Points of the water band, 80 a decade, over which an edge must last."""
 AIR_STYLES = dict(zip(curves.AIR, ("-.", "--", (0, (1, 1))), strict=True))
 SLOPED = "Shao & Lu 2000"
 """The curve for air that is drawn for sloping beds: three for each slope would hide the rest."""
@@ -52,14 +49,16 @@ PILE = ("reynolds", "shields", "shields_low", "shields_high")
 
 
 class Sheet(NamedTuple):
-    """A figure of panels, endings of its name and title, the rows of each panel and of all."""
+    """A figure of panels, endings of its name and title, the rows of each panel and of all.
+
+    `panels` makes the figure and its panels when they are drawn in, once.
+    """
 
     name: str
     title: str
-    canvas: Canvas
-    axes: list[Axes]
     parts: list[pd.DataFrame]
     rows: pd.DataFrame
+    panels: Callable[[], tuple[Canvas, list[Axes]]]
 
 
 def sheets(
@@ -70,11 +69,10 @@ def sheets(
     order = sorted(range(len(panels)), key=lambda i: (-panels[i]["scene_id"].nunique(), i))
     for name, title, chosen in style.pages(order):
         parts = [panels[i] for i in sorted(chosen)]
-        single = 1.3 if len(parts) == 1 else 1.0
-        canvas, axes = style.grid(len(parts), single * height, x, y, **layout)
-        for ax, part in zip(axes, parts, strict=True):
-            ax.set_title(labels.panel(part.iloc[0], keys), loc="left")
-        yield Sheet(name, title, canvas, axes, parts, pd.concat(parts))
+        tall = height * (1.3 if len(parts) == 1 else 1.0)
+        titles = [labels.panel(part.iloc[0], keys) for part in parts]
+        made = cache(partial(style.grid, titles, tall, x, y, **layout))
+        yield Sheet(name, title, parts, pd.concat(parts), made)
 
 
 def parted(table: pd.DataFrame, *shown: str) -> tuple[list[str], pd.DataFrame]:
@@ -129,13 +127,19 @@ def about(rows: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def prepare(sheet: Sheet, reach: Sequence[float]) -> None:
-    """Logarithmic axes around a range of Re* and all lines in it; call it when all is drawn."""
-    xlim = min(reach) / 2, max(reach) * 2
-    shown = [line for ax in sheet.axes for line in ax.lines if line.get_gid() != "intervals"]
+def ends(scenes: pd.DataFrame, *drawn: pd.DataFrame) -> tuple[float, float]:
+    """Ends of an axis of Re* around the single grains of some scenes and rows that are drawn."""
+    shown = (rows["reynolds"] for rows in drawn if len(rows))
+    reach = np.concatenate([theory.span(scenes), *shown])
+    return float(reach.min()) / 2, float(reach.max()) * 2
+
+
+def prepare(sheet: Sheet, xlim: tuple[float, float]) -> None:
+    """Logarithmic axes over a range of Re* and all lines in it; call it when all is drawn."""
+    shown = [line for ax in sheet.panels()[1] for line in ax.lines if line.get_gid() != "intervals"]
     x, tau = np.concatenate([np.asarray(line.get_xydata(), float) for line in shown]).T
     tau = tau[(x >= xlim[0]) & (x <= xlim[1]) & (tau > 0)]
-    for ax, rows in zip(sheet.axes, sheet.parts, strict=True):
+    for ax, rows in zip(sheet.panels()[1], sheet.parts, strict=True):
         ax.set(xscale="log", yscale="log", xlim=xlim, ylim=(tau.min() / 1.6, tau.max() * 2.2))
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
@@ -185,33 +189,20 @@ def draw_points(
         for solid in (True, False):
             at = (rows[SHAPE] == marker).to_numpy() & (usable == solid)
             look = {"ls": "", "marker": marker, "ms": size, "color": colour, "mew": 0.8}
-            look |= (
-                {"gid": RESULT[1], "label": label} if solid else {"gid": RESULT[2], "mfc": "white"}
-            )
+            told: Look = {"gid": RESULT[2], "label": "hollow: not usable, see why_not"}
+            look |= {"gid": RESULT[1], "label": label} if solid else {**told, "mfc": "white"}
             if solid or at.any():
-                look = {"label": "hollow: not usable, see why_not", **look}
                 drawn.append((ax.plot(x[at], y[at], zorder=3, **look)[0], rows[at]))
     return drawn
 
 
-@cache
-def _band() -> tuple[np.ndarray, ...]:
-    """Re*, lowest and highest of the published curves for water, and where there are curves."""
-    reynolds = np.geomspace(0.01, 1000, 400)
-    low, high = theory.water_band(reynolds)
-    covered = np.isfinite(low)
-    at = np.flatnonzero(covered)
-    # a curve that begins far from the others is a line alone until it comes near them
-    low, high = (np.interp(np.arange(len(reynolds)), at, edge[at]) for edge in (low, high))
-    return reynolds, grey_closing(low, (SPIKE,)), grey_opening(high, (SPIKE,)), covered
-
-
 def draw_published(
-    ax: Axes, scenes: pd.DataFrame, colours: Mapping[float, str] | None = None
+    ax: Axes, scenes: pd.DataFrame, xlim: tuple[float, float], colours: Any = None
 ) -> None:
     """Curves for air, and unless the bed slopes in a gas those and measurements for water.
 
-    On slopes one curve for air is drawn, times the slope factor, in the colours of the slopes.
+    Measurements are drawn whose median is within some ends of the axis. On slopes one curve for air
+    is drawn, times the slope factor, in the colours of the slopes.
     """
     sloped = bool((scenes["alpha_deg"] > 0).any())
     for alpha in sorted(set(scenes["alpha_deg"])):
@@ -224,23 +215,23 @@ def draw_published(
     if sloped and theory.in_gas(scenes).all():
         return
     lines = [part for item in curves.WATER for part in (np.column_stack(item.points()), GAP)]
-    ax.plot(*np.concatenate(lines).T, color=style.WATER, lw=0.4, zorder=1)
-    x, low, high, covered = _band()
-    look = {"color": style.WATER, "alpha": 0.45, "lw": 0, "zorder": 1, "gid": "water band"}
-    label = "water: spread of published curves"
-    ax.fill_between(x, low, high, where=covered.tolist(), label=label, **look)
-    x, y = theory.MIDDLES, theory.MEDIANS
+    look = {"color": style.WATER, "lw": 0.7, "zorder": 1, "label": "water: published curves"}
+    ax.plot(*np.concatenate(lines).T, **look)
+    bins = [item for item in BINS if xlim[0] < item.middle < xlim[1]]
+    x, y = np.array([(item.middle, item.median) for item in bins]).reshape(-1, 2).T
     look = {"color": "black", "lw": 0.7, "zorder": 2.2}
-    ax.vlines(x, [item.tenth for item in BINS], [item.ninetieth for item in BINS], **look)
-    ax.hlines(y, [item.low for item in BINS], [item.high for item in BINS], **look)
+    ax.vlines(x, [item.tenth for item in bins], [item.ninetieth for item in bins], **look)
+    ax.hlines(y, [item.low for item in bins], [item.high for item in bins], **look)
     ax.plot(x, y, "s", ms=3.5, label="measured in water: median, 10 to 90 %", **look)
 
 
-def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> None:
-    """Legends of the colours of a column above the panels, and of all labels below them."""
+def legends(sheet: Sheet, column: str, colours: Mapping[Any, str]) -> Canvas:
+    """Legends of the colours of a column above the panels, of all labels below them; the figure."""
+    canvas, axes = sheet.panels()
     used = set(sheet.rows[column])
     top = [style.entry(labels.plain(column, v), c) for v, c in colours.items() if v in used]
-    style.legends(sheet.canvas, top, style.samples(sheet.axes))
+    style.legends(canvas, top, style.samples(axes))
+    return canvas
 
 
 def single_grains(results: Results) -> pd.DataFrame:
@@ -264,9 +255,10 @@ def draw(results: Results) -> Iterator[Figure]:
     if not lines and piles.empty and grains.empty:
         return
     scenes = results.scenes
-    sheet = Sheet("", "", *style.grid(1, 3.5, *AXES), [scenes], scenes)
-    (ax,) = sheet.axes
-    draw_published(ax, scenes.assign(alpha_deg=0.0))
+    sheet = Sheet("", "", [scenes], scenes, cache(partial(style.grid, [""], 3.5, *AXES)))
+    (ax,) = sheet.panels()[1]
+    xlim = ends(scenes, piles, grains)
+    draw_published(ax, scenes.assign(alpha_deg=0.0), xlim)
     shades: dict[Any, str] = style.palette("alpha_deg", results.values("alpha_deg"))
     points: dict[str, list[list[str]]] = {}
     kinds = ((grains, "single grain", DEM, "o", 2.4), (piles, "bed", PILE, "s", 3.6))
@@ -274,8 +266,9 @@ def draw(results: Results) -> Iterator[Figure]:
         if rows.empty:
             continue
         telling = [*TOLD, *(labels.varying(rows, *TOLD, *({"fraction"} & set(rows))))]
-        if "fraction" in rows and rows["fraction"].nunique() == 1:
-            name += f" at n/N = {rows['fraction'].iloc[0]:.0%}"
+        if "fraction" in rows:
+            shares = sorted(set(100 * rows["fraction"]))
+            name += f" at n/N = {', '.join(f'{share:g}' for share in shares)} %"
         for (alpha,), part in split(rows, "alpha_deg"):
             label = f"{name}, {labels.plain('alpha_deg', alpha)}"
             marked = part.assign(**{SHAPE: shape, LABEL: label})
@@ -287,9 +280,8 @@ def draw(results: Results) -> Iterator[Figure]:
         # a law on another bed has a thinner line
         width = 1.4 / (1 + [item.law for item in lines[:at]].count(closed.law))
         draw_line(ax, closed, closed.name, *theory.look(closed.law), width)
-    reach = [rows["reynolds"] for rows in (piles, grains) if len(rows)]
-    prepare(sheet, [*theory.span(scenes), *np.concatenate([[], *reach])])
-    legends(sheet, "alpha_deg", {})
+    prepare(sheet, xlim)
+    canvas = legends(sheet, "alpha_deg", {})
     text = caption(
         "overview",
         piles=about(piles),
@@ -300,7 +292,7 @@ def draw(results: Results) -> Iterator[Figure]:
     )
     cases = case_names(piles, grains)
     title = "Extended Shields diagram"
-    yield Figure(NAME, title, text, cases, sheet.canvas, data=points, leads=True)
+    yield Figure(NAME, title, text, cases, canvas, data=points, leads=True)
 
 
 def shown_piles(results: Results) -> pd.DataFrame:
@@ -360,11 +352,8 @@ def singles(results: Results) -> Iterator[Figure]:
     colours = style.palette("alpha_deg", results.values("alpha_deg"))
     for (beta,), group in split(grains, "beta_deg"):
         if (group["alpha_deg"] > 0).any():
-            name, title = (
-                f"{kind}-slope-beta{beta:g}",
-                f"One grain on a slope, β = {beta:g}°{ending}",
-            )
-            yield from _diagrams(group, "alpha_deg", colours, name, title)
+            title = f"One grain on a slope, β = {beta:g}°{ending}"
+            yield from _diagrams(group, "alpha_deg", colours, f"{kind}-slope-beta{beta:g}", title)
 
 
 def piles(results: Results) -> Iterator[Figure]:
@@ -376,7 +365,10 @@ def piles(results: Results) -> Iterator[Figure]:
         written = labels.ratio_of(float(str(ratio)), "d")
         name, title = f"extended-shields-{written}", f"Thresholds of beds by slope, z₀ = {written}"
         for figure in _diagrams(rows, "fraction", colours, name, title):
-            yield replace(figure, fold=figure.fold or ratio != reached["z0_over_d"].min())
+            # the one diagram shows all of few piles on one slope
+            same = reached["alpha_deg"].nunique() == 1 and every["scene_id"].nunique() <= FEW
+            fold = figure.fold or same or ratio != reached["z0_over_d"].min()
+            yield replace(figure, fold=fold)
 
 
 def _diagrams(
@@ -391,11 +383,11 @@ def _diagrams(
     keys = [{"fraction": "alpha_deg", "force_law": "beta_deg"}.get(by, "z0_over_d"), *choices]
     # to part a hundred columns takes long
     narrow = [*dict.fromkeys((*SHOWN, *columns, by, "regime", "usable", SHAPE, LABEL))]
-    for sheet in sheets(rows, keys, 2.5, *AXES):
-        dashes = theory.dashes(sheet.rows["force_law"])
-        shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
-        for ax, part in zip(sheet.axes, sheet.parts, strict=True):
-            draw_published(ax, part, colours if by == "alpha_deg" else None)
+
+    def draw(sheet: Sheet, shown: pd.DataFrame) -> Canvas:
+        dashes, xlim = theory.dashes(sheet.rows["force_law"]), ends(sheet.rows, shown)
+        for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
+            draw_published(ax, part, xlim, colours if by == "alpha_deg" else None)
             for line in theory.lines(part):
                 label, look = labels.value("force_law", line.law), theory.look(line.law)
                 if not by_law:
@@ -414,12 +406,16 @@ def _diagrams(
                 if joined:
                     ax.plot(*np.concatenate(joined).T, color=colours[value], lw=0.6, zorder=2)
                 draw_points(ax, group, colours[value], columns)
-        prepare(sheet, [*theory.span(sheet.rows), *shown["reynolds"]])
-        legends(sheet, by, {} if by_law else colours)
+        prepare(sheet, xlim)
+        return legends(sheet, by, {} if by_law else colours)
+
+    for sheet in sheets(rows, keys, 2.5, *AXES):
+        shown = every[every["scene_id"].isin(sheet.rows["scene_id"])]
         stem, fold = name.replace("/", "").replace(" ", ""), bool(sheet.name) or by == "alpha_deg"
         text = caption("diagram", by=by, about=about(sheet.rows), answers=about(shown))
         names = stem + sheet.name, title + sheet.title
-        yield Figure(*names, text, case_names(shown), sheet.canvas, fold=fold)
+        drawing = partial(draw, sheet, shown)
+        yield Figure(*names, text, case_names(shown), drawing, fold=fold)
 
 
 def accuracy(results: Results) -> Iterator[Figure]:
@@ -433,22 +429,26 @@ def accuracy(results: Results) -> Iterator[Figure]:
     rows = dem.assign(**{name: dem[column] / exact for name, column in names.items()})
     choices, rows = parted(rows, *SHOWN, "beta_deg", "load_increment")
     colours: dict[Any, str] = style.palette("alpha_deg", results.values("alpha_deg"))
-    axes = labels.RE_AXIS, r"$u^\star_{DEM}/u^\star_{closed\;form}$"
+    axes = labels.RE_AXIS, "u* of DEM over closed form"
     keys = ["load_increment", *choices]
-    for sheet in sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
-        for ax, part in zip(sheet.axes, sheet.parts, strict=True):
+
+    def draw(sheet: Sheet) -> Canvas:
+        for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
             ax.axhline(1, color="0.3", lw=0.8, zorder=1)
             for (alpha,), group in split(part, "alpha_deg"):
                 draw_points(ax, group, colours[alpha], ("reynolds", "value", "low", "high"))
             reach = 1.6 * float(np.nanmax(np.abs(part[["value", "low", "high"]] - 1)))
             ax.set(xscale="log", ylim=(1 - reach, 1 + reach))
-        for ax in sheet.axes:
+        for ax in sheet.panels()[1]:
             style.plain_ticks(ax.xaxis)
             shade_transition(ax, rows)
-        legends(sheet, "alpha_deg", colours)
+        return legends(sheet, "alpha_deg", colours)
+
+    for sheet in sheets(rows, keys, 2.1, *axes, columns=1, sharey=False):
         far, holds = (sheet.rows["value"] - 1).abs(), valid(sheet.rows)
         named = ((holds, "where its law holds"), (~holds, "where it does not"))
         deviations = ", ".join(f"{far[at].max():.2%} {where}" for at, where in named if at.any())
         text = caption("accuracy", about=about(sheet.rows), deviations=deviations)
         name, title = f"accuracy{sheet.name}", f"DEM over closed form{sheet.title}"
-        yield Figure(name, title, text, case_names(sheet.rows), sheet.canvas, fold=True)
+        drawing = partial(draw, sheet)
+        yield Figure(name, title, text, case_names(sheet.rows), drawing, fold=True)

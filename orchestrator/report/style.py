@@ -1,10 +1,11 @@
 """How all figures look: settings of matplotlib, sizes, colours by meaning, legends, files."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from io import BytesIO
 from typing import Any, TypeVar
 
@@ -43,10 +44,12 @@ RC: dict[Any, Any] = {
 """Settings that differ from matplotlib's defaults."""
 WIDTH = 7.0
 """Width of a figure across two columns of a paper, inches."""
+SIDES, UNDER, LINE = (0.66, 0.12), 0.42, 0.165
+"""Margins of panels: left and right, numbers and label of x, a line of a title or legend, inches"""
 PANELS = 6
 """Largest number of panels of a figure."""
 SHADES = {
-    "beta_deg": ("viridis", 0.0, 0.85),
+    **dict.fromkeys(("beta_deg", "nu_m2_s"), ("viridis", 0.0, 0.85)),
     "alpha_deg": ("plasma", 0.0, 0.82),
     "fraction": ("YlGnBu", 0.35, 1.0),
     "d_m": ("turbo", 0.05, 0.95),
@@ -64,20 +67,25 @@ NOTE: Look = {"fontsize": 6.5, "color": "0.35", "gid": "note"}
 class Figure:
     """A drawing: its file's stem, heading, caption and the directories of the cases behind it.
 
-    `image` (SVG or PNG) is what a page shows; until it is made `canvas` holds the drawing. `data`
-    are for the page's script, a pointer or a slider; None if there are none. The page shows a
-    figure with `fold` on demand alone, and one that `leads` at its head.
+    `image` (SVG or PNG) is what a page shows; until it is made there is a `drawing`, or a function
+    that draws it. `data` are for the page's script, a pointer or a slider; None if there are none.
+    A figure with `fold` is drawn on demand alone, and one that `leads` is at the page's head.
     """
 
     name: str
     title: str
     caption: str
     cases: tuple[str, ...]
-    canvas: Canvas | None
+    drawing: Canvas | Callable[[], Canvas] | None
     image: bytes = b""
     data: Any = None
     fold: bool = False
     leads: bool = False
+
+    @cached_property
+    def canvas(self) -> Canvas | None:
+        """The drawing, made when it is asked for."""
+        return self.drawing() if callable(self.drawing) else self.drawing
 
 
 def settings() -> AbstractContextManager[None]:
@@ -102,21 +110,40 @@ def canvas(height: float) -> Canvas:
 
 
 def grid(
-    count: int, height: float, x: str, y: str, columns: int = 2, *, sharey: bool = True
+    titles: Sequence[str], height: float, x: str, y: str, columns: int = 2, *, sharey: bool = True
 ) -> tuple[Canvas, list[Axes]]:
-    """A figure of panels of a height (inches), in columns where there are several; all share x."""
-    columns = min(count, columns)
-    lines = -(-count // columns)
-    figure = canvas(height * lines + 0.9)
+    """A figure of panels with titles and of a height (inches), in columns; all share x.
+
+    Its margins are fixed: to measure all texts takes as long as to draw them.
+    """
+    columns = min(len(titles), columns)
+    lines = -(-len(titles) // columns)
+    above = LINE * max(title.count("\n") + 1 for title in titles) + SIDES[1] if any(titles) else 0.0
+    between = 2 * SIDES[1] if sharey else sum(SIDES)
+    wide = (WIDTH - sum(SIDES) - (columns - 1) * between) / columns
+    figure = Canvas(figsize=(WIDTH, lines * height + (lines - 1) * above))
+    ends = SIDES[0] / WIDTH, 0.0, 1 - SIDES[1] / WIDTH, 1.0
+    figure.subplots_adjust(*ends, wspace=between / wide, hspace=above / height)
+    extend(figure, above + SIDES[1], UNDER)
     axes = figure.subplots(lines, columns, sharex=True, sharey=sharey, squeeze=False).ravel()
-    for unused in axes[count:]:
+    for unused in axes[len(titles) :]:
         unused.remove()
-    for lowest in axes[count - columns : count]:
+    for lowest in axes[len(titles) - columns : len(titles)]:
         lowest.tick_params(axis="x", which="both", labelbottom=True)
         lowest.set_xlabel(x)
-    for left in axes[:count:columns]:
+    for left in axes[: len(titles) : columns]:
         left.set_ylabel(y)
-    return figure, list(axes[:count])
+    for ax, title in zip(axes, titles, strict=False):
+        ax.set_title(title, loc="left")
+    return figure, list(axes[: len(titles)])
+
+
+def extend(figure: Canvas, above: float, below: float) -> None:
+    """Make a figure of fixed margins higher above and below its panels, by inches."""
+    height, places = figure.get_figheight(), figure.subplotpars
+    bottom, top = places.bottom * height + below, (1 - places.top) * height + above
+    figure.set_figheight(whole := height + above + below)
+    figure.subplots_adjust(bottom=bottom / whole, top=1 - top / whole)
 
 
 def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]:
@@ -128,12 +155,16 @@ def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
     """Place the legend of colours above the panels and all other samples below them."""
-    if colours:
-        figure.legend(handles=colours, loc="outside upper center", ncols=6)
-    if looks:
-        # of entries of more letters three columns do not fit
-        columns = 3 if max(len(str(item.get_label())) for item in looks) < 42 else 2
-        figure.legend(handles=looks, loc="outside lower center", ncols=columns)
+    room = []
+    for items, most, edge in ((colours, 6, "upper"), (looks, 3, "lower")):
+        longest = max((len(str(item.get_label())) for item in items), default=0)
+        count = max(1, min(most, int(WIDTH / (0.5 + 0.055 * longest))))  # a sample, and letters
+        look: Look = {"handles": items, "loc": f"outside {edge} center", "ncols": count}
+        if items:
+            figure.legend(**look)
+        room.append(-(-len(items) // count) * LINE + (SIDES[1] if items else 0.0))
+    if not figure.get_layout_engine():
+        extend(figure, *room)
 
 
 def samples(axes: Sequence[Axes]) -> list[Artist]:
@@ -163,7 +194,8 @@ def plain_ticks(axis: Axis) -> None:
     low, high = axis.get_view_interval()
     axis.set_minor_locator(LogLocator(subs=range(2, 9) if high < 5 * low else (2, 5)))
     axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter("{x:g}" if high < 200 * low else NullFormatter())
+    decades = 3.5 if axis is axis.axes.yaxis else 2.3  # numbers beside each other take more room
+    axis.set_minor_formatter("{x:g}" if high < 10**decades * low else NullFormatter())
 
 
 def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
@@ -181,4 +213,4 @@ def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
         images["svg"] = re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
     for ending, image in images.items():
         folder.put(f"{FIGURES}/{figure.name}.{ending}", image)
-    return replace(figure, canvas=None, image=image)
+    return replace(figure, drawing=None, image=image)

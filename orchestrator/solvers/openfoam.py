@@ -4,13 +4,9 @@ import os
 import re
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from orchestrator import solvers
 from orchestrator.errors import Exploded, SolverError, Stalled
-
-if TYPE_CHECKING:
-    import pyvista
 
 PROGRAM = "simpleFoam"
 TRIED = "1912"
@@ -32,23 +28,6 @@ def version() -> str:
     remedy = INSTALL if home == _HOME else other
     command = f"{PROGRAM} -help"
     return solvers.version("OpenFOAM", command, _STATED, tried=TRIED, env=env, remedy=remedy)
-
-
-def read_cells(directory: Path, array: str) -> "pyvista.UnstructuredGrid":
-    """The cells of a case with a field of its last time; SolverError if it has no results."""
-    import pyvista
-
-    if not any(directory.glob(f"[1-9]*/{array}")):
-        raise SolverError("no results", where=str(directory), remedy="run ./Allrun there")
-    reader = pyvista.POpenFOAMReader(str(directory / "system" / "controlDict"))
-    # the reader starts at the first time, not at the last
-    reader.set_active_time_value(reader.time_values[-1])
-    reader.cell_to_point_creation = False
-    reader.disable_all_cell_arrays()
-    reader.enable_cell_array(array)
-    cells: Any = reader.read()["internalMesh"]
-    assert isinstance(cells, pyvista.UnstructuredGrid)
-    return cells
 
 
 def check_log(directory: Path) -> int:
