@@ -18,8 +18,7 @@ from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
-"""Times of imports and of the first figures, of each scene, and of each grain of a bed without a
-run, s: measured on `first-look`, `dune` and `paper --tolerance 0.2`, two cores."""
+"""Times of imports and first figures, of a scene, and of a grain of a bed without a run, s."""
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
 
 

@@ -1,7 +1,7 @@
 """Figures of flows: stress along the bed, velocity, mesh, measured hills."""
 
-from collections.abc import Iterator, Sequence
-from functools import lru_cache, partial
+from collections.abc import Iterator
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 from typing import get_args
@@ -9,7 +9,6 @@ from typing import get_args
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Rectangle
 from numpy.lib.stride_tricks import sliding_window_view
 
@@ -70,20 +69,16 @@ def stress(results: Results) -> Iterator[Figure]:
     piles = [pile for least, *others in _kinds(results) for pile in (least, *others[-1:])]
     if not piles:
         return
-
-    def draw() -> Canvas:
-        figure, axes = style.grid([_title(results, pile) for pile in piles], 2.6, "x/h", USTAR)
-        for ax, pile in zip(axes, piles, strict=True):
-            _along(results, pile, ax)
-        axes[0].set_xlim(-4, max(pile.model.line.x[-2] / pile.bed.height for pile in piles) + 10)
-        style.legends(figure, [], style.samples(axes))
-        return figure
-
+    figure, axes = style.grid([_title(results, pile) for pile in piles], 2.6, "x/h", USTAR)
+    for ax, pile in zip(axes, piles, strict=True):
+        _along(results, pile, ax)
+    axes[0].set_xlim(-4, max(pile.model.line.x[-2] / pile.bed.height for pile in piles) + 10)
+    style.legends(figure, [], style.samples(axes))
     names = tuple(pile.flow.name for pile in piles)
     mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
     lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
     text = caption("stress", mean=mean, crest=crest, averaged=f"max(d, {', '.join(lengths)})")
-    yield Figure("wall-stress", "Friction velocity over the pile", text, names, draw, fold=True)
+    yield Figure("wall-stress", "Friction velocity over the pile", text, names, figure, fold=True)
 
 
 def _along(results: Results, pile: Pile, ax: Axes) -> None:
@@ -132,9 +127,8 @@ def over_u_e(pile: Pile, cases: Path, window: Window, unit: float, width: int = 
     above = z - bed.height(x)[:, None]
     beyond = (above < 0) | (z > lid) | ((x < bed.x[0]) | (x > bed.x[-1]))[:, None]
     # a height of 1 stands for those that are not used
-    values = _solved(cases / pile.flow.name).at(
-        "U", x, np.where(beyond, 1.0, np.maximum(above, 1e-12)), bed
-    )
+    heights = np.where(beyond, 1.0, np.maximum(above, 1e-12))
+    values = _solved(cases / pile.flow.name).at("U", x, heights, bed)
     grid = np.where(beyond[..., None], np.nan, values.reshape(*above.shape, 3))
     return np.asarray(grid.swapaxes(0, 1) / pile.scene.flow.speed)
 
@@ -142,33 +136,27 @@ def over_u_e(pile: Pile, cases: Path, window: Window, unit: float, width: int = 
 def flow(results: Results) -> Iterator[Figure]:
     """Speed and streamlines: a panel for each slope and height, at its least z0."""
     for name, title, shown in style.pages(drawn(results)):
+        toe = max(pile.model.line.x[-2] / pile.bed.height for pile in shown)
+        window = left, right, bottom, top = -2.0, toe + 8.0, 0.0, 3.0
+        panel = (style.WIDTH - sum(style.SIDES)) * (top - bottom) / (right - left)
+        figure, axes = style.grid([_title(results, p) for p in shown], panel, "x/h", "z/h", 1)
+        for ax, pile in zip(axes, shown, strict=True):
+            field = over_u_e(pile, results.cases, window, pile.bed.height)
+            speed = np.linalg.norm(field, axis=-1)
+            image = ax.imshow(speed, origin="lower", extent=window, vmin=0, vmax=1.1)
+            _streamlines(ax, window, field)
+            _draw_bed(ax, pile)
+            ax.set(aspect="auto", xlim=window[:2], ylim=window[2:], yticks=range(4))
+        style.extend(figure, 0.0, 0.55)
+        at = (0.1, 0.4 / figure.get_figheight(), 0.88, 0.1 / figure.get_figheight())
+        bar = figure.colorbar(image, cax=figure.add_axes(at), orientation="horizontal")
+        bar.set_label("speed over that of the approaching flow at 10 h, |u|/Uₑ")
         flows, lid = [pile.scene.flow for pile in shown], not any(p.scene.flow.depth for p in shown)
         models = {labels.value("turbulence_model", flow.turbulence_model): 0 for flow in flows}
         speeds = {labels.value("solve_u_e_m_s", flow.speed): 0 for flow in flows}
         text = caption("flow", models=", ".join(models), speeds=", ".join(speeds), lid=lid)
         names, title = tuple(pile.flow.name for pile in shown), f"Flow over the pile{title}"
-        drawing = partial(_flows, results, shown)
-        yield Figure(f"flow{name}", title, text, names, drawing, fold=bool(name))
-
-
-def _flows(results: Results, shown: Sequence[Pile]) -> Canvas:
-    toe = max(pile.model.line.x[-2] / pile.bed.height for pile in shown)
-    window = left, right, bottom, top = -2.0, toe + 8.0, 0.0, 3.0
-    panel = (style.WIDTH - sum(style.SIDES)) * (top - bottom) / (right - left)
-    titles = [_title(results, pile) for pile in shown]
-    figure, axes = style.grid(titles, panel, "x/h", "z/h", 1)
-    for ax, pile in zip(axes, shown, strict=True):
-        field = over_u_e(pile, results.cases, window, pile.bed.height)
-        speed = np.linalg.norm(field, axis=-1)
-        image = ax.imshow(speed, origin="lower", extent=window, vmin=0, vmax=1.1)
-        _streamlines(ax, window, field)
-        _draw_bed(ax, pile)
-        ax.set(aspect="auto", xlim=window[:2], ylim=window[2:], yticks=range(4))
-    style.extend(figure, 0.0, 0.55)
-    at = (0.1, 0.4 / figure.get_figheight(), 0.88, 0.1 / figure.get_figheight())
-    bar = figure.colorbar(image, cax=figure.add_axes(at), orientation="horizontal")
-    bar.set_label("speed over that of the approaching flow at 10 h, |u|/Uₑ")
-    return figure
+        yield Figure(f"flow{name}", title, text, names, figure, fold=bool(name))
 
 
 def _draw_bed(ax: Axes, pile: Pile) -> None:
@@ -199,34 +187,29 @@ def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
 def mesh(results: Results) -> Iterator[Figure]:
     """The mesh of the study's least slope, which stands for all, and its crest."""
     for pile in drawn(results)[:1]:
+        line, h = pile.model.line, pile.bed.height
+        x, z = line.crest / h
+        windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5), (x - 0.7, x + 0.7, z - 0.25, z + 0.25)]
+        shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
+        figure = style.canvas(6.4 * sum(shapes) + 0.8)
+        axes = list(figure.subplots(2, 1, height_ratios=shapes))
+        edges = read_edges(results.cases / pile.flow.name) / h
+        low, high = edges.min(axis=1), edges.max(axis=1)
+        for ax, (left, right, bottom, top) in zip(axes, windows, strict=True):
+            shown = (high >= [left, bottom]).all(axis=1) & (low <= [right, top]).all(axis=1)
+            # as one line with gaps: thousands of lines would take seconds and megabytes
+            ends = np.pad(edges[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+            ax.plot(*ends.reshape(-1, 2).T, color="0.25", lw=0.3, gid="mesh")
+            ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+            ax.set(xlabel="x/h", ylabel="z/h")
+            _draw_bed(ax, pile)
+        box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
+        axes[0].add_patch(box)
+        axes[0].set_title(_title(results, pile), loc="left")
+        axes[1].set_title("the crest", loc="left")
         first, lid = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}", not pile.scene.flow.depth
         text = caption("mesh", cells=pile.flow.settings.cells_per_face, first=first, lid=lid)
-        drawing = partial(_mesh, results, pile)
-        yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), drawing, fold=True)
-
-
-def _mesh(results: Results, pile: Pile) -> Canvas:
-    line, h = pile.model.line, pile.bed.height
-    x, z = line.crest / h
-    windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5), (x - 0.7, x + 0.7, z - 0.25, z + 0.25)]
-    shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
-    figure = style.canvas(6.4 * sum(shapes) + 0.8)
-    axes = list(figure.subplots(2, 1, height_ratios=shapes))
-    edges = read_edges(results.cases / pile.flow.name) / h
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    for ax, (left, right, bottom, top) in zip(axes, windows, strict=True):
-        shown = (high >= [left, bottom]).all(axis=1) & (low <= [right, top]).all(axis=1)
-        # as one line with gaps: thousands of lines would take seconds and megabytes
-        ends = np.pad(edges[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-        ax.plot(*ends.reshape(-1, 2).T, color="0.25", lw=0.3, gid="mesh")
-        ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
-        ax.set(xlabel="x/h", ylabel="z/h")
-        _draw_bed(ax, pile)
-    box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
-    axes[0].add_patch(box)
-    axes[0].set_title(_title(results, pile), loc="left")
-    axes[1].set_title("the crest", loc="left")
-    return figure
+        yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), figure, fold=True)
 
 
 def read_edges(case: Path) -> FloatArray:

@@ -39,8 +39,7 @@ def fractions(results: Results) -> Iterator[Figure]:
         curve = curve[(curve["moved"] > 0) & drawable(curve, "shields")]
     curves = {str(item): group for (item,), group in split(curve, "scene_id")}
     scenes = results.scenes[results.scenes["scene_id"].isin(curves)]
-    # of the piles alone: single grains have more diameters than there are colours
-    piles = results.beds("pile")
+    piles = results.beds("pile")  # single grains have more diameters than there are colours
     sizes = scenes.groupby("alpha_deg")["d_m"].nunique()
     by = "nu_m2_s" if (sizes == 1).all() and piles["nu_m2_s"].nunique() > 1 else "d_m"
     colours = style.palette(by, sorted(set(piles[by])))

@@ -49,10 +49,7 @@ PILE = ("reynolds", "shields", "shields_low", "shields_high")
 
 
 class Sheet(NamedTuple):
-    """A figure of panels, endings of its name and title, the rows of each panel and of all.
-
-    `panels` makes the figure and its panels when they are drawn in, once.
-    """
+    """Endings of a figure's name and title, rows of each panel and of all; `panels` makes it."""
 
     name: str
     title: str

@@ -50,8 +50,6 @@ GRAIN = [
 """Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
 """Columns of all that a line depends on beside its law, in the order of `Bed`."""
-LEAST_CURVES = 2
-"""The band for water is drawn only where at least this many curves were published for."""
 BAGNOLD_FROM = 3.5
 """Bagnold's A is 0.1 above this Re* only; it rises below."""
 GAS_RATIO = 100.0
@@ -195,15 +193,6 @@ def span(scenes: pd.DataFrame) -> tuple[float, float]:
 def thresholds(scenes: pd.DataFrame, law: str) -> list[Threshold]:
     """The closed form of the single grains of some rows under a law."""
     return thresholds_of(law, list(scenes[GRAIN].itertuples(index=False, name=None)))
-
-
-def water_band(reynolds: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest of the published curves for water at some Re*, NaN below two curves."""
-    logs = (np.log(curve.points(2000)) for curve in curves.WATER)
-    at, outside = np.log(reynolds), {"left": np.nan, "right": np.nan}
-    table = np.exp([np.interp(at, x, y, **outside) for x, y in logs])
-    table[:, np.isfinite(table).sum(axis=0) < LEAST_CURVES] = np.nan
-    return np.fmin.reduce(table), np.fmax.reduce(table)
 
 
 def in_gas(scenes: pd.DataFrame) -> "pd.Series[bool]":
