@@ -1,18 +1,19 @@
 """Figures of flows: stress along the bed, velocity, mesh, measured hills."""
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import groupby
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Rectangle
 from numpy.lib.stride_tricks import sliding_window_view
 
-from orchestrator.flow.foam import SolvedFlow, sides
+from orchestrator.flow.foam import SolvedFlow
 from orchestrator.grains.pile import Pile
 from orchestrator.report import labels, style
 from orchestrator.report.page import caption
@@ -187,37 +188,45 @@ def _streamlines(ax: Axes, window: Window, velocity: FloatArray) -> None:
 def mesh(results: Results) -> Iterator[Figure]:
     """The mesh of the study's least slope, which stands for all, and its crest."""
     for pile in drawn(results)[:1]:
-        line, h = pile.model.line, pile.bed.height
-        x, z = line.crest / h
-        windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5), (x - 0.7, x + 0.7, z - 0.25, z + 0.25)]
-        shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
-        figure = style.canvas(6.4 * sum(shapes) + 0.8)
-        axes = list(figure.subplots(2, 1, height_ratios=shapes))
-        edges = read_edges(results.cases / pile.flow.name) / h
-        low, high = edges.min(axis=1), edges.max(axis=1)
-        for ax, (left, right, bottom, top) in zip(axes, windows, strict=True):
-            shown = (high >= [left, bottom]).all(axis=1) & (low <= [right, top]).all(axis=1)
-            # as one line with gaps: thousands of lines would take seconds and megabytes
-            ends = np.pad(edges[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-            ax.plot(*ends.reshape(-1, 2).T, color="0.25", lw=0.3, gid="mesh")
-            ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
-            ax.set(xlabel="x/h", ylabel="z/h")
-            _draw_bed(ax, pile)
-        box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
-        axes[0].add_patch(box)
-        axes[0].set_title(_title(results, pile), loc="left")
-        axes[1].set_title("the crest", loc="left")
         first, lid = f"{pile.flow.first_cell_m / pile.bed.roughness:.3g}", not pile.scene.flow.depth
         text = caption("mesh", cells=pile.flow.settings.cells_per_face, first=first, lid=lid)
-        yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), figure, fold=True)
+        draw = partial(_mesh, results, pile)
+        yield Figure("mesh", "Mesh of the flow", text, (pile.flow.name,), draw, fold=True)
+
+
+def _mesh(results: Results, pile: Pile) -> Canvas:
+    line, h = pile.model.line, pile.bed.height
+    x, z = line.crest / h
+    windows = [(-2.0, line.x[-2] / h + 2.0, 0.0, 2.5), (x - 0.7, x + 0.7, z - 0.25, z + 0.25)]
+    shapes = [(top - bottom) / (right - left) for left, right, bottom, top in windows]
+    figure = style.canvas(6.4 * sum(shapes) + 0.8)
+    axes = list(figure.subplots(2, 1, height_ratios=shapes))
+    edges = read_edges(results.cases / pile.flow.name) / h
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    for ax, (left, right, bottom, top) in zip(axes, windows, strict=True):
+        shown = (high >= [left, bottom]).all(axis=1) & (low <= [right, top]).all(axis=1)
+        # as one line with gaps: thousands of lines would take seconds and megabytes
+        ends = np.pad(edges[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+        ax.plot(*ends.reshape(-1, 2).T, color="0.25", lw=0.3, gid="mesh")
+        ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x/h", ylabel="z/h")
+        _draw_bed(ax, pile)
+    box = Rectangle((left, bottom), right - left, top - bottom, fc="none", ec="#d55e00", lw=1)
+    axes[0].add_patch(box)
+    axes[0].set_title(_title(results, pile), loc="left")
+    axes[1].set_title("the crest", loc="left")
+    return figure
 
 
 def read_edges(case: Path) -> FloatArray:
     """The edges of a mesh one cell deep, seen across the flow: x and z of ends, (E, 2, 2), m."""
-    faces = sides(case)
-    across = faces[np.ptp(faces[..., 1], axis=1) > 0]
-    front = np.argsort(across[..., 1], axis=1)[:, :2, None]
-    return np.asarray(np.take_along_axis(across, front, axis=1)[..., [0, 2]])
+    import pyvista  # half a second, for which a page without this figure does not wait
+
+    reader = pyvista.POpenFOAMReader(str(case / "system" / "controlDict"))
+    cells: Any = reader.read()["internalMesh"]
+    edges = cells.extract_all_edges()
+    ends: FloatArray = np.asarray(edges.points, float)[edges.lines.reshape(-1, 3)[:, 1:]]
+    front = (ends[..., 1] < ends[..., 1].mean()).all(axis=1)
+    return np.asarray(ends[front][..., [0, 2]])
 
 
 def hills(results: Results) -> Iterator[Figure]:
