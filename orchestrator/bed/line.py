@@ -224,8 +224,7 @@ def _train(form: FloatArray, count: int, spacing: float | None) -> FloatArray:
         raise UnfitError("bed.spacing", what, "raise it, or leave it out: they touch then")
     corners = np.vstack([form + np.array([place * spacing, 0]) for place in range(count)])
     # forms that touch share a corner
-    new = np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)
-    return np.asarray(corners[new])
+    return np.asarray(corners[np.append(True, np.diff(corners[:, 0]) > 1e-9 * spacing)])
 
 
 def _with_obstacle(line: BedLine, obstacle: Obstacle) -> BedLine:

@@ -87,8 +87,7 @@ class Places:
     def contacts(self, sizes: FloatArray, touch: float = TOUCH) -> tuple[IntArray, ...]:
         """Pairs as `pairs` gives them whose surfaces are nearer than a part of their mean size."""
         first, second, apart = self.pairs((1 + touch) * float(sizes.max()))
-        reach = (1 + touch) * (sizes[first] + sizes[second]) / 2
-        close = np.linalg.norm(apart, axis=1) < reach
+        close = np.linalg.norm(apart, axis=1) < (1 + touch) * (sizes[first] + sizes[second]) / 2
         return first[close], second[close], apart[close]
 
 
@@ -189,8 +188,7 @@ def along(line: BedLine, counts: str | Range) -> Packing:
     arc_length = s[piece] + ways - sums[piece]
     x = np.interp(arc_length, s, x)
     each, none = np.ones(PLACES), np.zeros(PLACES, bool)
-    centres = np.column_stack([x, line.height(x)])
-    return Packing(centres, each, none, ~none, none, arc_length)
+    return Packing(np.column_stack([x, line.height(x)]), each, none, ~none, none, arc_length)
 
 
 def pile(line: BedLine, lattice: Lattice) -> Packing:

@@ -131,8 +131,7 @@ class PouredBed(Case):
         length = self.line.x[-2] - self.line.x[1]
         if length < LEAST_LENGTH * (1 - 1e-9):
             what = f"a poured bed of {length:.3g} grains has no pockets that are those of a bed"
-            remedy = f"at least {LEAST_LENGTH:g} diameters"
-            raise InputError(what, where="bed.length", remedy=remedy)
+            raise InputError(what, "bed.length", f"at least {LEAST_LENGTH:g} diameters")
         if self._count > MOST_GRAINS:
             what = f"about {self._count:.2g} grains would be poured, more than {MOST_GRAINS:g}"
             remedy = "a shorter bed, larger grains, or less of bed.poured_depth or bed.width"
@@ -223,10 +222,8 @@ class PouredBed(Case):
     @cached_property
     def grains(self) -> tuple[FloatArray, FloatArray]:
         """Centres of all grains, the fixed first, and their diameters, d."""
-        floor = self.floor
-        sizes = self._drawn(self._count, self.seed)
-        places = self.rain(sizes)
-        return np.vstack([floor, places]), np.concatenate([np.ones(len(floor)), sizes])
+        floor, sizes = self.floor, self._drawn(self._count, self.seed)
+        return np.vstack([floor, self.rain(sizes)]), np.append(np.ones(len(floor)), sizes)
 
     def write(self, directory: Path, cases: Path) -> None:
         """Write the grains in the air, the walls and the cut."""
@@ -240,8 +237,7 @@ class PouredBed(Case):
         deck.write_parameters(directory, {**grain, **contact, **walls, **sharing, **stages})
         (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
         x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
-        cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
-        for name, scaled in cut.items():
+        for name, scaled in {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}.items():
             (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in scaled.tolist()))
         margin = float(sizes.max()) + 1
         bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
@@ -266,12 +262,10 @@ class PouredBed(Case):
         energy = (last["ke"] / last["grains"].clip(lower=1) / (WEIGHT * DIAMETER)).to_numpy()
         if len(last) < len(CALM) or not (last["grains"] > 0).all():
             what = "no grain of the poured bed is left"
-            remedy = "a gentler slope, or more of bed.poured_depth"
-            raise SolverError(what, where=where, remedy=remedy)
+            raise SolverError(what, where, "a gentler slope, or more of bed.poured_depth")
         if not np.all(energy < CALM):
             what = f"the poured bed does not come to rest: {energy[-1]:.2g} W d a grain"
-            remedy = "a gentler slope, or a larger grain.friction_angle_deg"
-            raise Noisy(what, where=where, remedy=remedy)
+            raise Noisy(what, where, "a gentler slope, or a larger grain.friction_angle_deg")
         _, rows = deck.read_dump(directory / DUMP, ("id", "x", "y", "z"))
         number = rows["id"].to_numpy(np.int64) - 1
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
@@ -307,8 +301,7 @@ def read(
     counted = free & line.counted(counts)[segment] & within(centres[:, 0], counts)
     if not counted.any():
         what = "no grain of the poured bed is exposed where grains are counted"
-        remedy = "choose another part of the bed, or another bed.seed"
-        raise InputError(what, where="bed.counted", remedy=remedy)
+        raise InputError(what, "bed.counted", "choose another part of the bed, or another bed.seed")
     first, second, apart = places.pairs(float(sizes.max()) + NEAR)
     gap = np.linalg.norm(apart, axis=1) - (sizes[first] + sizes[second]) / 2
     near = mobile.copy()

@@ -84,7 +84,7 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
     digest, out = chosen.manifest.sha256[pack.EXPECTED], _place(out, chosen)
     ours = Ours(chosen, names, out / OURS / "cases")
     with workspace.claimed(out, workspace.RESULTS, command) as folder:
-        about = workspace.read_marker(out, workspace.RESULTS) or {}
+        about = workspace.read_marker(out, workspace.RESULTS)
         if about.get("pack", digest) != digest:
             what = "it holds answers to another pack, or to an earlier export of this one"
             raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
@@ -118,7 +118,7 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, options: Opti
         if solvers.count(solver) > 1:
             remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
-    about = workspace.read_marker(results[0], workspace.RESULTS) or {}
+    about = workspace.read_marker(results[0], workspace.RESULTS)
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
     out = _place(out or (results[0] if is_of_run else None), chosen)
     kind, name = workspace.COMPARISON, chosen.root.name
@@ -139,7 +139,7 @@ def _place(out: Path | None, chosen: Pack) -> Path:
 
 def name_of(place: Path) -> str:
     """The name of the solver of a directory of results: what `run` noted, or the directory's."""
-    noted = (workspace.read_marker(place, workspace.RESULTS) or {}).get("solver")
+    noted = workspace.read_marker(place, workspace.RESULTS).get("solver")
     return printable(str(noted or place.absolute().name))
 
 
@@ -239,7 +239,7 @@ def _read(place: Path, names: Sequence[str]) -> tuple[dict[tuple[str, ...], floa
     answers: dict[tuple[str, ...], float] = {}
     used = []
     for name in names:
-        about = read_json(place / name / USED) or {}
+        about = read_json(place / name / USED)
         error, given = str(about.get("error") or ""), {}
         try:
             given = {} if error else _answers(place / name / ANSWER)
@@ -248,9 +248,8 @@ def _read(place: Path, names: Sequence[str]) -> tuple[dict[tuple[str, ...], floa
         except (OSError, ValueError) as fault:
             error = f"{ANSWER}: {fault}"
         answers |= {(name, *key): answer for key, answer in given.items()}
-        times = [about.get(key) for key in TIMES]
         # the message repeats the output of a program
-        used.append([one_line(error), *times, given.get((STEPS, ""))])
+        used.append([one_line(error), *map(about.get, TIMES), given.get((STEPS, ""))])
     table = pd.DataFrame(used, index=list(names), columns=["message", *TIMES, STEPS])
     numbers = table[[*TIMES, STEPS]].apply(pd.to_numeric, errors="coerce")
     return answers, table[["message"]].join(numbers.where(numbers > 0))
@@ -362,8 +361,7 @@ def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
         **{"largest, %": ("worst", "max"), "time over ours": ("ratio", "median")},
         **{"CPU over ours": ("cpu_ratio", "median"), "peak, MiB": ("peak_mib", "max")},
     }
-    groups = verdicts.groupby(["level", "kind", "solver"], sort=False)
-    table = groups.agg(**columns).reset_index()
+    table = verdicts.groupby(["level", "kind", "solver"], sort=False).agg(**columns).reset_index()
     percent = [name for name in columns if name.endswith("%")]
     return table.assign(**(100 * table[percent]))
 

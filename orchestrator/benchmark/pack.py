@@ -146,8 +146,7 @@ def read(root: Path) -> Pack:
     """Read a pack; raises InputError if there is none, or it is of another schema or changed."""
     if not os.path.lexists(root / MANIFEST):
         what = f"there is no pack here: {MANIFEST} is missing"
-        remedy = "write one with: python -m orchestrator benchmark export"
-        raise InputError(what, where=str(root), remedy=remedy)
+        raise InputError(what, str(root), "write one with: python -m orchestrator benchmark export")
     path = root / MANIFEST
     try:
         manifest = Manifest.model_validate_json(path.read_bytes())

@@ -179,8 +179,7 @@ def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     ax = canvas.subplots()
     groups: Any = timed.groupby(["solver", "level"])
     for (solver, level), rows in groups:
-        errors = rows["worst"].clip(lower=FLOOR)
-        ax.plot(rows["cpu_s"], errors, MARKERS[level], **looks[solver])
+        ax.plot(rows["cpu_s"], rows["worst"].clip(lower=FLOOR), MARKERS[level], **looks[solver])
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
     _legends(canvas, looks, timed["level"].unique())
     caption = (

@@ -145,8 +145,7 @@ def checks() -> Iterator[Problem]:
         given = _contact(0.02) | {"speed_m_s": speed * UNIT}
         given["roll_time_s"] = 2 * speed * UNIT / (7 * friction * GRAVITY)
         half, rolls = ("speed_over_start", 6 / 7, 0.5), ("speed_over_start", 5 / 7, 2.0)
-        spins = ("spin_over_start", 5 / 7, 2.0)
-        listed.append(("sliding", speed, given, [half, rolls, spins]))
+        listed.append(("sliding", speed, given, [half, rolls, ("spin_over_start", 5 / 7, 2.0)]))
     beta = np.radians(PASSING_DEG)
     x, z = float(np.cos(beta)), -float(np.sin(beta))
     grains = {"grains": _three(DIAMETER * np.array([[-x, z], [x, z], [0.0, 0.0]]), DIAMETER)}
@@ -156,10 +155,8 @@ def checks() -> Iterator[Problem]:
         given["force_n"] = push * given["weight_n"] / float(np.tan(beta))
         time = passing_time(push, CRITERION)
         listed.append(("passing", push, given, [("passing_time_over_t", time, None)]))
-    for kind, number, given, answers in listed:
-        rows = [
-            expectation(what, float(x), CHECK, at) | {"ours": np.nan} for what, x, at in answers
-        ]
+    for kind, number, given, exact in listed:
+        rows = [expectation(what, float(x), CHECK, at) | {"ours": np.nan} for what, x, at in exact]
         tables = grains if kind == "passing" else {}
         yield Problem(f"{kind}-{number:g}", kind, given, tables, rows)
 
@@ -212,14 +209,11 @@ def _flow_tables(pile: Pile) -> tuple[Row, dict[str, pd.DataFrame]]:
 def flow(name: str, pile: Pile, results: Tables) -> Problem:
     """Level 3: the stress on the bed of a pile whose flow is solved."""
     low, high = (x * pile.model.line.crest_s / pile.bed.height for x in FACE)
-    stress, diagnostics = (
-        results[table].set_index("flow_case").loc[[pile.flow.name]]
-        for table in ("wall_stress", "flow")
-    )
-    rows = [expectation("windward_mean", float(diagnostics["ustar_mean"].iloc[0]), MEAN_STRESS)]
+    stress = results["wall_stress"].set_index("flow_case").loc[[pile.flow.name]]
+    diagnostics = results["flow"].set_index("flow_case").loc[pile.flow.name]
+    rows = [expectation("windward_mean", float(diagnostics["ustar_mean"]), MEAN_STRESS)]
     for s, u in zip(stress["s_over_h"], stress["ustar_over_ustar0_wall"], strict=True):
-        tolerance = STRESS if low <= s <= high else np.nan
-        rows.append(expectation("ustar_over_ustar0", u, tolerance, s))
+        rows.append(expectation("ustar_over_ustar0", u, STRESS if low <= s <= high else np.nan, s))
     return Problem(name, "flow", *_flow_tables(pile), rows)
 
 
@@ -230,10 +224,8 @@ def bed(name: str, kind: str, pile: Pile, results: Tables, cases: Path) -> Probl
     `results` are the tables of the study, `cases` is the directory of the runs, which are done.
     """
     scene = pile.scene
-    curve, thresholds = (
-        results[table].set_index("scene_id").loc[[scene.id]].reset_index()
-        for table in ("pile_curve", "pile_threshold")
-    )
+    curve = results["pile_curve"].set_index("scene_id").loc[[scene.id]].reset_index()
+    thresholds = results["pile_threshold"].set_index("scene_id").loc[[scene.id]]
     total, moved, off = (int(curve[key].iloc[-1]) for key in ("count", "moved", "carried_off"))
     tolerance, until = THRESHOLD[kind], 1.0
     scatter = POURED_SCATTER if pile.pouring else SCATTER

@@ -63,8 +63,7 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     middles = points[cells].mean(axis=1)
     columns = np.argsort(middles[:, 0])
     columns = columns.reshape(np.count_nonzero(tags == mesh.field_data["bed"][0]), -1)
-    upwards = np.argsort(middles[columns, 2], axis=1)
-    columns = np.take_along_axis(columns, upwards, axis=1)
+    columns = np.take_along_axis(columns, np.argsort(middles[columns, 2], axis=1), axis=1)
     faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4).astype(np.int64)
     owner = np.repeat(np.arange(len(cells)), len(SIDES))
 
@@ -142,8 +141,7 @@ class SolvedFlow:
         """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""
         path = next(self.directory.glob(f"[1-9]*/{name}"), None)
         if path is None:
-            where = str(self.directory)
-            raise SolverError("no results", where=where, remedy="run ./Allrun there")
+            raise SolverError("no results", str(self.directory), "run ./Allrun there")
         return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
 
     @cached_property

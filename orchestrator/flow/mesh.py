@@ -74,8 +74,7 @@ def growth_far(growth: float, cells_per_face: int) -> float:
 
 def extended(line: BedLine, upstream: float, downstream: float) -> BedLine:
     """A line with flat bed of some lengths, m, before and behind it in place of its own."""
-    x = (line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream)
-    return replace(line, x=x)
+    return replace(line, x=(line.x[1] - upstream, *line.x[1:-1], line.x[-2] + downstream))
 
 
 def along(line: BedLine, slope_deg: float, cells_per_face: int, growth: float) -> Grid:
@@ -207,7 +206,7 @@ def made_by_gmsh(directory: Path) -> Any:
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
             where = str(directory / "pile.msh")
-            raise SolverError(f"no usable mesh: {error}", where=where, remedy=remedy) from error
+            raise SolverError(f"no usable mesh: {error}", where, remedy) from error
         finally:
             gmsh.finalize()
     mesh = meshio.read(directory / "pile.msh", file_format="gmsh")

@@ -95,14 +95,10 @@ class WallStress:
         apart = np.diff(self.s_m)
         steps = np.diff(tau) / apart
         chord = np.hypot(np.diff(self.x_m), np.diff(self.z_m))
-        straight = np.abs(chord / apart - 1.0) < BEND
-        steps = np.where(straight, steps, np.nan)
-        behind, ahead = np.append(np.nan, steps), np.append(steps, np.nan)
+        steps = np.where(np.abs(chord / apart - 1.0) < BEND, steps, np.nan)
+        sides = np.array([np.append(np.nan, steps), np.append(steps, np.nan)])
         # at a bend, or an end of the bed, the one neighbour that is left counts alone
-        behind, ahead = (
-            np.where(np.isnan(behind), ahead, behind),
-            np.where(np.isnan(ahead), behind, ahead),
-        )
+        behind, ahead = np.where(np.isnan(sides), sides[::-1], sides)
         # limited so that no face reaches beyond its neighbours' values
         slope = np.where(behind * ahead > 0.0, (behind + ahead) / 2.0, 0.0)
         most = 2.0 * np.minimum(np.abs(behind), np.abs(ahead))
@@ -146,8 +142,7 @@ def diagnostics(
         "reattachment_over_h": ((bubble(stress, height) or (0.0, 0.0))[1], shortest, inf),
     }
     if mean_speed is not None:
-        channel = (mean_speed, 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR)
-        rows["mean_speed_over_log_law"] = channel
+        rows["mean_speed_over_log_law"] = (mean_speed, 1 - MEAN_SPEED_ERROR, 1 + MEAN_SPEED_ERROR)
     columns = ["value", "sound_from", "sound_to"]
     table = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     sound = table["value"].between(table["sound_from"], table["sound_to"])
@@ -160,15 +155,14 @@ def bubble(stress: WallStress, height: float) -> tuple[float, float] | None:
     A stretch of less than h that runs forward within it is a corner's eddy. None where no flow is
     reversed.
     """
-    top = stress.x_m[int(np.argmax(stress.z_m))]
-    faces = np.flatnonzero((stress.x_m > top) & (stress.tau_wall < 0))
+    x, tau = stress.x_m, stress.tau_wall
+    top = x[int(np.argmax(stress.z_m))]
+    faces = np.flatnonzero((x > top) & (tau < 0))
     if not faces.size:
         return None
-    ends = np.flatnonzero(np.diff(stress.x_m[faces]) > height)
+    ends = np.flatnonzero(np.diff(x[faces]) > height)
     first, last = faces[0], faces[ends[0]] if ends.size else faces[-1]
     # where the stress changes its sign between two faces: cells of h/3 lie there
-    pairs = [first, first - 1], [last, min(last + 1, len(stress.x_m) - 1)]
-    begins, stops = (
-        float(np.interp(0.0, stress.tau_wall[pair], stress.x_m[pair])) for pair in pairs
-    )
+    pairs = [first, first - 1], [last, min(last + 1, len(x) - 1)]
+    begins, stops = (float(np.interp(0.0, tau[pair], x[pair])) for pair in pairs)
     return (begins - top) / height, (stops - top) / height

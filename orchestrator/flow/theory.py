@@ -89,10 +89,9 @@ def of_wavelength(wavelength_over_roughness: FloatArray) -> tuple[FloatArray, Fl
     r = np.log(np.maximum(wavelength_over_roughness, 1))
     a = 1.0702 + 0.093069 * r + 0.10838 * r**2 + 0.024835 * r**3
     b = 0.036989 + 0.15765 * r + 0.11518 * r**2 + 0.0020249 * r**3
-    return (
-        2 + a / (1 + 0.041603 * r**2 + 0.0010625 * r**4),
-        b / (1 + 0.0028725 * r**2 + 0.00053483 * r**4),
-    )
+    a /= 1 + 0.041603 * r**2 + 0.0010625 * r**4
+    b /= 1 + 0.0028725 * r**2 + 0.00053483 * r**4
+    return 2 + a, b
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +120,8 @@ def seen_by_the_flow(line: BedLine) -> Seen:
     z, bubbles = line.height(x), []
     slopes = np.diff(line.z) / np.diff(line.x)
     sharp = (line.bends_deg[1:-1] > SHARP_DEG) & (slopes[1:] < 0)
-    leaves = np.flatnonzero(sharp | (slopes[1:] < -STEEPEST)) + 1
     end = line.x[0]
-    for corner in leaves:
+    for corner in np.flatnonzero(sharp | (slopes[1:] < -STEEPEST)) + 1:
         start, top = line.x[corner], line.z[corner]
         if start < end or (streamline := _streamline(x, z, start, top, slopes[corner - 1])) is None:
             continue

@@ -144,8 +144,7 @@ def prepare(case: Case, cases: Path) -> Path:
     """
     cases.mkdir(parents=True, exist_ok=True)
     old = cases / case.name
-    identity = read_json(old / IDENTITY)
-    inputs = identity.get("inputs_sha256") if isinstance(identity, dict) else None
+    inputs = read_json(old / IDENTITY).get("inputs_sha256")
     patterns = (*STATE, *case.results, *case.derived, *case.bulky, *case.made)
     names = {path for path, _, _ in template_files(case.template)}
 
@@ -202,8 +201,7 @@ def fail(directory: Path, error: SolverError) -> None:
 
 def failure(directory: Path) -> tuple[str, str]:
     """In which way the case in a directory failed, and why; empty if it is not known to have."""
-    state = read_json(directory / FAILED)
-    about = state if isinstance(state, dict) else {}
+    about = read_json(directory / FAILED)
     return str(about.get("ended", "")), str(about.get("cause", ""))
 
 
@@ -218,8 +216,6 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     A bulky file may be missing: `prune` drops it, and no table is made of it.
     """
     about, state = read_json(directory / IDENTITY), read_json(directory / DONE)
-    if not (isinstance(about, dict) and isinstance(state, dict)):
-        return None
     if not about.get("id") == state.get("id") == identity:
         return None
     digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
@@ -243,8 +239,7 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
 
 def is_whole(case: Case, cases: Path) -> bool:
     """Whether a case is done and has all of its files: none was pruned, or a rerun made it anew."""
-    state = read_json(cases / case.name / DONE)
-    names = state.get("stamps", {}) if isinstance(state, dict) else {"": 0}
+    names = read_json(cases / case.name / DONE).get("stamps", [""])
     return all((cases / case.name / name).is_file() for name in names)
 
 
@@ -268,8 +263,7 @@ def names_in(cases: Path) -> list[str]:
 
 def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     """The programs, with versions, that some of the cases were made with."""
-    identities = (read_json(cases / name / IDENTITY) for name in sorted(names))
-    given = (each.get("programs", {}) for each in identities if isinstance(each, dict))
+    given = (read_json(cases / name / IDENTITY).get("programs", {}) for name in sorted(names))
     return {program: version for versions in given for program, version in versions.items()}
 
 

@@ -169,8 +169,7 @@ def run(
         while ready and len(running) < pool.places:
             case = todo[heapq.heappop(ready)[-1]]
             if need_failed := next((n.name for n in case.needs if n.name in failed), None):
-                why = f"it needs {need_failed}, which failed"
-                settle(case, error=SolverError(why, case.name))
+                settle(case, error=SolverError(f"it needs {need_failed}, which failed", case.name))
             else:
                 running[pool.executor.submit(pool.task, case)] = case
         if running:

@@ -55,13 +55,14 @@ def opened(path: Path) -> BufferedReader:
     return path.open("rb")
 
 
-def read_json(path: Path) -> Any:
-    """The file's value, or None where it is missing or cannot be read: unreadable is undone."""
+def read_json(path: Path) -> dict[str, Any]:
+    """The file's object; empty where there is none that can be read: unreadable is undone."""
     try:
         with opened(path) as stream:
-            return json.load(stream)
+            value = json.load(stream)
     except (OSError, ValueError, RecursionError):
-        return None
+        return {}
+    return value if isinstance(value, dict) else {}
 
 
 def write_durably(path: Path, content: str | bytes) -> None:

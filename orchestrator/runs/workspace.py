@@ -63,13 +63,12 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
         raise OrchestratorError(f"it is in use by {holder}", str(root), remedy) from None
     except OSError as error:
         what = f"the output directory cannot be used: {error.strerror or error}"
-        where = str(error.filename or root)
-        raise InputError(what, where, remedy="choose another one: --out") from None
+        raise InputError(what, str(error.filename or root), "choose another one: --out") from None
     try:
         with contextlib.suppress(OSError):  # a full disk holds no note, but gives the lock
             (root / LOCK).write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
         _check(folder, kind, name)  # another process may have been first
-        if new and read_marker(root, kind) is None:
+        if new and not read_marker(root, kind):
             folder.note(kind.marker, files.text_of({"kind": kind.word, "name": name}))
         yield folder
     finally:
@@ -78,10 +77,10 @@ def claimed(root: Path, kind: Kind, name: str, *, new: bool = True) -> Iterator[
         lock.release()
 
 
-def read_marker(root: Path, kind: Kind) -> dict[str, Any] | None:
-    """Content of the marker of a kind; None where there is none, or it is not this program's."""
+def read_marker(root: Path, kind: Kind) -> dict[str, Any]:
+    """Content of the marker of a kind; empty where there is none, or it is not this program's."""
     value = read_json(root / kind.marker)
-    return value if isinstance(value, dict) and {"kind", "name"} <= value.keys() else None
+    return value if {"kind", "name"} <= value.keys() else {}
 
 
 def _check(folder: Folder, kind: Kind, name: str) -> None:
@@ -93,7 +92,7 @@ def _check(folder: Folder, kind: Kind, name: str) -> None:
             raise InputError(f"{holds}, not the {kind.word} {name}", str(root), remedy)
     # a study whose marker is lost still has its cases
     has_cases = kind.marker == STUDY.marker and names_in(root / "cases")
-    if read_marker(root, kind) is None and not has_cases:
+    if not read_marker(root, kind) and not has_cases:
         for path in sorted(root.iterdir()):
             # a claim that was ended at once leaves these, and empty directories
             is_left = path.name in (LOCK, RECORD) or path.suffix == ".tmp"
@@ -128,8 +127,7 @@ class Workspace(Folder):
 
     def description(self) -> dict[str, Any]:
         """Read what `describe` wrote; InputError if the directory holds no study."""
-        value = read_json(self.root / STUDY.marker)
-        about = value if isinstance(value, dict) else {}
+        about = read_json(self.root / STUDY.marker)
         names = about["cases"] if isinstance(about.get("cases"), list) else [None]
         texts = (about.get("name"), about.get("study", ""), *names)
         if all(isinstance(text, str) for text in texts):
@@ -147,7 +145,7 @@ class Workspace(Folder):
     def answer(self, ids: Mapping[str, str]) -> str | None:
         """The answer on the page of these cases; None where it is not finished, or has changed."""
         marker = read_json(self.drawn)
-        is_drawn = isinstance(marker, dict) and {**marker, **self.drawn_of(ids)} == marker
+        is_drawn = marker and {**marker, **self.drawn_of(ids)} == marker
         return str(marker["answer"]) if is_drawn and self.is_whole() else None
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:

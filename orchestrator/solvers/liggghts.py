@@ -58,6 +58,5 @@ def check_log(directory: Path) -> None:
     if error := re.search(r"(?m)^ERROR(?!: ld\.so:).*$", text):
         raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
     if LAST_WORDS not in text:
-        what = "LIGGGHTS ended before its protocol did"
         remedy = "it was killed, or the disk is full; run the same command again"
-        raise SolverError(what, where=str(log), remedy=remedy)
+        raise SolverError("LIGGGHTS ended before its protocol did", str(log), remedy)

@@ -33,12 +33,8 @@ def version() -> str:
 def check_log(directory: Path) -> int:
     """Read from its log how a case that `Allrun` has run in ended; the iterations that it took.
 
-    Raises
-    ------
-    Exploded, Stalled
-        If simpleFoam diverged, or did not converge.
-    SolverError
-        If it failed or was stopped otherwise, whatever its exit code was.
+    Raises Exploded or Stalled if simpleFoam diverged or did not converge, and SolverError if it
+    failed or was stopped otherwise, whatever its exit code was.
     """
     where, log = str(directory), directory / f"log.{PROGRAM}"
     if not log.is_file():
