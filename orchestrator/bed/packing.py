@@ -303,8 +303,7 @@ def cover(line: BedLine, ground: BedLine, counts: str | Range, lattice: Lattice)
     segments = top.counted(counts)
     centres = _without_overlaps(list(_rows(top, segments, lattice)))
     under, depth = _depth(top, centres)
-    slack = SLIT if lattice.pattern == "aligned" else 0.0
-    slack = max(SLIT, lattice.disorder) if lattice.uneven else slack
+    slack = 0.0 if lattice.pattern == "horizontal" else max(SLIT, lattice.disorder)
     seen = exposed(centres, top.tangents[under], slack) & (depth < 1)
     chosen = segments[under] & within(centres[:, 0], counts)
     for start, end in line.bare:

@@ -140,11 +140,10 @@ class PouredBed(Case):
     @cached_property
     def _count(self) -> int:
         """Number of grains that rain into the mould."""
-        sizes = self._drawn(1000, 0)
+        sizes, (start, end) = self._drawn(1000, 0), self.ends
         mean = float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
         part = FILLED_IN_SPACE * self.width if self.width else FILLED
-        length = self.ends[1] - self.ends[0]
-        return int(np.ceil((self.depth + self.surface + HEAP) * length * part / mean))
+        return int(np.ceil((self.depth + self.surface + HEAP) * (end - start) * part / mean))
 
     def _drawn(self, count: int, seed: int) -> FloatArray:
         """Diameters of so many of its grains, d."""

@@ -208,7 +208,8 @@ class Ours:
         answer = problem.expected[["quantity", "at", "ours"]].rename(columns={"ours": "value"})
         if given["kind"] == "pile":
             steps = pd.read_csv(self.root / problem.runs[0] / "samples.csv")["step"].iloc[-1]
-            answer.loc[len(answer)] = ["steps", "", float(steps)]
+            row = pd.DataFrame({"quantity": ["steps"], "at": [""], "value": [float(steps)]})
+            answer = pd.concat([answer, row])
         pairs = (("seconds", "solver_s"), ("cpu_s", "cpu_s")) if problem.runs else ()
         return answer, {name: sum(states[run][key] for run in problem.runs) for name, key in pairs}
 

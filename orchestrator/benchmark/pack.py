@@ -130,12 +130,8 @@ class Pack:
 
     def chosen(self, levels: Collection[int] = (), patterns: Collection[str] = ()) -> list[str]:
         """Names of the scenes of levels and patterns, empty for all; InputError if none is left."""
-        names = [
-            name
-            for name, given in self.scenes.items()
-            if (not levels or given["level"] in levels)
-            and (not patterns or any(fnmatchcase(name, pattern) for pattern in patterns))
-        ]
+        names = [n for n, given in self.scenes.items() if not levels or given["level"] in levels]
+        names = [name for name in names if any(fnmatchcase(name, p) for p in patterns or ["*"])]
         if not names:
             remedy = "see its scenes.csv, and --level and --scene"
             raise InputError("no scene of the pack is chosen", str(self.root), remedy)

@@ -157,8 +157,7 @@ def checks() -> Iterator[Problem]:
         listed.append(("passing", push, given, [("passing_time_over_t", time, None)]))
     for kind, number, given, exact in listed:
         rows = [expectation(what, float(x), CHECK, at) | {"ours": np.nan} for what, x, at in exact]
-        tables = grains if kind == "passing" else {}
-        yield Problem(f"{kind}-{number:g}", kind, given, tables, rows)
+        yield Problem(f"{kind}-{number:g}", kind, given, grains if kind == "passing" else {}, rows)
 
 
 def _contact(time_step: float, damping: float = 0.1, stiffness: float = STIFFNESS) -> Row:
@@ -210,8 +209,8 @@ def flow(name: str, pile: Pile, results: Tables) -> Problem:
     """Level 3: the stress on the bed of a pile whose flow is solved."""
     low, high = (x * pile.model.line.crest_s / pile.bed.height for x in FACE)
     stress = results["wall_stress"].set_index("flow_case").loc[[pile.flow.name]]
-    diagnostics = results["flow"].set_index("flow_case").loc[pile.flow.name]
-    rows = [expectation("windward_mean", float(diagnostics["ustar_mean"]), MEAN_STRESS)]
+    diagnostics = results["flow"].set_index("flow_case").loc[[pile.flow.name]]
+    rows = [expectation("windward_mean", float(diagnostics["ustar_mean"].iloc[0]), MEAN_STRESS)]
     for s, u in zip(stress["s_over_h"], stress["ustar_over_ustar0_wall"], strict=True):
         rows.append(expectation("ustar_over_ustar0", u, STRESS if low <= s <= high else np.nan, s))
     return Problem(name, "flow", *_flow_tables(pile), rows)

@@ -15,7 +15,6 @@ from orchestrator.physics.constants import KARMAN
 from orchestrator.runs.files import write_durably
 from orchestrator.types import FloatArray
 
-_DERIVED = "ustar_over_ustar0_wall"
 BEND = 1e-3
 """Two faces are in one plane if their middles are as far apart as the bed between them is long,
 within this part of it: seven digits of the places make 1e-5 of it, a bend of 10 degrees 4e-3."""
@@ -107,7 +106,7 @@ class WallStress:
     def to_csv(self, path: Path) -> None:
         """Write a table with all digits: `from_csv` gives the same numbers back."""
         columns = {one.name: getattr(self, one.name) for one in fields(self)}
-        table = pd.DataFrame({**columns, _DERIVED: self.ustar_over_ustar0_wall})
+        table = pd.DataFrame({**columns, "ustar_over_ustar0_wall": self.ustar_over_ustar0_wall})
         write_durably(path, table.to_csv(index=False, lineterminator="\n"))
 
     @classmethod

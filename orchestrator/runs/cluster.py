@@ -19,10 +19,8 @@ from orchestrator.runs import engine, process
 from orchestrator.runs.case import PACKAGE, Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 
-SYSTEMS = {
-    name.lower(): f"{name}Cluster"
-    for name in ("HTCondor", "LSF", "Moab", "OAR", "PBS", "SGE", "SLURM")
-}
+_NAMES = ("HTCondor", "LSF", "Moab", "OAR", "PBS", "SGE", "SLURM")
+SYSTEMS = {name.lower(): f"{name}Cluster" for name in _NAMES}
 """Names of the queues, and dask-jobqueue's classes for them."""
 AHEAD = 2
 """Cases handed to a job for each core: no core waits for the next while this process is busy."""

@@ -196,9 +196,7 @@ class Display:
     `done` is the share of the work that is done, 0 to 1, and `left_s` the time until all is, s.
     """
 
-    def __init__(
-        self, todo: Collection[Case], cases: Path, workers: int, after_s: float = 0.0
-    ) -> None:
+    def __init__(self, todo: Collection[Case], cases: Path, workers: int, after_s: float) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
