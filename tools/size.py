@@ -7,14 +7,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = {
-    ("benchmark",): 1503,
+    ("benchmark",): 1486,
     ("report",): 2615,
-    ("runs",): 1400,
+    ("runs",): 1388,
     ("study",): 1600,
     ("experiments", "fidelity"): 2580,
-    ("grains", "bed", "flow", "physics"): 6520,
+    ("grains", "bed", "flow", "physics"): 6496,
     ("paper",): 700,
-    ("tables", "calculator", "solvers"): 1389,
+    ("tables", "calculator", "solvers"): 1384,
     ("root modules",): 862,
     ("the package",): 18997,
     ("tests",): 9500,
