@@ -548,10 +548,8 @@ class Dem(Method):
         return Worn.from_csv(cases / self.runs[-1].name)
 
 
-METHODS: dict[str, type[Method]] = {
-    **{"local": Pivot, "pivot": Pivot},
-    **{"peeling": Peeling, "dem": Dem},
-}
+METHODS: dict[str, type[Method]]
+METHODS = {"local": Pivot, "pivot": Pivot, "peeling": Peeling, "dem": Dem}
 """The methods by what a study file calls them, cheap to dear."""
 
 
