@@ -84,8 +84,9 @@ def _thresholds(ax: Axes, rows: pd.DataFrame) -> Any:
     flow = rows["ustar0_m_s"][goes]
     look: Look = {"s": 5, "cmap": "plasma", "vmin": 0, "vmax": 1, "gid": "thresholds"}
     dots = ax.scatter(rows["x_m"][goes], flow, c=flow.rank(method="first") / len(rows), **look)
-    for at in rows["x_m"][~goes]:
-        ax.axvline(at, color="0.75", lw=0.3, zorder=0)
+    # one collection: by the method local these may be hundreds
+    look = {"transform": ax.get_xaxis_transform(), "color": "0.75", "lw": 0.3, "zorder": 0}
+    ax.vlines(rows["x_m"][~goes], 0, 1, **look)
     ax.margins(y=0.15)
     ax.set(yscale="log", ylabel=r"threshold $u^\star_0$, m/s")
     style.plain_ticks(ax.yaxis)
