@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = {
-    ("benchmark",): 1486,
+    ("benchmark",): 1500,
     ("report",): 2625,
     ("runs",): 1388,
     ("study",): 1600,

@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
-from orchestrator.benchmark import compare
-from orchestrator.benchmark.compare import OURS
+from orchestrator.benchmark import judge
+from orchestrator.benchmark.judge import OURS
 from orchestrator.benchmark.pack import Pack
 from orchestrator.errors import printable
 from orchestrator.physics import curves
@@ -19,6 +19,7 @@ from orchestrator.report.page import Section
 from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
 
+PAGE = "comparison.html"
 FLOOR, EXPECTED = 1e-6, "0.25"
 """Least error of a logarithmic axis; colour of the expected answer, and of ours."""
 MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}  # of the levels
@@ -54,7 +55,7 @@ AXES: dict[str, tuple[str, str, Look]] = {
 
 
 def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: Folder) -> None:
-    """Put the page and its figures into a directory; the tables are those of `compare.judge`."""
+    """Put the page and its figures into a directory; the tables are those of `judge.judge`."""
     theirs = verdicts[verdicts["solver"] != OURS]
     percent = {name: 100 * theirs[name] for name in ("error", "worst")}
     scenes = theirs[[*SHOWN]].assign(**percent, passed=np.where(theirs["passed"], "yes", "no"))
@@ -66,15 +67,15 @@ def write(chosen: Pack, numbers: pd.DataFrame, verdicts: pd.DataFrame, folder: F
         beds = [_panels(numbers, answered[kind], *of) for kind, *of in BEDS if kind in answered]
         beds += _shields(chosen, numbers)
         sections = [
-            Section("", "\n\n".join(compare.in_words(theirs)), (), (compare.summary(theirs),)),
-            Section("What failed", tables=(compare.failures(theirs),)),
+            Section("", "\n\n".join(judge.in_words(theirs)), (), (judge.summary(theirs),)),
+            Section("What failed", tables=(judge.failures(theirs),)),
             Section("Beds", THRESHOLDS, beds, (thresholds(numbers),)),
             Section("Time and error", ERRORS, _speed(verdicts), (scenes,), LIMITS),
         ]
         names = ", ".join(theirs["solver"].unique())
         title = f"Against the pack “{printable(chosen.root.name)}”: {names}"
         shown = [part for part in sections if part.figures or any(map(len, part.tables))]
-        page.write(title, shown, folder, compare.PAGE, chosen.manifest.programs)
+        page.write(title, shown, folder, PAGE, chosen.manifest.programs)
 
 
 def _looks(table: pd.DataFrame) -> dict[str, Look]:
@@ -90,7 +91,7 @@ def _looks(table: pd.DataFrame) -> dict[str, Look]:
 def thresholds(numbers: pd.DataFrame) -> pd.DataFrame:
     """The threshold Shields numbers of piles: ours, each solver's, the interval."""
     asked = numbers[numbers["quantity"].eq("shields") & numbers["at"].ne("")]
-    margin = compare.ROUND * asked["value"]
+    margin = judge.ROUND * asked["value"]
     is_inside = asked["answer"].between(asked["low"] - margin, asked["high"] + margin)
     marks = np.where(asked["within"], np.where(is_inside, "", " *"), " **")
     pairs = zip(asked["answer"], marks, strict=True)

@@ -10,12 +10,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.calculator import (
-    GEOMETRIC,
-    MOST_POINTS,
-    PARAMETERS,
-    QUANTITIES,
-)
+from orchestrator.calculator import GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE, numbers_of

@@ -194,10 +194,8 @@ class _Roller:
 
     def _next(self, place: Place, pivot: Disc, numbers: Sequence[int]) -> tuple[Place, int] | None:
         """Where the grain, rolling over its pivot, touches another neighbour, and which."""
-        arm, turned = (
-            self.start.radius + pivot.radius,
-            math.atan2(place[1] - pivot.z, place[0] - pivot.x),
-        )
+        arm = self.start.radius + pivot.radius
+        turned = math.atan2(place[1] - pivot.z, place[0] - pivot.x)
         nearest: tuple[float, int] | None = None
         for k in numbers:
             other = self.others[k]
@@ -331,11 +329,7 @@ def pivot_angles_deg(
 
 
 def _rollers(
-    places: Places,
-    sizes: FloatArray,
-    loading: Loading,
-    chosen: BoolArray,
-    bond: float,
+    places: Places, sizes: FloatArray, loading: Loading, chosen: BoolArray, bond: float
 ) -> Iterator[tuple[int, _Roller]]:
     """The chosen grains that carry a force, by their numbers."""
     ahead, behind = (_discs(places, sizes, side) for side in (1.0, -1.0))
