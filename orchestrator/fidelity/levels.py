@@ -37,10 +37,9 @@ FINER = {
 FOLDER = Path(__file__).with_name("calibration")
 DISORDERS = (0.02, 0.05, 0.2)  # ends of the ranges of disorder that share their known errors, d
 VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it is rough
-# lift over weight at the threshold of a grain: below 0.93 it rolls, above 0.98 it is carried off
-LIFT_OFF = 0.95
 LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
-LIMITING = ", limiting slope"  # end of the name of a class
+LIMITING, LIFTED = ", limiting slope", ", lifted"  # ends of the names of classes
+LIFTED_TO = 1.235  # lift over the weight normal to the bed, up to which lifted grains were measured
 BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
 SETTINGS = (
@@ -92,10 +91,12 @@ class Level:
 
     def answer(self, scene: Scene) -> Scene:
         """The scene as this level answers it."""
-        fields = self.fields(scene)
-        if self.sets.get("flow.model", "flat") != "flat":
-            fields = {**fields, "flow.roughness": outer_roughness(scene)}
-        return changed(scene, fields)
+        return changed(scene, self.changes(scene))
+
+    def changes(self, scene: Scene) -> Fields:
+        """The fields that it sets where it is chosen: a flow over fine sand has its own z0."""
+        own = self.sets.get("flow.model", "flat") != "flat"
+        return {**self.fields(scene), **({"flow.roughness": outer_roughness(scene)} if own else {})}
 
     def describes(self, scene: Scene, *, or_finer: bool = False) -> bool:
         """Whether the scene is on this level, or has numbers that are finer and all else alike."""
@@ -138,7 +139,7 @@ class Pair(NamedTuple):
 
     def answer(self, scene: Scene) -> Scene:
         """The scene as both levels answer it."""
-        return self.grains.answer(self.flow.answer(scene))
+        return changed(scene, {**self.flow.changes(scene), **self.grains.changes(scene)})
 
 
 def value_of(scene: Scene, name: str) -> Any:
@@ -232,7 +233,8 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     """The class under which the known error of a level is measured on a scene.
 
     For the flow it names how the stress is read and what is above the bed, for the grains their
-    packing; both name the form, the limiting slope, and obstacles, unless these are left out.
+    packing, and whether lift takes them off before they roll; both name the form, the limiting
+    slope of those that roll, and obstacles, unless these are left out.
     """
     bed, name = scene.bed, packing(scene)
     assert isinstance(bed, PileBed)
@@ -242,8 +244,12 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
         name = scene.forces.stress + ("" if scene.flow.top == "boundary layer" else ", channel")
     elif name == "disordered":
         name = f"disordered up to {next(end for end in DISORDERS if bed.disorder <= end):g} d"
+    if part == "grains" and _lift(scene) > 1:
+        name += LIFTED
+    elif bed.is_triangle:
+        name += LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else ""
     if bed.is_triangle:
-        return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
+        return name
     if bed.obstacles and obstacles:
         return f"{name}, obstacles"
     if bed.shape == "flat" and not bed.profile:
@@ -263,15 +269,23 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
     base, below_deg = name.removesuffix(LIMITING), scene.limiting_slope_deg - bed.slope_deg
+    if base.endswith(LIFTED):
+        return (base,)
     if bed.is_triangle and (1 <= below_deg < BETWEEN_DEG or base == "horizontal"):
         return base, base + LIMITING
     return (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)
 
 
+def _lift(scene: Scene) -> float:
+    """Lift over the weight normal to the bed when a grain would roll: above 1 it is gone before."""
+    normal = scene.weight * math.cos(math.radians(scene.bed.slope_deg))
+    return float(closed_form(scene).lift) / normal
+
+
 def unmeasured(scene: Scene) -> str:
     """The property of a pile for which no level was measured, in words; empty if there is none."""
-    if float(closed_form(scene).lift) >= LIFT_OFF * scene.weight:
-        return "lift that carries grains off before they roll"
+    if (lift := _lift(scene)) > LIFTED_TO:
+        return f"a lift of {lift:.3g} times the weight normal to the bed"
     solved, roughness = scene.flow.model == "solve", scene.flow.roughness
     for name, default in DEFAULTS.items():
         value = value_of(scene, name)

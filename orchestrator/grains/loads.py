@@ -20,7 +20,7 @@ from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.peeling import FEWER, PLACES, RANGE, ForceTable, Loading
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics.laws import LAWS, Exposure
-from orchestrator.physics.threshold import thresholds_of
+from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -442,6 +442,26 @@ class Loads:
         criterion, bond = bed.scene.protocol.displacement_criterion, bed.scene.bond
         flows = peeling.flows(*given, criterion, self.present, bond, renew)
         return np.asarray(flows[packed.windward])
+
+    def lifting(self, rolling: FloatArray) -> FloatArray:
+        """Undisturbed friction velocity at which lift takes each counted grain off, m/s, (N,).
+
+        It then bears the weight normal to the bed, and what the contacts of a pocket pull. Infinite
+        for a grain that leaves before, at the flow `rolling`, (N,).
+        """
+        bed, scene, counted = self.geometry, self.geometry.scene, self.geometry.packing.windward
+        hold = 2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg)) + bed.tangents[:, 0]
+        # straight up a neighbour in front, rolling is being lifted
+        hold *= scene.weight * bed.packing.sizes**3 / LIFT_OFF
+        ratio = np.abs(self.ratio) * np.sqrt(scene.gust)
+        last = np.full(len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            last[counted] = np.minimum(rolling * ratio[counted], last[counted])
+            lifted = counted & (self.loading.lift(last) > hold)
+            if not lifted.any():
+                return np.full_like(rolling, np.inf)
+            local = root(lambda ustar: self.loading.lift(ustar) - hold, RANGE[0] * last, last)
+            return np.where(lifted, local / ratio, np.inf)[counted]
 
     def row_hold(self) -> float:
         """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.

@@ -65,15 +65,17 @@ class Motion:
     before and that one."""
 
     @classmethod
-    def of_flows(cls, flows: FloatArray) -> "Motion":
-        """The motion of grains that roll at given flows, shape (N,); infinite for never."""
-        moves = np.isfinite(flows)
+    def of_flows(cls, rolling: FloatArray, lifting: FloatArray | float = np.inf) -> "Motion":
+        """The motion of grains that roll or are lifted at given flows, (N,); infinite for never."""
+        flows = np.minimum(rolling, lifting)
+        moves, carried = np.isfinite(flows), flows < rolling
         levels = np.unique(flows[moves])
         # before the first level nothing moves
         flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
         level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
-        mode = np.where(moves, MODES.index("rolled"), MODES.index("none"))
-        return cls(flow, level, np.zeros_like(level), np.zeros_like(moves), mode, exact=True)
+        none, rolled, _, lifted = range(len(MODES))
+        mode = np.select([carried, moves], [lifted, rolled], none)
+        return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
 
     @classmethod
     def chained(cls, runs: "Sequence[tuple[BoolArray, Motion]]") -> "Motion":

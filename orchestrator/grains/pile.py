@@ -213,7 +213,8 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
     windward = geometry.packing.windward
     reached = worn.left[np.isfinite(worn.left)].max(initial=0.0)
     flows = np.full(len(windward), np.inf)
-    flows[windward] = np.maximum(loads.leaving(), reached)
+    rolling = loads.leaving()
+    flows[windward] = np.maximum(np.minimum(rolling, loads.lifting(rolling)), reached)
     flows[~worn.present] = np.inf
     least = goal(geometry, flow) - worn.moved
     # those that one grain frees at its flow leave with it
@@ -487,12 +488,13 @@ class Pivot(Method):
     """The closed form: each grain, or place on the bed line, by itself under its own stress."""
 
     def motion(self, cases: Path) -> Motion:
-        """Motion at the flows of Eq. 3 or 5."""
-        return Motion.of_flows(self.geometry.loads(cases).alone())
+        """Motion at the flows of Eq. 3 or 5, or at those that lift a grain off before."""
+        loads = self.geometry.loads(cases)
+        return Motion.of_flows(rolling := loads.alone(), loads.lifting(rolling))
 
 
 class Peeling(Method):
-    """Pivots that free one another, without dynamics. All roll."""
+    """Pivots that free one another, without dynamics; a grain that lift takes off frees none."""
 
     @property
     def cases(self) -> tuple[WornFlow, ...]:
@@ -507,7 +509,8 @@ class Peeling(Method):
         """Motion at the flows that `orchestrator.grains.peeling` finds."""
         if self.geometry.scene.protocol.update:
             return Motion.of_flows(self.last(cases).left[self.geometry.packing.windward])
-        return Motion.of_flows(self.geometry.loads(cases).leaving())
+        loads = self.geometry.loads(cases)
+        return Motion.of_flows(rolling := loads.leaving(), loads.lifting(rolling))
 
     def last(self, cases: Path) -> Worn:
         """The grains of a bed that changes, when the last round has ended."""

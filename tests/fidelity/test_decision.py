@@ -1,8 +1,6 @@
 """The decision how a scene is answered: the levels, what is known of them, and the reason."""
 
 import itertools
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +20,6 @@ from orchestrator.fidelity.levels import (
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
 from tests.fidelity.conftest import MakePile
-
-LEVEL: Mapping[str, Any] = {"packing": "poured", "shape": "flat", "slope_deg": 0.0}
-CHANGING = {"protocol.update": 0.1, "flow.first_cell_height": 5e-4}
 
 
 def decide(scene: Scene, tolerance: float | None, above: Bound = NO_BOUND) -> Decision:
@@ -90,7 +85,7 @@ def test_a_flow_that_many_piles_share_counts_once(
         ({"protocol.waiting_time": 1.0}, "ramp"),
         ({"protocol.method": "peeling"}, "peeling"),
         ({"flow.model": "hill"}, "hill"),
-        (CHANGING, "changes"),
+        ({"protocol.update": 0.1, "flow.first_cell_height": 5e-4}, "changes"),
         ({"bed.packing": "disordered", "bed.disorder": 0.2}, "no error is known"),
         ({"forces.averaging_length": 10.0}, "averaging_length = 10"),
         ({"flow.first_cell_height": 0.005}, "first cells of 0.005 m"),
@@ -106,7 +101,7 @@ def test_what_is_asked_for_or_not_known_is_answered_as_asked(
 
 
 def test_over_a_level_bed_the_flow_is_exact_and_the_grains_are_chosen(pile: MakePile) -> None:
-    asked = pile({"flow.model": "flat"}, **LEVEL)
+    asked = pile({"flow.model": "flat"}, packing="poured", shape="flat", slope_deg=0.0)
     assert levels.classes("flow", asked) == (LEVEL_BED,)
     for tolerance in (0.9, 0.7, 0.1):
         chosen = decide(asked, tolerance)

@@ -90,18 +90,13 @@ def test_errors_of_the_parts_add_up_by_their_squares(pile: MakePile) -> None:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"forces.averaging_length": 10.0},
-        {"forces.averaging_length": 1.0},
-        {"forces.loaded_grains": "all but crest"},
-        {"flow.first_cell_height": 0.005},
-        {"flow.speed": 0.5, "flow.viscosity": 1e-5},
-        {"flow.roughness": 1e-8},
-        {"flow.turbulence_model": "kOmegaSST"},
-        {"flow.convection_scheme": "upwind"},
-        {"flow.lid": 20.0},
+        *({"forces.averaging_length": 10.0}, {"forces.loaded_grains": "all but crest"}),
+        *({"flow.first_cell_height": 0.005}, {"flow.speed": 0.5, "flow.viscosity": 1e-5}),
+        *({"flow.roughness": 1e-8}, {"flow.turbulence_model": "kOmegaSST"}),
+        *({"flow.convection_scheme": "upwind"}, {"flow.lid": 20.0}),
         {"protocol.displacement_criterion": 0.1},
         {"flow.top": "open water", "flow.depth": 0.1, "bed.shape": "dune"},
-        {"forces.law": "low"},  # lift carries these grains off
+        {"forces.law": "low"},  # with more lift than was measured
     ],
     ids=lambda fields: next(iter(fields)),
 )
@@ -110,6 +105,13 @@ def test_a_known_error_holds_for_what_was_measured(
 ) -> None:
     assert math.isfinite(levels.known(COARSE, pile()).total)
     assert levels.known(COARSE, pile(fields)) == UNKNOWN
+
+
+def test_grains_that_lift_takes_off_have_a_class_of_their_own(pile: MakePile) -> None:
+    low = {"forces.law": "low", "grain.diameter": 5e-4, "bed.roughness": 5e-4 / 30}
+    for packing in ("aligned", "horizontal"):
+        scene = pile(low, packing=packing)
+        assert levels.classes("grains", scene) == (f"{packing}, lifted",)
 
 
 def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: MakePile) -> None:

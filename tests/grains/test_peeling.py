@@ -75,12 +75,7 @@ def test_a_flow_that_runs_back_is_the_flow_over_the_turned_bed(slope_deg: float)
 
 
 @settings(deadline=None)
-@given(
-    slope_deg=st.floats(0, 29),
-    beta_deg=st.floats(45, 60),
-    drag=st.floats(0.1, 10),
-    lift=st.floats(0, 3),
-)
+@given(st.floats(0, 29), st.floats(45, 60), st.floats(0.1, 10), st.floats(0, 3))
 def test_one_grain_leaves_at_the_pivot_of_eq_1(
     slope_deg: float, beta_deg: float, drag: float, lift: float
 ) -> None:
