@@ -212,11 +212,10 @@ def write(
 
 def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
     """Write sets of values of grains as LIGGGHTS reads them: a count, then ids and values."""
-    ids = [f"{number} " for number in (grains + 1).tolist()]
+    rows = "".join(f"{number} %r\n" for number in (grains + 1).tolist())
     with path.open("w") as stream:
         for values in sets.tolist():
-            stream.write(f"{len(ids)}\n")
-            stream.writelines(f"{a}{b!r}\n" for a, b in zip(ids, values, strict=True))
+            stream.write(f"{len(values)}\n{rows}" % tuple(values))
 
 
 def write_parameters(

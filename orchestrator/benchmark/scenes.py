@@ -325,7 +325,7 @@ def _forces(pile: Pile, curve: pd.DataFrame, cases: Path) -> pd.DataFrame:
     """The flow's force on each exposed grain in each load step: each grain has its own size."""
     loading = pile.loads(cases).loading
     exposed = np.flatnonzero(loading.ratio)
-    fx, fz = loading.in_steps(curve["ustar0_m_s"].tolist())[:, exposed].reshape(-1, 2).T
+    fx, fz = loading.at(curve["ustar0_m_s"])[:, exposed].reshape(-1, 2).T
     steps, ids = np.repeat(curve["load_step"].to_numpy(), len(exposed)), exposed + 1
     columns = {"load_step": steps, "id": np.tile(ids, len(curve)), "fx_n": fx, "fz_n": fz}
     return pd.DataFrame(columns)

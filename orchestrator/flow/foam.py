@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
+from orchestrator.flow.mesh import Mesh
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.types import FloatArray, IntArray
@@ -30,10 +31,11 @@ def listed(values: FloatArray | IntArray, item: str) -> str:
     return f"{len(values)}\n(\n{text})\n"
 
 
-def read_list(path: Path, after: str = "") -> FloatArray:
+def read_list(path: Path, after: str = "", kind: type = float) -> Any:
     """The first list of a file, or the first behind some text, shape (n, numbers of an item).
 
-    Raises a SolverError if the file is missing or not whole.
+    The numbers are of a kind: whole ones are read seven times as fast. Raises a SolverError if the
+    file is missing or not whole.
     """
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
@@ -42,29 +44,28 @@ def read_list(path: Path, after: str = "") -> FloatArray:
         raise SolverError(what, where=str(path), remedy="is the disk full? Run the case again")
     count = int(text[:start].rsplit(maxsplit=1)[-1])
     numbers = text[start + 3 : text.find("\n)", start)].translate(_WITHOUT_BRACKETS)
-    return np.fromstring(numbers, sep=" ").reshape(count, -1)
+    return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
 
 
 def sides(directory: Path) -> FloatArray:
     """Corners of the sides of the cells of a case, m, shape (n, 4, 3)."""
-    points, faces = (read_list(directory / f"constant/polyMesh/{n}") for n in ("points", "faces"))
-    return np.asarray(points[faces.astype(int)[:, 1:]])
+    folder = directory / "constant/polyMesh"
+    points, faces = read_list(folder / "points"), read_list(folder / "faces", kind=int)
+    return np.asarray(points[faces[:, 1:]])
 
 
-def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case from a `meshio.Mesh` of hexahedra one cell thick.
+def write_poly_mesh(mesh: Mesh, directory: Path, types: Mapping[str, str]) -> FloatArray:
+    """Write the ``constant/polyMesh`` of a case from a mesh one cell thick.
 
-    Its physical surfaces become the patches, of the given types with their entries, else "patch";
-    ``bed`` has one face for each column of cells. Returned are the middles of the cells in their
-    order, m: downstream, in a column upwards; shape (columns, cells of a column, 3).
+    Its patches are of the given types with their entries, else of the type "patch"; ``bed`` has one
+    face for each column of cells. Returned are the middles of the cells in their order, m:
+    downstream, in a column upwards; shape (columns, cells of a column, 3).
     """
-    points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
-    tags = mesh.cell_data_dict["gmsh:physical"]["quad"]
+    points, cells = mesh.points, mesh.cells
     middles = points[cells].mean(axis=1)
-    columns = np.argsort(middles[:, 0])
-    columns = columns.reshape(np.count_nonzero(tags == mesh.field_data["bed"][0]), -1)
+    columns = np.argsort(middles[:, 0]).reshape(len(mesh.patches["bed"]), -1)
     columns = np.take_along_axis(columns, np.argsort(middles[columns, 2], axis=1), axis=1)
-    faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4).astype(np.int64)
+    faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4)
     owner = np.repeat(np.arange(len(cells)), len(SIDES))
 
     def key(corners: IntArray) -> IntArray:
@@ -78,14 +79,12 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     inner, outer = order[twins], order[twins + 1]
     inside = np.lexsort((owner[outer], owner[inner]))  # as OpenFOAM orders the faces of cells
     chosen, neighbour = [inner[inside]], owner[outer[inside]]
-    on_patches = order[np.searchsorted(keys[order], key(quads.astype(np.int64)))]
     patches, start = [], len(neighbour)
-    for name, (tag, dimension) in mesh.field_data.items():
-        if dimension == 2:
-            chosen.append(np.sort(on_patches[tags == tag]))
-            entries = f"type {types.get(name, 'patch')}; nFaces {len(chosen[-1])}"
-            patches.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
-            start += len(chosen[-1])
+    for name, quads in mesh.patches.items():
+        chosen.append(np.sort(order[np.searchsorted(keys[order], key(quads))]))
+        entries = f"type {types.get(name, 'patch')}; nFaces {len(quads)}"
+        patches.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
+        start += len(quads)
     at = np.concatenate(chosen)
     (directory / "constant/polyMesh").mkdir(parents=True)
     for name, kind, text in (
@@ -142,14 +141,15 @@ class SolvedFlow:
         path = next(self.directory.glob(f"[1-9]*/{name}"), None)
         if path is None:
             raise SolverError("no results", str(self.directory), "run ./Allrun there")
-        return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
+        after = f"\n    {patch}\n" if patch else "internalField   nonuniform"
+        return np.asarray(read_list(path, after))
 
     @cached_property
     def mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
         """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells, m."""
         folder, corners = self.directory / "constant/polyMesh", sides(self.directory)
         files = (folder / name for name in ("owner", "neighbour"))
-        owner, neighbour = (read_list(file).astype(int)[:, 0] for file in files)
+        owner, neighbour = (read_list(file, kind=int)[:, 0] for file in files)
         # the mean of a hexahedron's corners is that of the means of its sides
         middles = np.zeros((owner.max() + 1, 3))
         np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))

@@ -8,14 +8,14 @@ import threading
 from dataclasses import dataclass, replace
 from math import ceil, expm1, inf, log, radians, tan
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
-from orchestrator.types import FloatArray
+from orchestrator.types import FloatArray, IntArray
 
 SHARP_DEG = 8.0
 """Least bend of the bed that is a corner, not a part of a curve."""
@@ -38,7 +38,7 @@ LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each cor
 // cells from it to the next one, and the ratio of each of these to the one upstream of it.
 """
 _GMSH = threading.Lock()  # gmsh has one global state
-_HEXAHEDRON = 5  # gmsh's element type
+_QUADRANGLE, _HEXAHEDRON = 3, 5  # gmsh's types of elements
 
 
 @dataclass(frozen=True)
@@ -172,14 +172,20 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-def made_by_gmsh(directory: Path) -> Any:
+class Mesh(NamedTuple):
+    """Points (n, 3), m, and by their numbers the corners of cells (n, 8) and patches (n, 4)."""
+
+    points: FloatArray
+    cells: IntArray
+    patches: dict[str, IntArray]
+
+
+def made_by_gmsh(directory: Path) -> Mesh:
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
-    Any thread may call; one at a time makes its mesh. Returned is the `meshio.Mesh`. Raises a
-    SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is missing.
+    Any thread may call; one at a time makes its mesh. Raises a SolverError if gmsh fails, cells are
+    inverted or no hexahedra, or one of `GROUPS` is missing.
     """
-    import meshio
-
     try:
         import gmsh
     except OSError as error:
@@ -191,24 +197,29 @@ def made_by_gmsh(directory: Path) -> Any:
         try:
             gmsh.option.setNumber("General.Terminal", 0)
             gmsh.open(str(directory / "pile.geo"))
-            gmsh.model.mesh.generate(3)
-            names = {gmsh.model.getPhysicalName(*group) for group in gmsh.model.getPhysicalGroups()}
-            if missing := GROUPS - names:
+            model, mesh = gmsh.model, gmsh.model.mesh
+            mesh.generate(3)
+            groups = {model.getPhysicalName(*group): group for group in model.getPhysicalGroups()}
+            if missing := GROUPS - groups.keys():
                 raise ValueError(f"without the physical groups {sorted(missing)}")
-            if list(gmsh.model.mesh.getElementTypes(3)) != [_HEXAHEDRON]:
+            if list(mesh.getElementTypes(3)) != [_HEXAHEDRON]:
                 raise ValueError("not of hexahedra only")
-            tags = gmsh.model.mesh.getElementsByType(_HEXAHEDRON)[0]
-            if (gmsh.model.mesh.getElementQualities(tags, "minDetJac") <= 0).any():
+            tags, cells = mesh.getElementsByType(_HEXAHEDRON)
+            if (mesh.getElementQualities(tags, "minSICN") <= 0).any():
                 raise ValueError("with inverted cells")
-            gmsh.option.setNumber("Mesh.Binary", 1)
-            gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
-            gmsh.write(str(directory / "pile.msh"))
+            names, points, _ = mesh.getNodes()
+            number = np.empty(int(names.max()) + 1, np.int64)
+            number[names] = np.arange(len(names))
+            patches = {}
+            for name, group in groups.items():
+                if group[0] == 2:
+                    entities = model.getEntitiesForPhysicalGroup(*group)
+                    corners = [mesh.getElementsByType(_QUADRANGLE, one)[1] for one in entities]
+                    patches[name] = number[np.concatenate(corners)].reshape(-1, 4)
+            return Mesh(points.reshape(-1, 3), number[cells].reshape(-1, 8), patches)
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
-            where = str(directory / "pile.msh")
+            where = str(directory / "pile.geo")
             raise SolverError(f"no usable mesh: {error}", where, remedy) from error
         finally:
             gmsh.finalize()
-    mesh = meshio.read(directory / "pile.msh", file_format="gmsh")
-    (directory / "pile.msh").unlink()  # OpenFOAM's files hold the same
-    return mesh

@@ -14,10 +14,12 @@ the deck; rolling needs no friction.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
@@ -59,17 +61,13 @@ class Loading:
     along: FloatArray
     outward: FloatArray
 
-    def at(self, ustar0: float) -> FloatArray:
-        """Force on each grain (N) at an undisturbed friction velocity (m/s), shape (n, 2)."""
+    def at(self, ustar0: ArrayLike) -> FloatArray:
+        """Force on each grain (N) at undisturbed friction velocities (m/s), shape (..., n, 2)."""
         loaded = self.ratio != 0
-        local = np.where(loaded, np.abs(self.ratio), 1.0) * ustar0
+        local = np.where(loaded, np.abs(self.ratio), 1.0) * np.asarray(ustar0, float)[..., None]
         drag, lift = self.drag(local) * np.sign(self.ratio), self.lift(local)
-        force = drag[:, None] * self.along + lift[:, None] * self.outward
+        force = drag[..., None] * self.along + lift[..., None] * self.outward
         return np.where(loaded[:, None], force, 0.0)
-
-    def in_steps(self, flows: Sequence[float]) -> FloatArray:
-        """Force on each grain at several undisturbed friction velocities, shape (steps, n, 2)."""
-        return np.array([self.at(flow) for flow in flows])
 
 
 class ForceTable:
@@ -81,6 +79,8 @@ class ForceTable:
 
     def __init__(self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray) -> None:
         self._log_ustar, self._forces, self._pieces = log_ustar, forces, pieces
+        # a grain asks again when a neighbour has left
+        self.reaching = cache(self._reaching)
 
     @classmethod
     def of(
@@ -100,7 +100,7 @@ class ForceTable:
         given = zip(forces, np.ascontiguousarray(pieces), strict=True)
         return [cls(np.log(ustar), *values) for values in given]
 
-    def reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
+    def _reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
         """The local friction velocity at which drag and lift times their arms reach a goal, m/s.
 
         0 where they always do, infinite where they never do.
@@ -249,8 +249,8 @@ def flows(
     for i in rollers.keys() & known:
         sample(i)
     reached = 0.0
-    while present[list(tables)].any() and np.isfinite(lowest := float(next_flow.min())):
-        i = int(next_flow.argmin())
+    asked = np.array(list(tables), int)
+    while present[asked].any() and math.isfinite(lowest := next_flow[i := int(next_flow.argmin())]):
         # a grain that is freed late leaves at once
         reached = max(reached, lowest)
         left[i], next_flow[i], present[i] = reached, np.inf, False
@@ -356,8 +356,9 @@ def _neighbours(
     first, second, apart = places.pairs((REACH + 1) * float(sizes.max()))
     reach = REACH * sizes[first] + (sizes[first] + sizes[second]) / 2
     near = np.linalg.norm(apart, axis=1) < reach
-    for i, rows in _by_grain(first[near], second[near], chosen):
-        yield i, second[near][rows].tolist()
+    first, second = first[near], second[near]
+    for i, rows in _by_grain(first, second, chosen):
+        yield i, second[rows].tolist()
 
 
 def _by_grain(

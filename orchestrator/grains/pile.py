@@ -351,9 +351,9 @@ class PileCase(GrainCase):
             **{"slope": slope, "ceiling_x": ridge[0] * d, "ceiling_z": ridge[1] * d},
             "behind": behind,
         }
-        force, gusts = loads.loading.in_steps(rising.tolist()), deck.STEADY
+        force, gusts = loads.loading.at(rising), deck.STEADY
         if scene.flow.gusts:
-            mean = loads.loading.in_steps((rising / np.sqrt(scene.gust)).tolist())
+            mean = loads.loading.at(rising / np.sqrt(scene.gust))
             gusts = in_time(scene.flow.gusts, force[1:], mean[1:], geometry.bed.seed)
         deck.write(directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts)
 

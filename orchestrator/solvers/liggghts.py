@@ -55,8 +55,8 @@ def check_log(directory: Path) -> None:
     text = log.read_text(errors="replace") if log.is_file() else ""
     # the message of an error follows a banner of MPI; the deck's own words hold no such line, and
     # the linker's are of libraries that were asked for in vain
-    if error := re.search(r"(?m)^ERROR(?!: ld\.so:).*$", text):
-        raise SolverError(f"LIGGGHTS stopped: {error[0]}", where=str(log), remedy="see the log")
+    if error := re.search(r"\n(ERROR(?!: ld\.so:).*)", text):
+        raise SolverError(f"LIGGGHTS stopped: {error[1]}", where=str(log), remedy="see the log")
     if LAST_WORDS not in text:
         remedy = "it was killed, or the disk is full; run the same command again"
         raise SolverError("LIGGGHTS ended before its protocol did", str(log), remedy)

@@ -40,10 +40,10 @@ def check_log(directory: Path) -> int:
     if not log.is_file():
         raise SolverError(f"{PROGRAM} has not run", where, "run ./Allrun there")
     text = log.read_text(encoding="utf-8", errors="replace")
-    times = re.findall(r"^Time = (\d+)$", text, re.MULTILINE)
+    times = re.findall(r"\nTime = (\d+)\n", text)
     last = f"iteration {times[-1]}" if times else "its header"
     # first the crash: a NaN also makes simpleFoam stumble over its own residuals' file
-    nan = re.search(r".*residual = -?nan.*", text)
+    nan = re.search(r"(?m)^.*residual = -?nan.*", text)
     if nan or "sigFpe::sigHandler" in text:
         exception = f"floating point exception after {last}"
         cause = f"the residuals are not numbers: {nan[0].strip()}" if nan else exception

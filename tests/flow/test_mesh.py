@@ -98,7 +98,7 @@ def test_a_mesh_that_is_no_such_mesh(
     template: Path, file: str, old: str, new: str, cause: str
 ) -> None:
     edit(template / file, old, new)
-    with pytest.raises(SolverError, match=rf"pile\.msh: .*{cause}"):
+    with pytest.raises(SolverError, match=rf"pile\.geo: .*{cause}"):
         made_by_gmsh(template)
 
 

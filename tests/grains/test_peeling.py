@@ -165,7 +165,7 @@ def test_dem_moves_a_grain_out_of_its_pocket_at_the_closed_form(tmp_path: Path) 
     along, sizes = _loading().along, np.ones(len(places.xyz))
     grains = deck.GrainTable(places.xyz * d, kind, along, sizes, d, 2500.0, WIDTH)
     rising = deck.flows(0.95 * np.sqrt(_drag(0)), 1.02 * np.sqrt(_drag(60)), 0.002)
-    force = _loading().in_steps(rising.tolist())
+    force = _loading().at(rising)
     moved = _moved_by_dem(tmp_path / "b", grains, force, Protocol(waiting_time=8), rising=rising)
     ustar = threshold.of_grains(moved).value
     np.testing.assert_allclose(ustar, np.sqrt([_drag(turned) for turned in TURNED]), rtol=0.005)
