@@ -151,8 +151,8 @@ class BedLine:
 
     def over(self, points: FloatArray, segment: IntArray | int) -> FloatArray:
         """Distance of points (m, 2) over the straight lines of segments, shape (m,)."""
-        away = points - self.corners[segment]
-        return np.asarray((away * self.normals[segment]).sum(axis=1))
+        (x, z), (nx, nz) = (points - self.corners[segment]).T, self.normals[segment].T
+        return np.asarray(x * nx + z * nz)
 
     def roof(self, clearance: float) -> tuple[float, FloatArray]:
         """Slope (degrees) and ridge of two planes that are everywhere this far above the forms."""

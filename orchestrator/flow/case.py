@@ -19,7 +19,7 @@ from orchestrator.flow.stress import WallStress, diagnostics
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import depth_mean_speed, log_law_speed, log_law_ustar
 from orchestrator.runs.case import Case
-from orchestrator.runs.files import canonical_json, digest_text, write_durably
+from orchestrator.runs.files import canonical_json, digest_text
 from orchestrator.solvers import openfoam
 from orchestrator.study.parts import Flow
 from orchestrator.study.profile import Profile
@@ -264,8 +264,7 @@ class FlowCase(Case):
         speed = self.mean_speed_over_log_law(solved) if self.settings.depth else None
         bed = (self.slope_deg, self.height_m, self.roughness_m)
         table = diagnostics(stress, approach, reynolds, *bed, mean_speed=speed)
-        text = table.to_csv(float_format="%.6g", lineterminator="\n")
-        write_durably(directory / DIAGNOSTICS, text)
+        table.to_csv(directory / DIAGNOSTICS, float_format="%.6g", lineterminator="\n")
         if table.loc["approach_ustar_over_log_law", "sound"] != "yes":
             what = f"on flat bed u* is {approach:.3f} of the log law's: the wall function fails"
             remedy = f"{DIAGNOSTICS} says more; raise the first cell's height or the speed"

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import KARMAN
-from orchestrator.runs.files import write_durably
 from orchestrator.types import FloatArray
 
 BEND = 1e-3
@@ -107,7 +106,7 @@ class WallStress:
         """Write a table with all digits: `from_csv` gives the same numbers back."""
         columns = {one.name: getattr(self, one.name) for one in fields(self)}
         table = pd.DataFrame({**columns, "ustar_over_ustar0_wall": self.ustar_over_ustar0_wall})
-        write_durably(path, table.to_csv(index=False, lineterminator="\n"))
+        table.to_csv(path, index=False, lineterminator="\n")
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":

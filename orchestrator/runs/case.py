@@ -170,14 +170,15 @@ def prepare(case: Case, cases: Path) -> Path:
         "inputs_sha256": files.digest_files(written, root=directory),
         "programs": case.versions(),
     }
-    files.write_durably(directory / IDENTITY, files.text_of(identity))
+    (directory / IDENTITY).write_text(files.text_of(identity))
     return directory
 
 
 def finish(case: Case, directory: Path, **times: float) -> None:
     """Write the marker, last of all files: digests of the results and tables, and the times, s.
 
-    The times are `solver_s`, `cpu_s` (of a processor) and `wall_s` (with Python's work).
+    It alone must survive a crash: what it names is compared with it. The times are `solver_s`,
+    `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
     results, derived = (
         {name: files.digest_file(directory / name) for name in _matching(directory, patterns)}
@@ -185,7 +186,7 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     )
     bulky = _matching(directory, case.bulky)
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
-    files.write_durably(directory / CHECKSUMS, sums)
+    (directory / CHECKSUMS).write_text(sums)
     stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
     digests = {"results_sha256": results, "derived_sha256": derived}
     marker = {"id": case.id, "ended": "done", **times, **digests, "bulky": bulky, "stamps": stamps}
@@ -275,10 +276,10 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:
     """Names of the files in a directory that fit a pattern; no link is followed."""
-    walked = (Path(path, name) for path, _, names in os.walk(directory) for name in names)
-    paths = (path for path in walked if path.is_file() and not path.is_symlink())
-    names = sorted(path.relative_to(directory).as_posix() for path in paths)
-    return [name for name in names if _fits(name, patterns)]
+    walked = (os.path.join(path, name) for path, _, names in os.walk(directory) for name in names)
+    fit = sorted(path for path in walked if _fits(os.path.relpath(path, directory), patterns))
+    paths = (path for path in fit if os.path.isfile(path) and not os.path.islink(path))
+    return [os.path.relpath(path, directory) for path in paths]
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:
