@@ -92,7 +92,7 @@ def _at(scene: Scene, roughness: float) -> Scene:
     """The scene whose flow is solved at a roughness length, on the mesh of this one."""
     changes = {"roughness": roughness, "nodes": False, "first_cell_height": scene.first_cell_height}
     parts = {name: getattr(scene, name) for name in Scene.model_fields}
-    return Scene(**{**parts, "flow": scene.flow.model_copy(update=changes)})
+    return Scene.model_construct(**{**parts, "flow": scene.flow.model_copy(update=changes)})
 
 
 @lru_cache(maxsize=256)

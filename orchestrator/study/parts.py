@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import log, radians, tan
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 import pydantic
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, InstanceOf, PlainSerializer, field_validator
+from pydantic import BaseModel, ConfigDict, Field, InstanceOf, PlainSerializer, model_validator
 from pydantic.fields import FieldInfo
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
@@ -90,11 +90,12 @@ class Part(BaseModel):
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
-    @field_validator("*", mode="after")
-    @classmethod
-    def _without_minus_zero(cls, value: Any) -> Any:
+    @model_validator(mode="after")
+    def _without_minus_zero(self) -> Self:
         """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
-        return value + 0.0 if isinstance(value, float) else value
+        zeros = {k: 0.0 for k, value in self.__dict__.items() if type(value) is float and not value}
+        self.__dict__.update(zeros)
+        return self
 
 
 class LogNormal(Part):

@@ -42,6 +42,12 @@ a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
 CLOSED = ("pivot", "local")  # methods without contacts: nothing that moves changes the bed
+OF_SHAPES = {
+    name: shapes
+    for name in PileBed.model_fields
+    if (shapes := [each for each, facts in SHAPES.items() if name in facts.fields])
+}
+"""Fields of beds that not all shapes have, and the shapes that have them."""
 OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
@@ -141,9 +147,9 @@ class Scene(parts.Part):
             yield not gentle, "bed.slope_deg", f"{slope:g} deg", f"choose {low:g} to {high:g}"
             yield slope and not rises, "bed.slope_deg", f"the shape {shape} does not rise", OUT
             yield bed.smoothing, "bed.smoothing", "it is of a profile", OUT
-            for name, declared in PileBed.model_fields.items():
-                shapes = [each for each, facts in SHAPES.items() if name in facts.fields]
-                foreign = shapes and shape not in shapes and getattr(bed, name) != declared.default
+            for name, shapes in OF_SHAPES.items():
+                default = PileBed.model_fields[name].default
+                foreign = shape not in shapes and getattr(bed, name) != default
                 yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
             return
         cell = self.first_cell_height
@@ -227,7 +233,7 @@ class Scene(parts.Part):
         """z0 at which the flow over a pile is solved, m."""
         return self.flow.roughness or self.bed.roughness
 
-    @property
+    @cached_property
     def first_cell_height(self) -> float:
         """Height of the flow's first cell on the bed of a pile, m."""
         assert isinstance(self.bed, PileBed)
@@ -241,7 +247,7 @@ class Scene(parts.Part):
         most = self._eddy_viscosity * self.first_cell_height / VISCOUS_CELLS
         return self.flow.viscosity or min(SOLVE_VISCOSITY, float(f"{most:.3g}"))
 
-    @property
+    @cached_property
     def _eddy_viscosity(self) -> float:
         """Eddy viscosity of the undisturbed flow of the solve over the height, kappa u*_0, m/s."""
         assert isinstance(self.bed, PileBed)
