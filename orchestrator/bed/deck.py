@@ -281,8 +281,7 @@ def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFr
     try:
         text = path.read_text(encoding="ascii")
         heads = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
-        steps = np.array([int(head[0]) for head in heads])
-        counts = np.array([int(head[2]) for head in heads])
+        steps, counts = (np.array([int(head[row]) for head in heads]) for row in (0, 2))
         body = StringIO("".join(head[8] for head in heads))
         rows = pd.read_csv(body, sep=r"\s+", names=list(columns), header=None)
         whole = text.endswith("\n") and len(rows) == counts.sum()

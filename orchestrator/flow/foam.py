@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
-from orchestrator.flow.mesh import Mesh
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.types import FloatArray, IntArray
@@ -31,11 +31,11 @@ def listed(values: FloatArray | IntArray, item: str) -> str:
     return f"{len(values)}\n(\n{text})\n"
 
 
-def read_list(path: Path, after: str = "", kind: type = float) -> Any:
+def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
     """The first list of a file, or the first behind some text, shape (n, numbers of an item).
 
-    The numbers are of a kind: whole ones are read seven times as fast. Raises a SolverError if the
-    file is missing or not whole.
+    Whole numbers, of the kind int, are read seven times as fast as others. Raises a SolverError if
+    the file is missing or not whole.
     """
     text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     start = text.find("\n(\n", max(text.find(after), 0)) if after in text else -1
@@ -47,23 +47,21 @@ def read_list(path: Path, after: str = "", kind: type = float) -> Any:
     return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
 
 
-def sides(directory: Path) -> FloatArray:
-    """Corners of the sides of the cells of a case, m, shape (n, 4, 3)."""
-    folder = directory / "constant/polyMesh"
-    points, faces = read_list(folder / "points"), read_list(folder / "faces", kind=int)
-    return np.asarray(points[faces[:, 1:]])
+def write_poly_mesh(
+    points: FloatArray,
+    cells: IntArray,
+    patches: Mapping[str, IntArray],
+    directory: Path,
+    types: Mapping[str, str],
+) -> FloatArray:
+    """Write the ``constant/polyMesh`` of a case from a mesh of hexahedra one cell thick.
 
-
-def write_poly_mesh(mesh: Mesh, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case from a mesh one cell thick.
-
-    Its patches are of the given types with their entries, else of the type "patch"; ``bed`` has one
+    The patches are of the given types with their entries, else of the type "patch"; ``bed`` has one
     face for each column of cells. Returned are the middles of the cells in their order, m:
     downstream, in a column upwards; shape (columns, cells of a column, 3).
     """
-    points, cells = mesh.points, mesh.cells
     middles = points[cells].mean(axis=1)
-    columns = np.argsort(middles[:, 0]).reshape(len(mesh.patches["bed"]), -1)
+    columns = np.argsort(middles[:, 0]).reshape(len(patches["bed"]), -1)
     columns = np.take_along_axis(columns, np.argsort(middles[columns, 2], axis=1), axis=1)
     faces = cells[columns.ravel()][:, SIDES].reshape(-1, 4)
     owner = np.repeat(np.arange(len(cells)), len(SIDES))
@@ -79,11 +77,11 @@ def write_poly_mesh(mesh: Mesh, directory: Path, types: Mapping[str, str]) -> Fl
     inner, outer = order[twins], order[twins + 1]
     inside = np.lexsort((owner[outer], owner[inner]))  # as OpenFOAM orders the faces of cells
     chosen, neighbour = [inner[inside]], owner[outer[inside]]
-    patches, start = [], len(neighbour)
-    for name, quads in mesh.patches.items():
+    boundary, start = [], len(neighbour)
+    for name, quads in patches.items():
         chosen.append(np.sort(order[np.searchsorted(keys[order], key(quads))]))
         entries = f"type {types.get(name, 'patch')}; nFaces {len(quads)}"
-        patches.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
+        boundary.append(f"    {name} {{ {entries}; startFace {start}; }}\n")
         start += len(quads)
     at = np.concatenate(chosen)
     (directory / "constant/polyMesh").mkdir(parents=True)
@@ -92,7 +90,7 @@ def write_poly_mesh(mesh: Mesh, directory: Path, types: Mapping[str, str]) -> Fl
         ("faces", "faceList", listed(faces[at], "4(%d %d %d %d)")),
         ("owner", "labelList", listed(owner[at], "%d")),
         ("neighbour", "labelList", listed(neighbour, "%d")),
-        ("boundary", "polyBoundaryMesh", f"{len(patches)}\n(\n{''.join(patches)})\n"),
+        ("boundary", "polyBoundaryMesh", f"{len(boundary)}\n(\n{''.join(boundary)})\n"),
     ):
         whole = f"{_HEAD.format(kind, name)}{text}\n{_END}\n"
         (directory / "constant/polyMesh" / name).write_text(whole, encoding="utf-8")
@@ -141,15 +139,17 @@ class SolvedFlow:
         path = next(self.directory.glob(f"[1-9]*/{name}"), None)
         if path is None:
             raise SolverError("no results", str(self.directory), "run ./Allrun there")
-        after = f"\n    {patch}\n" if patch else "internalField   nonuniform"
-        return np.asarray(read_list(path, after))
+        return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
 
     @cached_property
     def mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:
         """Corners of the bed's faces (n, 4, 3), the cells on them (n,), middles of all cells, m."""
-        folder, corners = self.directory / "constant/polyMesh", sides(self.directory)
-        files = (folder / name for name in ("owner", "neighbour"))
-        owner, neighbour = (read_list(file, kind=int)[:, 0] for file in files)
+        folder = self.directory / "constant/polyMesh"
+        files = (folder / name for name in ("faces", "owner", "neighbour"))
+        faces, owner, neighbour = (read_list(file, kind=int) for file in files)
+        # the corners of each face come behind their number
+        corners = read_list(folder / "points")[faces[:, 1:]]
+        owner, neighbour = owner[:, 0], neighbour[:, 0]
         # the mean of a hexahedron's corners is that of the means of its sides
         middles = np.zeros((owner.max() + 1, 3))
         np.add.at(middles, owner, corners.mean(axis=1) / len(SIDES))

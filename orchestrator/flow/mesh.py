@@ -8,7 +8,6 @@ import threading
 from dataclasses import dataclass, replace
 from math import ceil, expm1, inf, log, radians, tan
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
@@ -172,19 +171,12 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-class Mesh(NamedTuple):
-    """Points (n, 3), m, and by their numbers the corners of cells (n, 8) and patches (n, 4)."""
-
-    points: FloatArray
-    cells: IntArray
-    patches: dict[str, IntArray]
-
-
-def made_by_gmsh(directory: Path) -> Mesh:
+def made_by_gmsh(directory: Path) -> tuple[FloatArray, IntArray, dict[str, IntArray]]:
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
-    Any thread may call; one at a time makes its mesh. Raises a SolverError if gmsh fails, cells are
-    inverted or no hexahedra, or one of `GROUPS` is missing.
+    It has points (m), shape (n, 3), and by their numbers the corners of cells, (n, 8), and of the
+    faces of each patch, (n, 4). Any thread may call; one at a time makes its mesh. Raises a
+    SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is missing.
     """
     try:
         import gmsh
@@ -199,24 +191,24 @@ def made_by_gmsh(directory: Path) -> Mesh:
             gmsh.open(str(directory / "pile.geo"))
             model, mesh = gmsh.model, gmsh.model.mesh
             mesh.generate(3)
-            groups = {model.getPhysicalName(*group): group for group in model.getPhysicalGroups()}
-            if missing := GROUPS - groups.keys():
+            names = {model.getPhysicalName(*group) for group in model.getPhysicalGroups()}
+            if missing := GROUPS - names:
                 raise ValueError(f"without the physical groups {sorted(missing)}")
             if list(mesh.getElementTypes(3)) != [_HEXAHEDRON]:
                 raise ValueError("not of hexahedra only")
             tags, cells = mesh.getElementsByType(_HEXAHEDRON)
             if (mesh.getElementQualities(tags, "minSICN") <= 0).any():
                 raise ValueError("with inverted cells")
-            names, points, _ = mesh.getNodes()
-            number = np.empty(int(names.max()) + 1, np.int64)
-            number[names] = np.arange(len(names))
-            patches = {}
-            for name, group in groups.items():
-                if group[0] == 2:
-                    entities = model.getEntitiesForPhysicalGroup(*group)
-                    corners = [mesh.getElementsByType(_QUADRANGLE, one)[1] for one in entities]
-                    patches[name] = number[np.concatenate(corners)].reshape(-1, 4)
-            return Mesh(points.reshape(-1, 3), number[cells].reshape(-1, 8), patches)
+            nodes, points, _ = mesh.getNodes()
+            number, patches = np.empty(int(nodes.max()) + 1, np.int64), {}
+            number[nodes] = np.arange(len(nodes))
+            for group in model.getPhysicalGroups(2):
+                faces = model.getEntitiesForPhysicalGroup(*group)
+                quads = [mesh.getElementsByType(_QUADRANGLE, face)[1] for face in faces]
+                patches[model.getPhysicalName(*group)] = number[np.concatenate(quads)].reshape(
+                    -1, 4
+                )
+            return points.reshape(-1, 3), number[cells].reshape(-1, 8), patches
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
             where = str(directory / "pile.geo")

@@ -180,11 +180,9 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     It alone must survive a crash: what it names is compared with it. The times are `solver_s`,
     `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
-    results, derived = (
-        {name: files.digest_file(directory / name) for name in _matching(directory, patterns)}
-        for patterns in (case.results, case.derived)
-    )
-    bulky = _matching(directory, case.bulky)
+    patterns = case.results, case.derived, case.bulky
+    *made, bulky = (_matching(directory, each) for each in patterns)
+    results, derived = ({n: files.digest_file(directory / n) for n in names} for names in made)
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     (directory / CHECKSUMS).write_text(sums)
     stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
@@ -277,9 +275,9 @@ def _stamp(path: Path) -> tuple[int, int]:
 def _matching(directory: Path, patterns: Iterable[str]) -> list[str]:
     """Names of the files in a directory that fit a pattern; no link is followed."""
     walked = (os.path.join(path, name) for path, _, names in os.walk(directory) for name in names)
-    fit = sorted(path for path in walked if _fits(os.path.relpath(path, directory), patterns))
-    paths = (path for path in fit if os.path.isfile(path) and not os.path.islink(path))
-    return [os.path.relpath(path, directory) for path in paths]
+    paths = (path for path in walked if os.path.isfile(path) and not os.path.islink(path))
+    names = sorted(os.path.relpath(path, directory) for path in paths)
+    return [name for name in names if _fits(name, patterns)]
 
 
 def _fits(name: str, patterns: Iterable[str]) -> bool:

@@ -93,8 +93,8 @@ class Part(BaseModel):
     @model_validator(mode="after")
     def _without_minus_zero(self) -> Self:
         """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
-        zeros = {k: 0.0 for k, value in self.__dict__.items() if type(value) is float and not value}
-        self.__dict__.update(zeros)
+        fields = self.__dict__
+        fields |= {n: 0.0 for n, value in fields.items() if type(value) is float and not value}
         return self
 
 

@@ -42,12 +42,6 @@ a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
 CLOSED = ("pivot", "local")  # methods without contacts: nothing that moves changes the bed
-OF_SHAPES = {
-    name: shapes
-    for name in PileBed.model_fields
-    if (shapes := [each for each, facts in SHAPES.items() if name in facts.fields])
-}
-"""Fields of beds that not all shapes have, and the shapes that have them."""
 OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
@@ -147,9 +141,10 @@ class Scene(parts.Part):
             yield not gentle, "bed.slope_deg", f"{slope:g} deg", f"choose {low:g} to {high:g}"
             yield slope and not rises, "bed.slope_deg", f"the shape {shape} does not rise", OUT
             yield bed.smoothing, "bed.smoothing", "it is of a profile", OUT
-            for name, shapes in OF_SHAPES.items():
-                default = PileBed.model_fields[name].default
-                foreign = shape not in shapes and getattr(bed, name) != default
+            for name in sorted({field for facts in SHAPES.values() for field in facts.fields}):
+                foreign = name not in bed.form.fields
+                foreign &= getattr(bed, name) != PileBed.model_fields[name].default
+                shapes = [each for each, facts in SHAPES.items() if name in facts.fields]
                 yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
             return
         cell = self.first_cell_height
