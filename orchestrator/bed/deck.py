@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from orchestrator.errors import SolverError
 from orchestrator.study.parts import Grain, Gusts, Protocol, extremes
@@ -259,17 +261,26 @@ def write_grains(
     (directory / "grains.data").write_text(f"{head}{box}\nAtoms\n\n{rows}")
 
 
-def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
-    """Read a CSV of the deck or of `collect`; a SolverError if it is not whole or has less rows."""
+def read_columns(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
+    """The texts in each column of a CSV of the deck or of `collect`, which quotes none.
+
+    A SolverError if it is not whole or has less rows.
+    """
     try:
-        text = path.read_text(encoding="ascii")
-        table = pd.read_csv(StringIO(text))
-        if len(table) < rows or not text.endswith("\n"):
+        head, *lines = path.read_text(encoding="ascii").split("\n")
+        if len(lines) <= rows or lines.pop():
             raise ValueError("it is cut short")
+        columns = np.array([line.split(",") for line in lines]).T
+        return dict(zip(head.split(","), columns, strict=True))
     except (OSError, ValueError) as error:
         what, remedy = f"the table cannot be read: {error}", "run the same command again"
         raise SolverError(what, where=str(path), remedy=remedy) from None
-    return table
+
+
+def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
+    """The numbers of such a CSV, to the last digit; NaN where one is missing."""
+    columns = read_columns(path, rows).items()
+    return pd.DataFrame({n: np.where(c == "", "nan", c).astype(float) for n, c in columns})
 
 
 def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFrame]:

@@ -5,7 +5,7 @@ resting in the pockets of the one below, ``d sin(beta)`` lower. Lengths here are
 the scene, with the foot of the first form at the origin; each grain has a size of its own.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,13 +197,14 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     row_height, faces = np.sin(beta), (line.top - 1, line.top)
     most = int(np.ceil(line.crest[1] / line.tangents[faces[0], 0] / row_height)) + 1
     mobile_layers = min(lattice.mobile_layers, most)
-    points = _filling(line, replace(lattice, mobile_layers=mobile_layers), surface)
     # under a slope's level rows a grain rests on one that lies deeper below the face
     layers = mobile_layers + (lattice.pattern == "horizontal")
+    # below the layers that hold mobile grains one is enough: a grain touches no deeper one
+    thick = {faces[0]: (layers + 0.5) * row_height, faces[1]: LEE_DEPTH * row_height}
+    points = _filling(line, replace(lattice, mobile_layers=mobile_layers), surface, thick)
     deep = np.array([surface - line.over(points, face) for face in faces])
     depth, level = deep.min(axis=0), points[:, 1] - surface
-    # below the layers that hold mobile grains one is enough: a grain touches no deeper one
-    shell = (deep[0] < (layers + 0.5) * row_height) | (deep[1] < LEE_DEPTH * row_height)
+    shell = (deep[0] < thick[faces[0]]) | (deep[1] < thick[faces[1]])
     inside = (depth >= -(STRAY if lattice.uneven else TIE)) & shell
     below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
     kept = inside & ((level >= -TIE) | below)
@@ -220,8 +221,13 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     return lattice.packed(line, np.vstack([body[needed], apron]), kinds)
 
 
-def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
-    """Where grains of the pattern may lie in a pile of two faces, one of them on the crest."""
+def _filling(
+    line: BedLine, lattice: Lattice, surface: float, thick: Mapping[int, float]
+) -> FloatArray:
+    """Where grains of the pattern may lie in a pile of two faces, one of them on the crest.
+
+    Of all places those are made that are no deeper below a face than it is `thick`, and some more.
+    """
     beta, face = lattice.beta, line.tangents[line.top - 1]
     direction = np.array([1.0, 0.0]) if lattice.pattern == "horizontal" else face
     normal = np.array([-direction[1], direction[0]])
@@ -230,9 +236,13 @@ def _filling(line: BedLine, lattice: Lattice, surface: float) -> FloatArray:
     along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
     rows = np.arange(0, np.ceil(down.max()) + 3)
     columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)
-    row, column = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
-    offset = (2 * column + row % 2) * np.cos(beta)
-    points = apex + np.outer(offset, direction) - np.outer(row * np.sin(beta), normal)
+    offset = (2 * columns + rows[:, None] % 2) * np.cos(beta)
+    fall, near = np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape), offset < -np.inf
+    for face, most in thick.items():
+        out = line.normals[face]
+        over = offset * (direction @ out) - fall * (normal @ out)
+        near |= np.abs(over + (apex - line.corners[face]) @ out - surface) < most + 1
+    points = apex + np.outer(offset[near], direction) - np.outer(fall[near], normal)
     if not lattice.uneven:
         return np.asarray(points)
     uneven = max(lattice.mobile_layers, DISORDERED)

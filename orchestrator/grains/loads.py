@@ -38,8 +38,15 @@ MARGIN = 20.0
 DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
-_packed, _covered, _poured = cache(packing.pile), cache(packing.cover), cache(poured.read)
+_covered, _poured = cache(packing.cover), cache(poured.read)
 Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities (m/s)
+
+
+@cache
+def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
+    """A pile of two faces on a bed line: obstacles before it make the way along that longer."""
+    packed = packing.pile(ground, lattice)
+    return replace(packed, arc_length=line.nearest(packed.centres)[1])
 
 
 def forces(
@@ -206,9 +213,7 @@ class Geometry:
                 x = self.packed_line.x
                 ground = replace(ground, x=x, z=tuple(ground.height(np.array(x)).tolist()))
             return _covered(self.line, ground, self.counts, lattice)
-        packed = _packed(ground, lattice)
-        # an obstacle before it makes the way along the bed longer
-        return replace(packed, arc_length=self.line.nearest(packed.centres)[1])
+        return _packed(ground, lattice, self.line)
 
     @cached_property
     def tangents(self) -> FloatArray:

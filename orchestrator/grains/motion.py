@@ -6,13 +6,14 @@ same criterion to know when a load step may end, and its counts are compared wit
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_dump, read_table
+from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_columns, read_dump, read_table
 from orchestrator.bed.packing import across
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.types import BoolArray, FloatArray, IntArray
@@ -97,7 +98,7 @@ class Motion:
         parts = ("level", "fallen", "carried", "mode")
         return replace(self, **{name: getattr(self, name)[chosen] for name in parts})
 
-    @property
+    @cached_property
     def low(self) -> FloatArray:
         """For each level the highest flow that is known to be below it, shape (levels + 1,)."""
         # two load steps of one flow are before and after the bed has changed
@@ -113,12 +114,12 @@ class Motion:
         """N, how many grains are counted."""
         return len(self.level)
 
-    @property
+    @cached_property
     def fraction(self) -> FloatArray:
         """n/N at the end of each load step, shape (levels + 1,)."""
         return np.asarray(self.moved / self.count)
 
-    @property
+    @cached_property
     def moved(self) -> IntArray:
         """How many grains had moved by the end of each load step, shape (levels + 1,)."""
         return self._by_load_step(self.level)
@@ -128,7 +129,7 @@ class Motion:
         """How many had been the displacement criterion upstream by then, shape (levels + 1,)."""
         return self._by_load_step(self.fallen)
 
-    @property
+    @cached_property
     def carried_off(self) -> IntArray:
         """How many of those that had moved by then were carried off, shape (levels + 1,)."""
         return self._by_load_step(np.where(self.carried, self.level, 0))
@@ -162,13 +163,12 @@ class Motion:
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
         """Read what `to_csv` wrote."""
-        load_steps = read_table(directory / LOAD_STEPS)
-        grains = read_table(directory / MOTION)
+        grains = read_columns(directory / MOTION)
         return cls(
-            flow=load_steps["flow"].to_numpy(float),
-            level=grains["moved_in"].to_numpy(np.int64),
-            fallen=grains["fallen_in"].to_numpy(np.int64),
-            carried=grains["carried_off"].to_numpy(bool),
+            flow=read_columns(directory / LOAD_STEPS)["flow"].astype(float),
+            level=grains["moved_in"].astype(np.int64),
+            fallen=grains["fallen_in"].astype(np.int64),
+            carried=grains["carried_off"] == "1",
             mode=np.array([MODES.index(mode) for mode in grains["mode"]], np.int64),
         )
 

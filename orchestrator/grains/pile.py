@@ -610,12 +610,12 @@ class Pile(Geometry):
         ratio = self.method.last(cases).speed if changes else self.loads(cases).ratio
         return np.asarray(ratio[self.packing.windward])
 
-    def first(self, cases: Path) -> tuple[float, float]:
-        """Where motion starts, x in m, and at which undisturbed friction velocity, m/s.
+    def first(self, motion: Motion) -> tuple[float, float]:
+        """Where a motion starts, x in m, and at which undisturbed friction velocity, m/s.
 
         Grains that lie loose, and go in still fluid, say nothing of it.
         """
-        flows = of_grains(self.motion(cases)).value
+        flows = of_grains(motion).value
         flows = np.where(flows > 0, flows, np.nan)
         least = np.flatnonzero(flows == np.nanmin(flows, initial=np.inf))
         if not len(least):

@@ -4,8 +4,10 @@ Tables of results hold no time and no path of a machine: the same study gives th
 wherever and whenever it runs. The times of the runs are in `timings`.
 """
 
+import re
 from collections.abc import Container, Iterable, Mapping
 from fnmatch import fnmatchcase
+from functools import cache
 from io import BytesIO
 from pathlib import Path, PurePath
 from typing import Any
@@ -90,13 +92,43 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
     return pd.DataFrame(rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"])
 
 
-def csv(table: pd.DataFrame, digits: str | None = None) -> str:
-    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe."""
-    texts = table.select_dtypes(exclude=["number", "bool"])
-    # pandas writes \r without quotes, and a reader takes it for the end of the row
-    harmless = texts.replace({r"\r\n?": "\n"}, regex=True).replace({FORMULA: "'"}, regex=True)
-    columns = {str(name): harmless[name] for name in harmless}
-    return table.assign(**columns).to_csv(index=False, float_format=digits)
+def csv(table: pd.DataFrame, digits: str = "") -> str:
+    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe.
+
+    The text is that of pandas, which takes five times as long: it writes each value anew.
+    """
+    columns = [[_quoted(str(name)), *_written(table[name], digits)] for name in table]
+    # a line of one empty value would be no line
+    lines = [",".join(row) or '""' for row in zip(*columns, strict=True)]
+    return "\n".join([*lines, ""])
+
+
+def _written(column: "pd.Series[Any]", digits: str) -> list[str]:
+    """The values of a column as they are written: each number once, texts that do no harm."""
+    values = column.to_numpy()
+    if values.dtype.kind not in "biuf":
+        return [_text(value) for value in column.tolist()]
+    codes, bits = pd.factorize(values.view(f"i{values.itemsize}"))
+    each = bits.view(values.dtype).tolist()
+    form = digits.__mod__ if digits and values.dtype.kind == "f" else str
+    texts = np.array(["" if v != v else form(v) for v in each], object)
+    return list(texts[codes])
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return _harmless(value)
+    return "" if value is None or value != value else _quoted(str(value))
+
+
+@cache
+def _harmless(text: str) -> str:
+    # a reader takes \r without quotes for the end of the row
+    return _quoted(re.sub(FORMULA, "'", re.sub(r"\r\n?", "\n", text)))
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if re.search('[,"\r\n]', text) else text
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:

@@ -172,10 +172,11 @@ class Answer:
         self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
         self.row_hold = pile.loads(cases).row_hold()
-        self.first, self.checked = pile.first(cases), (np.nan, np.nan)
+        self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
         if decision.levels and decision.levels.grains is levels.LOCAL and not decision.is_as_asked:
             with suppress(InputError, UnfitError):  # where no grains can lie there is no check
-                self.checked = pile.around(self.first[0]).first(cases)
+                around = pile.around(self.first[0])
+                self.checked = around.first(around.motion(cases))
 
     def at(self, fraction: float, chosen: BoolArray | None = None) -> PileThreshold:
         """The threshold of the pile, or of some of its counted grains, at a fraction.
