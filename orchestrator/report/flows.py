@@ -70,16 +70,21 @@ def stress(results: Results) -> Iterator[Figure]:
     piles = [pile for least, *others in _kinds(results) for pile in (least, *others[-1:])]
     if not piles:
         return
+    names = tuple(pile.flow.name for pile in piles)
+    mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
+    lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
+    text = caption("stress", mean=mean, crest=crest, averaged=f"max(d, {', '.join(lengths)})")
+    draw, title = partial(_stress, results, piles), "Friction velocity over the pile"
+    yield Figure("wall-stress", title, text, names, draw, fold=True)
+
+
+def _stress(results: Results, piles: list[Pile]) -> Canvas:
     figure, axes = style.grid([_title(results, pile) for pile in piles], 2.6, "x/h", USTAR)
     for ax, pile in zip(axes, piles, strict=True):
         _along(results, pile, ax)
     axes[0].set_xlim(-4, max(pile.model.line.x[-2] / pile.bed.height for pile in piles) + 10)
     style.legends(figure, [], style.samples(axes))
-    names = tuple(pile.flow.name for pile in piles)
-    mean, crest = (f"{ratio:+.0%}" for ratio in eq10_over_wall(results, names))
-    lengths = {labels.value("averaging_length", p.scene.forces.averaging_length): 0 for p in piles}
-    text = caption("stress", mean=mean, crest=crest, averaged=f"max(d, {', '.join(lengths)})")
-    yield Figure("wall-stress", "Friction velocity over the pile", text, names, figure, fold=True)
+    return figure
 
 
 def _along(results: Results, pile: Pile, ax: Axes) -> None:

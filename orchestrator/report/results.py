@@ -22,7 +22,7 @@ RAMP_BELOW = 3.0
 """Waiting time, sqrt(d/g'), below which load steps are a ramp; 6 are needed near a threshold."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Results:
     """A study with its plan, its tables and the directory of its cases."""
 

@@ -6,7 +6,7 @@ of it a grain is on. Measurements judge each line over the Re* that a study has 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -226,6 +226,7 @@ def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
     return curves.AIR[name](np.geomspace(first, last, POINTS), air)
 
 
+@lru_cache(maxsize=1)
 def ranked(results: Results) -> list[Line]:
     """The lines of a study's single grains on a flat bed: the widest within measurements first.
 

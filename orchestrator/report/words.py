@@ -1,6 +1,7 @@
 """The answer of a study in sentences and tables, and all other words of its page."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
@@ -61,6 +62,7 @@ def text(results: Results, guests: Sequence[Guest] = ()) -> str:
     return "\n".join([*lines, *[""] * bool(warned), *warned])
 
 
+@lru_cache(maxsize=1)
 def answer(results: Results) -> Answer:
     """What a study asks: which of many laws is nearest to measurements, or at which flow what goes.
 
@@ -138,6 +140,7 @@ def _hills(results: Results) -> Iterator[str]:
         yield caption("hill", hill=hill, ends=ends, **facts)
 
 
+@lru_cache(maxsize=1)
 def doubts(results: Results) -> list[str]:
     """What a reader must know of the thresholds: which are usable, what their intervals lack."""
     piles = results.joined("pile_threshold")
