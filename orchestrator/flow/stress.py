@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from orchestrator.bed.deck import read_columns
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import KARMAN
 from orchestrator.types import FloatArray
@@ -111,8 +112,8 @@ class WallStress:
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
         """Read a table of `to_csv`, to the last digit."""
-        table = pd.read_csv(path, dtype=str).astype(float)
-        return cls(**{each.name: table[each.name].to_numpy() for each in fields(cls)})
+        columns = read_columns(path)
+        return cls(**{each.name: columns[each.name].astype(float) for each in fields(cls)})
 
 
 def diagnostics(

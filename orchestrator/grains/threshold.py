@@ -44,7 +44,9 @@ def mean_tau(motion: Motion, speed: FloatArray, fluid_density: float) -> FloatAr
     It is NaN before any had. Of `speed`, the local friction velocity over the undisturbed one of
     the N counted grains, only the size matters; the density is in kg/m3.
     """
-    mean = np.array([_mean(motion, speed**2, level) for level in range(len(motion.flow))])
+    moved, squares = motion.moved, np.bincount(motion.level, speed**2, len(motion.flow))
+    squares[0] = 0.0  # those that never move
+    mean = np.where(moved > 0, np.cumsum(squares) / np.maximum(moved, 1), np.nan)
     return np.asarray(fluid_density * motion.flow**2 * mean)
 
 

@@ -50,6 +50,7 @@ def _templates(folder: Path, autoescape: bool = True) -> Environment:
     return environment
 
 
+@cache
 def typeset(text: str) -> Markup:
     """HTML of a text: ``V_f`` has an index, ``why_not`` none; words in backticks are code."""
     index = r"\b([^\W\d_]|[^\W\d_a-z][^\W\d_]{1,2})_([A-Za-z]+)\b(?!_)"
