@@ -7,15 +7,18 @@ the scene, with the foot of the first form at the origin; each grain has a size 
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from orchestrator.bed.line import BedLine
 from orchestrator.study.parts import Packing as Pattern
 from orchestrator.study.parts import Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 TIE = 1e-6
 """Neighbours of a lattice lie exactly on the limits below; round-off must not decide, diameters."""
@@ -77,8 +80,7 @@ class Places:
 
         Also the vector from the first to the second, the shorter way across the sides, (k, 3).
         """
-        tree = cKDTree(self.xyz, boxsize=np.array([0.0, self.width, 0.0]))
-        pairs = tree.query_pairs(reach, output_type="ndarray")
+        pairs = _tree(self.xyz, self.width).query_pairs(reach, output_type="ndarray")
         first, second = np.vstack([pairs, pairs[:, ::-1]]).T
         apart = self.xyz[second] - self.xyz[first]
         apart[:, 1] = across(apart[:, 1], self.width)
@@ -89,6 +91,12 @@ class Places:
         first, second, apart = self.pairs((1 + touch) * float(sizes.max()))
         close = np.linalg.norm(apart, axis=1) < (1 + touch) * (sizes[first] + sizes[second]) / 2
         return first[close], second[close], apart[close]
+
+
+def _tree(points: FloatArray, width: float = 0.0) -> "cKDTree":
+    from scipy.spatial import cKDTree  # 0.4 s, for which a plan does not wait
+
+    return cKDTree(points, boxsize=np.array([0.0, width, 0.0])[: points.shape[1]])
 
 
 def across(distance: FloatArray, width: float) -> FloatArray:
@@ -441,7 +449,7 @@ def _depth(top: BedLine, points: FloatArray) -> tuple[IntArray, FloatArray]:
 def _without_overlaps(groups: list[FloatArray]) -> FloatArray:
     """Points of all groups but those too near to one before them."""
     points = np.vstack(groups)
-    near = cKDTree(points).query_pairs(1 - 2 * TIE, output_type="ndarray")
+    near = _tree(points).query_pairs(1 - 2 * TIE, output_type="ndarray")
     kept = np.ones(len(points), bool)
     for first, second in near[np.argsort(near.max(axis=1), kind="stable")].tolist():
         low, high = min(first, second), max(first, second)
@@ -496,7 +504,7 @@ def _rests(centres: FloatArray) -> BoolArray:
 
 def _touching(centres: FloatArray, chosen: BoolArray) -> BoolArray:
     """Which grains touch one of the chosen ones, or are one."""
-    return np.asarray(cKDTree(centres[chosen]).query(centres)[0] < 1 + TOUCH)
+    return np.asarray(_tree(centres[chosen]).query(centres)[0] < 1 + TOUCH)
 
 
 def within(x: FloatArray, counts: str | Range) -> BoolArray:

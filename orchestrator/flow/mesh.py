@@ -10,7 +10,6 @@ from math import ceil, expm1, inf, log, radians, tan
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
@@ -107,6 +106,8 @@ def ratio_of(cells: int, first: float, length: float) -> float:
 
     def beyond(ratio: float) -> float:
         return first * float(expm1(cells * log(ratio))) / (ratio - 1) - length
+
+    from scipy.optimize import brentq  # a third of a second, for which no page waits
 
     # the last cell alone would fill the length at the upper end
     return float(brentq(beyond, 1 + 1e-9, (length / first) ** (1 / (cells - 1)), xtol=1e-15))

@@ -29,7 +29,6 @@ from itertools import pairwise
 from math import ceil, log, pi, sqrt
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
@@ -189,6 +188,8 @@ def response(slopes: FloatArray, cell: float, coefficients: Coefficients) -> Flo
     """
     count = len(slopes)
     # level bed beside it, so that the transform's next period is far
+    from scipy.fft import irfft, next_fast_len, rfft
+
     size = next_fast_len(4 * count, real=True)
     beyond = np.arange(-1.0, count + 1)
     integral = beyond * (np.log(np.maximum(np.abs(beyond), 1)) - 1)

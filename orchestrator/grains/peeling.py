@@ -20,8 +20,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 
 from orchestrator.bed.packing import TOUCH, Places
 from orchestrator.types import BoolArray, FloatArray, IntArray
@@ -96,6 +94,8 @@ class ForceTable:
         forces = np.stack(list(each), axis=1) / weights[:, None, None]
         # a law without lift has none anywhere
         logs = np.log(np.where(forces > 0, forces, 1e-300))
+        from scipy.interpolate import CubicSpline
+
         pieces = CubicSpline(np.log(ustar), logs, axis=2).c.transpose(2, 1, 3, 0)
         given = zip(forces, np.ascontiguousarray(pieces), strict=True)
         return [cls(np.log(ustar), *values) for values in given]
@@ -123,6 +123,8 @@ class ForceTable:
         # round-off at the places themselves
         if excess(start) >= 0 or excess(end) <= 0:
             return math.exp(start if excess(start) >= 0 else end)
+        from scipy.optimize import brentq
+
         return math.exp(brentq(excess, start, end, xtol=1e-15))
 
 

@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline
 
 from orchestrator.bed.packing import Packing
 from orchestrator.physics.threshold import root
@@ -65,6 +64,8 @@ class Shelter:
     @cached_property
     def _pieces(self) -> FloatArray:
         """Coefficients of the splines of ln u*, shape (4, places - 1, patches)."""
+        from scipy.interpolate import CubicSpline
+
         return np.asarray(CubicSpline(np.log(self.ustar), self.levels).c)
 
     def level(self, ustar: ArrayLike, patch: ArrayLike) -> FloatArray:

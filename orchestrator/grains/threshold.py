@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtr
 
 from orchestrator.grains.motion import Motion
 from orchestrator.types import BoolArray, FloatArray
@@ -74,6 +73,8 @@ def sampled(fraction: float, count: int) -> tuple[float, float]:
 
     Of 5 grains none to four, where 0.3 of all have moved.
     """
+    from scipy.special import bdtr
+
     below = bdtr(np.arange(count + 1), count, fraction)
     low, high = np.searchsorted(below, [OUTSIDE, 1 - OUTSIDE])
     return float(low / count), float((high + 1) / count)

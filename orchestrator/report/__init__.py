@@ -30,7 +30,7 @@ def write(
     """
     from matplotlib import artist
 
-    artist.kwdoc = lambda _: ""  # matplotlib's classes make no help texts, which take 0.3 s
+    artist.kwdoc = lambda artist: ""  # texts of help, which take 0.3 s
     from orchestrator.report import along, bed, flows, page, piles, shields, style, words
 
     figures: list[style.Figure] = []
