@@ -51,25 +51,21 @@ MEANING = {
 GONE, FIXED, MOBILE, COUNTED, PUSHED = 0, 1, 2, 3, 4
 """Grain types of the deck: fixed; mobile; mobile and exposed: counted, or pushed only. Those that
 have gone are in no deck."""
-SAMPLING_INTERVAL = 0.5
-"""Time between two samples of the grains, sqrt(d/g')."""
+SAMPLING_INTERVAL = 0.5  # time between two samples of the grains, sqrt(d/g')
 REST_ENERGY = 1e-6
 """Kinetic energy of all mobile grains that have not passed the displacement criterion, W d, below
 which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie in the same load step
 as with the waiting time alone, 23 in one beside it, 15 further off: most on level and disordered
 rows, where round-off decides. Of 1079 single grains none moves in another load step."""
-SETTLE = 10.0
-"""Time in which the bed settles before the first load step, sqrt(d/g')."""
+SETTLE = 10.0  # time in which the bed settles before the first load step, sqrt(d/g')
 POURED_DRAG = 2.0
 """Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be softer than
 those of the pouring, and without a drag a pile of 25 degrees was not at rest at the end."""
 SETTLE_FLOW = math.sqrt(0.5)
 """Flow of the settling over that of the first load step: about half of its force. Without any, a
 bed at its limiting slope would not come to rest."""
-STEADY = np.ones(1)
-"""The gusts of a deck without any."""
-START = 0.9
-"""Flow of the first load step over that of the first threshold by the pivot law."""
+STEADY = np.ones(1)  # the gusts of a deck without any
+START = 0.9  # flow of the first load step over that of the first threshold by the pivot law
 BEYOND = 1.2
 """The last load step's flow over that at which the pivot law says that enough grains have moved."""
 STIR = 0.02

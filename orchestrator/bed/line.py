@@ -18,14 +18,10 @@ UPSTREAM, DOWNSTREAM = 10.0, 20.0
 """Flat bed before and behind the forms, in heights of them."""
 SIDE_DEG = 75.0
 """Slope of an obstacle's sides: the grid lines of the mesh are vertical, and so no side is."""
-FENCE = 0.1
-"""Thickness of a fence at its top, of its height."""
-CHORDS = 16
-"""Chords of a half-cylinder."""
-LEVEL_DEG = 1e-6
-"""Slope from which on a segment rises."""
-PLACES = 10**6
-"""Most pairs of a point and a segment that are compared at a time."""
+FENCE = 0.1  # thickness of a fence at its top, of its height
+CHORDS = 16  # chords of a half-cylinder
+LEVEL_DEG = 1e-6  # slope from which on a segment rises
+PLACES = 10**6  # most pairs of a point and a segment that are compared at a time
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ the scene, with the foot of the first form at the origin; each grain has a size 
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,45 +17,28 @@ from orchestrator.study.parts import Packing as Pattern
 from orchestrator.study.parts import Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
 TIE = 1e-6
 """Neighbours of a lattice lie exactly on the limits below; round-off must not decide, diameters."""
-TOUCH = 1e-3
-"""Two grains closer than this touch, of the mean of their diameters."""
-APRON = 10.0
-"""Length of the fixed flat bed beyond each toe, diameters."""
-STRAY = 0.1
-"""Rows of a disordered bed are straight within this, diameters."""
+TOUCH = 1e-3  # two grains closer than this touch, of the mean of their diameters
+APRON = 10.0  # length of the fixed flat bed beyond each toe, diameters
+STRAY = 0.1  # rows of a disordered bed are straight within this, diameters
 DISORDERED = 4
 """Least disordered rows: the packing is the same for any number of mobile layers up to it."""
 PERTURBATION = 1e-9
 """How far a replica's grains lie aside, diameters: it decides which grain of a chain goes first."""
-LEE_DEPTH = 1.5
-"""Thickness of the fixed lee side, layers: no grain falls through it."""
-SHARP_DEG = 8.0
-"""Bend from which on rows do not follow the bed round a corner."""
+LEE_DEPTH = 1.5  # thickness of the fixed lee side, layers: no grain falls through it
+SHARP_DEG = 8.0  # bend from which on rows do not follow the bed round a corner
 SLIT = 0.15
 """Between neighbours of a row that goes round a bend a gap is at most this wide, diameters."""
-BARE = 1.0
-"""Grains this near to an obstacle are fixed under its foot, diameters."""
-LOWER = 0.1
-"""A neighbour bears a grain that stands so much over it, diameters."""
-UNDER = 2
-"""Rows of fixed grains where none is counted: none falls through them."""
-HIDES = 4.0
-"""Farthest distance at which a grain hides another one of a lattice, diameters."""
-OFFSET = 0.125
-"""Largest offset of a grain normal to its row, over the size of the disorder."""
-FINE = 0.1
-"""Between two places of a curve at which a row may be opened, diameters."""
-TURNS = 100
-"""How often a row is opened further; grains that overlap then are left out by `cover`."""
-PLACES = 2000
-"""Places along a bed without grains, as many as a figure shows."""
-ROOM = 1 + 1e-9
-"""Neighbours of a disordered row are at least this far apart, diameters."""
+BARE = 1.0  # grains this near to an obstacle are fixed under its foot, diameters
+LOWER = 0.1  # a neighbour bears a grain that stands so much over it, diameters
+UNDER = 2  # rows of fixed grains where none is counted: none falls through them
+HIDES = 4.0  # farthest distance at which a grain hides another one of a lattice, diameters
+OFFSET = 0.125  # largest offset of a grain normal to its row, over the size of the disorder
+FINE = 0.1  # between two places of a curve at which a row may be opened, diameters
+TURNS = 100  # how often a row is opened further; grains that overlap then are left out by `cover`
+PLACES = 2000  # places along a bed without grains, as many as a figure shows
+ROOM = 1 + 1e-9  # neighbours of a disordered row are at least this far apart, diameters
 
 
 @dataclass(frozen=True)
@@ -93,7 +76,7 @@ class Places:
         return first[close], second[close], apart[close]
 
 
-def _tree(points: FloatArray, width: float = 0.0) -> "cKDTree":
+def _tree(points: FloatArray, width: float = 0.0) -> Any:
     from scipy.spatial import cKDTree  # 0.4 s, for which a plan does not wait
 
     return cKDTree(points, boxsize=np.array([0.0, width, 0.0])[: points.shape[1]])

@@ -21,16 +21,14 @@ from orchestrator.solvers import liggghts
 from orchestrator.study.parts import LogNormal, Range, Sizes
 from orchestrator.types import BoolArray, FloatArray
 
-HEAP = 2.0
-"""Height of the grains over the line that are cut away, d."""
+HEAP = 2.0  # height of the grains over the line that are cut away, d
 FILLED, FILLED_IN_SPACE = 0.83, 0.6
 """Part of the area, and of the volume of a strip, that settled grains fill; it only decides how
 many are poured."""
 LOOSE = 0.3
 """Room of a grain in the air, beside it and over it, in its own diameters: as little as leaves no
 order among equal grains, so that they fall no further than need be."""
-COLUMNS = 20
-"""Columns in a diameter by which free room is looked for."""
+COLUMNS = 20  # columns in a diameter by which free room is looked for
 DIAMETER, DENSITY, GRAVITY = 1e-3, 2500.0, 9.81
 """The reference grain of the deck, SI: in units of d, W and sqrt(d/g) a bed has no scale."""
 WEIGHT = DENSITY * np.pi / 6 * DIAMETER**3 * GRAVITY
@@ -42,19 +40,14 @@ W d, at which it ends. The grains fall on soft springs. Then a drag takes the en
 run up and down the bed, which contacts alone take off slowly. When the bed is cut, a small drag is
 enough and lets grains roll into their pockets. The last energy is 1e-2 W^2/K, which is rest to
 other decks too: in a long bed there is always a grain that still rolls somewhere."""
-LONGEST = 400
-"""Time that the grains have in a stage, sqrt(d/g')."""
+LONGEST = 400  # time that the grains have in a stage, sqrt(d/g')
 SETTLING, DUMP, BED = "settling.csv", "poured.dump", "bed.csv"
-LEAST_LENGTH = 3.0
-"""Least length of the forms of a poured bed, d."""
+LEAST_LENGTH = 3.0  # least length of the forms of a poured bed, d
 MOST_GRAINS = 100_000
 """Most grains of a poured bed: some hundred megabytes, and half an hour of one core."""
-LAYER = np.sin(np.pi / 3)
-"""Thickness of a layer, d: as of a lattice."""
-NEAR = 0.5
-"""Fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d."""
-LOCAL = 5.0
-"""Length of bed before and behind a grain that its height is compared with, d."""
+LAYER = np.sin(np.pi / 3)  # thickness of a layer, d: as of a lattice
+NEAR = 0.5  # fixed grains whose surfaces are nearer than this to a mobile one's are in the case, d
+LOCAL = 5.0  # length of bed before and behind a grain that its height is compared with, d
 
 
 def drawn(

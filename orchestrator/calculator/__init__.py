@@ -43,8 +43,7 @@ PARAMETERS = {
     "depth": Parameter("depth", "depth_m", "depth, m", (0, 0), None, "of a liquid: its mean speed"),
 }
 """By keyword, which is also the name in JSON. The paper's values are the defaults."""
-GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")
-"""Parameters whose ranges are spaced geometrically."""
+GEOMETRIC = ("diameter", "viscosity", "roughness", "depth")  # their ranges are geometric
 QUANTITIES = {
     "ustar_m_s": ("friction_velocity", "u*, m/s"),
     "wind_1m_m_s": ("wind_speed_1_m", "wind at 1 m, m/s"),

@@ -17,8 +17,7 @@ from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, wh
 from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.types import Row
 
-Table = dict[str, NDArray[Any]]
-"""Columns of equal length by name."""
+Table = dict[str, NDArray[Any]]  # columns of equal length by name
 
 
 def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:

@@ -26,10 +26,8 @@ from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-TOE = 0.05
-"""Part of the windward face, from its foot, that `forces.loaded_grains` may leave out."""
-KINDS = 20
-"""Kinds of grains in a bed beyond which their tables of forces have fewer places."""
+TOE = 0.05  # part of the windward face, from its foot, that `forces.loaded_grains` may leave out
+KINDS = 20  # kinds of grains in a bed beyond which their tables of forces have fewer places
 LONG = 5000.0
 """Length of a bed, d, beyond which a range that is counted is packed alone, and of which no grain
 is packed where no method is asked for."""

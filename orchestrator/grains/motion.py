@@ -23,15 +23,12 @@ LOAD_STEPS, MOTION = "load_steps.csv", "motion.csv"
 PASSAGE, BED = "passage.dump", "bed.dump"
 PASSAGE_COLUMNS = ("id", "x", "z", "vx", "vz", "omegay", "y")
 BED_COLUMNS = ("id", "type", "x", "z", "vx", "vz", "omegay")
-MODES = ("none", "rolled", "slid", "lifted")
-"""How a grain moved."""
+MODES = ("none", "rolled", "slid", "lifted")  # how a grain moved
 LIFTED = 0.3
 """A grain has lifted when it rises by this over its bed, d: to roll over a neighbour takes 0.13 at
 an entrainment angle of 60 degrees."""
-ROLLED = 0.5
-"""A grain rolls when its spin makes at least this part of its speed, else it slides."""
-WINDOW = 5
-"""Samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')."""
+ROLLED = 0.5  # a grain rolls when its spin makes at least this part of its speed, else it slides
+WINDOW = 5  # samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')
 NOISE = 0.01
 """Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its weight stores
 in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time step gave other
@@ -39,8 +36,7 @@ thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
 DECAY = 0.5
 """The energy still falls when the last quarter of the settling has less than this part of the
 second quarter's, and grows when it has more than 1/DECAY of it."""
-BURST = 10.0
-"""Kinetic energy per grain, over W d, that no fall of a grain can give it."""
+BURST = 10.0  # kinetic energy per grain, over W d, that no fall of a grain can give it
 REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 
 

@@ -40,24 +40,19 @@ grain in flight is gone, diameters."""
 EARLY = 0.01
 """Part of the grains of a poured bed that may go before the first load step: a few of many hundred
 hardly lie, and load steps from their flow on would take most of the time."""
-REST = 7.0
-"""Mean time until the grains of a lattice are at rest in a load step, sqrt(d/g')."""
+REST = 7.0  # mean time until the grains of a lattice are at rest in a load step, sqrt(d/g')
 IN_SPACE = 5.0
 """Cost of a grain in space over that of one in a plane: of contacts, and of fixed grains around."""
 GRAINS = "grains.csv"
 """The grains when a bed line was drawn, in the case of the flow over it; at the end of a run of
 LIGGGHTS, in its case."""
-EDGE = 2.0
-"""Length over which the edge of a bared part is rounded, d."""
-SPACING = 0.25
-"""Spacing of the places at which the height of the grains is taken, d."""
+EDGE = 2.0  # length over which the edge of a bared part is rounded, d
+SPACING = 0.25  # spacing of the places at which the height of the grains is taken, d
 NEAREST = 0.25
 """Least distance along x of a new corner from those of the bed line, d: corners that nearly
 coincide make cells that are far too short."""
-AROUND = 1000.0
-"""Length of bed that is packed around the place where motion starts, d."""
-LEVEL = 1e-6
-"""A bed that is less above the flat bed lies on it, d."""
+AROUND = 1000.0  # length of bed that is packed around the place where motion starts, d
+LEVEL = 1e-6  # a bed that is less above the flat bed lies on it, d
 FAR = 1e9
 
 

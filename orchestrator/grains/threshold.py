@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from orchestrator.grains.motion import Motion
 from orchestrator.types import BoolArray, FloatArray
 
-OUTSIDE = 0.1
-"""Part of samples beyond each end of the interval of a size class."""
-STEP = np.sqrt(2)
-"""Ratio of the ends of a class: half a phi; d lies in the middle of one."""
+OUTSIDE = 0.1  # part of samples beyond each end of the interval of a size class
+STEP = np.sqrt(2)  # ratio of the ends of a class: half a phi; d lies in the middle of one
 
 
 @dataclass(frozen=True)

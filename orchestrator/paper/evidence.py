@@ -14,17 +14,14 @@ from orchestrator.types import BoolArray, FloatArray
 
 Verdict = Literal["reproduced", "partly", "not", "no data"]
 
-SHARE = 0.95
-"""Share of comparisons from which a statement counts as true; from one less it, as false."""
+SHARE = 0.95  # part of comparisons from which a statement counts as true; from one less it, false
 RULE = (
     f"reproduced: so in at least {SHARE:.0%} of the comparisons of each judged line; not: in at "
     f"most {1 - SHARE:.0%} of each; else partly; no data: if a judged line has none"
 )
-WAITING_TIME = 5.0
-"""Least waiting time of a held flow, sqrt(d/g'); load steps that wait less make a ramp."""
+WAITING_TIME = 5.0  # least of a held flow, sqrt(d/g'); load steps that wait less make a ramp
 REGIMES = {"low": "low regime", "high": "high regime"}
-BRIDGED = "bridged"
-"""The force law of this program that has an answer where neither of the paper's has."""
+BRIDGED = "bridged"  # the force law that has an answer where neither of the paper's has one
 ANSWERS = ("pile_threshold", "wall_stress")
 """Tables that any threshold method fills; of all others the rows by DEM are taken."""
 BESIDE = ("fraction", "flow_level", "grain_level")

@@ -159,8 +159,8 @@ def order(evidence: Evidence) -> Comparisons:
         ("horizontal", "level rows"),
     ):
         downward, ranks = [], []
-        columns = ["scene_id", "s_m", "moved_in_load_step"]
-        for _, grains in parts(evidence.piles("pile_grain", packing)[columns], "scene_id"):
+        every = evidence.piles("pile_grain", packing)[["scene_id", "s_m", "moved_in_load_step"]]
+        for _, grains in parts(every, "scene_id"):
             step = grains.sort_values("s_m")["moved_in_load_step"].to_numpy(int)
             if (step > 0).any():
                 late = np.where(step > 0, step, step.max() + 1)
@@ -201,8 +201,8 @@ def above_single(evidence: Evidence) -> Comparisons:
 
 def wiggles(evidence: Evidence) -> Comparisons:
     """Roughness of the curves of the fraction, by DEM and by pivots."""
-    columns = ["scene_id", "s_m", "ustar_over_ustar0"]
-    grains = dict(parts(evidence.piles("pile_grain")[columns], "scene_id"))
+    every = evidence.piles("pile_grain")[["scene_id", "s_m", "ustar_over_ustar0"]]
+    grains = dict(parts(every, "scene_id"))
     rows = []
     for curve in evidence.curves:
         scene = curve.iloc[0]

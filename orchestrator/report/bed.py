@@ -25,14 +25,10 @@ from orchestrator.report.style import Figure
 from orchestrator.study import fields
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
-LONG = 100.0
-"""Length of a face, d, beyond which its upper end is shown alone: grains must be seen."""
-WHOLE = 4.0
-"""Length of a whole bed over `LONG` up to which all forms are shown."""
-STOPS = 300
-"""Largest number of stops of the slider of a bed without dynamics."""
-SHIFT = 0.02
-"""Grains that have moved by less since they were last drawn stay, d."""
+LONG = 100.0  # length of a face, d, beyond which its upper end is shown alone: grains must be seen
+WHOLE = 4.0  # length of a whole bed over `LONG` up to which all forms are shown
+STOPS = 300  # largest number of stops of the slider of a bed without dynamics
+SHIFT = 0.02  # grains that have moved by less since they were last drawn stay, d
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,9 @@ from orchestrator.report.page import caption
 from orchestrator.report.results import Results, case_names, drawable, split
 from orchestrator.report.style import Figure, Look
 
-SHOWN_UP_TO = 0.9
-"""n/N up to which the axis of the stress holds every curve."""
-MARKERS = 30
-"""Largest number of markers of a curve: peeling gives one for each grain."""
-LONGEST = 45.0
-"""Longest part of a poured bed that is drawn, d: of a longer one its middle."""
+SHOWN_UP_TO = 0.9  # n/N up to which the axis of the stress holds every curve
+MARKERS = 30  # largest number of markers of a curve: peeling gives one for each grain
+LONGEST = 45.0  # longest part of a poured bed that is drawn, d: of a longer one its middle
 LYING, FIXED, EDGE = "#e6decc", "#8c8c8c", "#595959"
 HIDING = (
     ("Wilcock and Crowe", lambda size: measured.wilcock_crowe_hiding(size) / size, "-"),

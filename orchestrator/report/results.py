@@ -16,8 +16,7 @@ from orchestrator.study.study import Study
 from orchestrator.tables import Tables
 from orchestrator.tables.rows import measured_hill
 
-FRACTION = 0.3
-"""n/N at which one threshold stands for all of its pile."""
+FRACTION = 0.3  # n/N at which one threshold stands for all of its pile
 RAMP_BELOW = 3.0
 """Waiting time, sqrt(d/g'), below which load steps are a ramp; 6 are needed near a threshold."""
 

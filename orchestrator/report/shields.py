@@ -24,24 +24,18 @@ from orchestrator.study import fields
 SHAPES = "os^DvP<X>p8hd*"
 SHAPE, LABEL = "marker", "label"
 """The columns that hold a row's marker and its meaning."""
-REYNOLDS = np.geomspace(1e-4, 1e6, 601)
-"""Re* at which lines are drawn; axes cut them."""
+REYNOLDS = np.geomspace(1e-4, 1e6, 601)  # Re* at which lines are drawn; axes cut them
 AIR_STYLES = dict(zip(curves.AIR, ("-.", "--", (0, (1, 1))), strict=True))
 SLOPED = "Shao & Lu 2000"
 """The curve for air that is drawn for sloping beds: three for each slope would hide the rest."""
-RESULT = ("closed form", "points", "points, not usable")
-"""Marks of artists."""
+RESULT = ("closed form", "points", "points, not usable")  # marks of artists
 NAME = "shields"
-TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")
-"""Columns that a point tells of its scene."""
-FEW = 8
-"""Piles of which every fraction is drawn in the one diagram."""
-LINES = 3
-"""Laws beyond which only those near the measurements are drawn."""
+TOLD = ("alpha_deg", "d_m", "z0_over_d", "force_law")  # columns that a point tells of its scene
+FEW = 8  # piles of which every fraction is drawn in the one diagram
+LINES = 3  # laws beyond which only those near the measurements are drawn
 SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 """Columns that figures, panels, axes, colours and markers tell apart."""
-SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
-"""Columns in which piles agree that a line joins."""
+SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)  # columns in which piles agree that a line joins
 GAP = np.full((1, 2), np.nan)
 AXES = labels.RE_AXIS, labels.TAU_AXIS
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")

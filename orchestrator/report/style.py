@@ -42,12 +42,10 @@ RC: dict[Any, Any] = {
     "figure.dpi": 200,
 }
 """Settings that differ from matplotlib's defaults."""
-WIDTH = 7.0
-"""Width of a figure across two columns of a paper, inches."""
+WIDTH = 7.0  # width of a figure across two columns of a paper, inches
 SIDES, UNDER, LINE = (0.66, 0.12), 0.42, 0.165
 """Margins of panels: left and right, numbers and label of x, a line of a title or legend, inches"""
-PANELS = 6
-"""Largest number of panels of a figure."""
+PANELS = 6  # largest number of panels of a figure
 SHADES = {
     **dict.fromkeys(("beta_deg", "nu_m2_s"), ("viridis", 0.0, 0.85)),
     "alpha_deg": ("plasma", 0.0, 0.82),

@@ -38,10 +38,8 @@ DASHES: tuple[Dash, ...] = (
     *((0, (6, 1, 1, 1, 1, 1)), (0, (9, 1.5)), (0, (4, 1, 4, 1, 1, 1))),
 )
 """Dashes where colours mean something else. Dotted is where a law does not hold."""
-MANY = 3
-"""Laws that dashes tell apart; more have colours of their own."""
-SWEEP_M = (5e-5, 1e-3)
-"""Diameters (m) of the curves for air; a study with others widens the range."""
+MANY = 3  # laws that dashes tell apart; more have colours of their own
+SWEEP_M = (5e-5, 1e-3)  # diameters (m) of the curves for air; a study with others widens the range
 POINTS = 240
 GRAIN = [
     *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
@@ -50,19 +48,15 @@ GRAIN = [
 """Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
 """Columns of all that a line depends on beside its law, in the order of `Bed`."""
-BAGNOLD_FROM = 3.5
-"""Bagnold's A is 0.1 above this Re* only; it rises below."""
-GAS_RATIO = 100.0
-"""Least rho_sol/rho_f of a fluid that curves for air may be compared with."""
+BAGNOLD_FROM = 3.5  # Bagnold's A is 0.1 above this Re* only; it rises below
+GAS_RATIO = 100.0  # least rho_sol/rho_f of a fluid that curves for air may be compared with
 
 BINS = BUFFINGTON_MONTGOMERY
 MIDDLES = np.array([item.middle for item in BINS])
 MEDIANS = np.array([item.median for item in BINS])
-FACTORS_FROM = 0.3
-"""Re* from which factors are taken: below it are a dozen measurements."""
+FACTORS_FROM = 0.3  # Re* from which factors are taken: below it are a dozen measurements
 EDGES = np.geomspace(BINS[0].low, BINS[-1].high, 2001)
-GRID = np.sqrt(EDGES[1:] * EDGES[:-1])
-"""Re* at which lines are compared with the measured ranges."""
+GRID = np.sqrt(EDGES[1:] * EDGES[:-1])  # Re* at which lines are compared with the measured ranges
 _AT = np.searchsorted([item.high for item in BINS], GRID, side="right")
 TENTHS = np.array([item.tenth for item in BINS])[_AT]
 NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]

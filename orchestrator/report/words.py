@@ -28,10 +28,8 @@ SPEEDS = {
     "mean_velocity_m_s": "mean velocity",
 }
 """Speeds of a flow that are measured in the field, by their columns."""
-MIXED = 2.0
-"""Least ratio of sizes that are told apart."""
-FEW = 12
-"""Piles, or values of a parameter, that are listed each; of more the range is told."""
+MIXED = 2.0  # least ratio of sizes that are told apart
+FEW = 12  # piles, or values of a parameter, that are listed each; of more the range is told
 EACH, RANGES = ("alpha_deg", "d_m", "force_law"), ("alpha_deg", "force_law")
 """Columns that each row of a table tells, of single piles and of ranges."""
 

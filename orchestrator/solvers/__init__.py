@@ -11,8 +11,7 @@ from pathlib import Path
 from orchestrator.errors import SolverError
 from orchestrator.runs.process import run
 
-QUERY_S, QUERY_BYTES = 30.0, 1_000_000
-"""Limits of a program that is asked for its version."""
+QUERY_S, QUERY_BYTES = 30.0, 1_000_000  # limits of a program that is asked for its version
 
 
 def find(name: str, remedy: str) -> str:

@@ -19,8 +19,7 @@ ENVIRONMENT = {
 of a machine that resolves nowhere; without the last it looks for fast networks for 0.2 s. Without
 the second all such processes of a user share a directory, which one may remove while another
 starts: of 2000 short runs, four at a time, 16 failed."""
-MANY = 10_000
-"""Grains from which on two processes share them: 29,000 of them are poured in half the time."""
+MANY = 10_000  # grains from which on two processes share them: 29,000 are poured in half the time
 LAST_WORDS = "the protocol has ended"
 
 

@@ -93,42 +93,29 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
 
 
 def csv(table: pd.DataFrame, digits: str = "") -> str:
-    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe.
-
-    The text is that of pandas, which takes five times as long: it writes each value anew.
-    """
-    columns = [[_quoted(str(name)), *_written(table[name], digits)] for name in table]
+    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe."""
+    # pandas takes five times as long: it writes equal numbers anew
+    columns = [[_harmless(str(name)), *_written(table[name], digits)] for name in table]
     # a line of one empty value would be no line
     lines = [",".join(row) or '""' for row in zip(*columns, strict=True)]
     return "\n".join([*lines, ""])
 
 
-def _written(column: "pd.Series[Any]", digits: str) -> list[str]:
-    """The values of a column as they are written: each number once, texts that do no harm."""
+def _written(column: "pd.Series[Any]", digits: str) -> Iterable[str]:
     values = column.to_numpy()
     if values.dtype.kind not in "biuf":
-        return [_text(value) for value in column.tolist()]
+        return ["" if v is None or v != v else _harmless(str(v)) for v in column.tolist()]
     codes, bits = pd.factorize(values.view(f"i{values.itemsize}"))
-    each = bits.view(values.dtype).tolist()
     form = digits.__mod__ if digits and values.dtype.kind == "f" else str
-    texts = np.array(["" if v != v else form(v) for v in each], object)
-    return list(texts[codes])
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, str):
-        return _harmless(value)
-    return "" if value is None or value != value else _quoted(str(value))
+    each = ["" if v != v else form(v) for v in bits.view(values.dtype).tolist()]
+    return np.array(each, object)[codes]
 
 
 @cache
 def _harmless(text: str) -> str:
     # a reader takes \r without quotes for the end of the row
-    return _quoted(re.sub(FORMULA, "'", re.sub(r"\r\n?", "\n", text)))
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if re.search('[,"\r\n]', text) else text
+    text = re.sub(FORMULA, "'", re.sub(r"\r\n?", "\n", text))
+    return '"' + text.replace('"', '""') + '"' if re.search('[,"\n]', text) else text
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
@@ -143,8 +130,7 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
 def read(folder: Folder, place: str) -> Tables:
     """Read the tables that `write` wrote; an OrchestratorError if none, or if one has changed."""
     files = [name for name in folder.written() if fnmatchcase(name, f"{place}/*.csv")]
-    names = {PurePath(file).stem: file for file in files}
-    names.pop("columns", None)
+    names = {PurePath(file).stem: file for file in files if PurePath(file).stem != "columns"}
     if not names:
         where = str(folder.root / place)
         raise OrchestratorError("there are no tables", where, "run the study first")

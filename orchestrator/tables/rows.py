@@ -33,6 +33,7 @@ POINT = ("alpha_deg", "beta_deg", "d_m", "z0_over_d", "nu_m2_s", "force_law", "r
 PER_E_FOLD = 0.06
 """Relative rise of tau_c with each e-fold of the flow's z0, at most: triangles of 15 and 30 deg
 under solved flows, z0/h from 2.5e-4 to 8e-3, at 10 to 70 % of the grains; 0.03 in the mean."""
+ENDS = ("", "_low", "_high")  # endings of a threshold's columns
 FEW = 10  # grains of a size class: the interval of its threshold is wide
 # u*/u*_0 at equal parts of the way along the bed from the foot to the top
 WAY_UP = ("ustar_foot", "ustar_quarter", "ustar_half", "ustar_three_quarters", "ustar_top")
@@ -320,8 +321,7 @@ def size_class(answer: Answer) -> Iterator[Row]:
         for number, size, chosen in classes:
             at = each[number]
             own = shields(scene, np.array([at.tau, at.tau_low, at.tau_high])) / size
-            hiding, hiding_low, hiding_high = own / middle if middle > 0 else own * np.nan
-            value, low, high = own
+            hiding = own / middle if middle > 0 else own * np.nan
             yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
@@ -330,12 +330,8 @@ def size_class(answer: Answer) -> Iterator[Row]:
                 "few": bool(chosen.sum() < FEW),
                 "class_moved": motion.moved_by(level)[chosen].mean() if level else np.nan,
                 "ustar0_m_s": at.ustar0,
-                "shields_own": value,
-                "shields_own_low": low,
-                "shields_own_high": high,
-                "hiding": hiding,
-                "hiding_low": hiding_low,
-                "hiding_high": hiding_high,
+                **{f"shields_own{end}": value for end, value in zip(ENDS, own, strict=True)},
+                **{f"hiding{end}": value for end, value in zip(ENDS, hiding, strict=True)},
                 "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(size) / size),
                 "hiding_egiazaroff": float(measured.egiazaroff_hiding(size)),
             }

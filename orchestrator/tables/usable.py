@@ -18,9 +18,7 @@ TURBULENT_FROM = 2000.0
 EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
 CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
 ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
-KEPT_TO = (
-    0.1  # n/N to which a balance of the whole bed does; at 0.3 theta is 2 to 3.5 times as high
-)
+KEPT_TO = 0.1  # n/N to which a balance of the whole bed does; at 0.3 theta is 2 to 3.5 times that
 SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
 """Piles that agree in these scatter alike: level rows or not; lifted grains collide or do not."""
 
@@ -75,8 +73,7 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
         rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
     texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
-    if "shields" not in rows:
-        rows["shields"] = rows["shields_closed_form"]
+    rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
     made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
 
@@ -90,9 +87,8 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
     # a pile has the share of grains that lift carried off
     weights = {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
     texts = why_not(law, np.asarray(ustar, float), exposure, **weights)
-    if law.unverified:
-        texts = [f"unverified force law: {law.unverified}; {text}" for text in texts]
-    return [text.removesuffix("; ") for text in texts]
+    head = f"unverified force law: {law.unverified}; " * bool(law.unverified)
+    return [f"{head}{text}".removesuffix("; ") for text in texts]
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
