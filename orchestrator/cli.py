@@ -2,6 +2,7 @@
 
 import argparse
 import difflib
+import gc
 import os
 import sys
 import warnings
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 only if all that was asked for was done."""
+    gc.set_threshold(100_000)  # a study's tables are millions of objects, none in a cycle
     terminal.listen()
     terminal.take()
     for name in ("SOURCE_DATE_EPOCH", "MPLBACKEND"):

@@ -131,8 +131,7 @@ def prune(directory: Path) -> str:
         done = planned.done(space.cases)
         made = tables.make(study, planned, space.cases, done)
         shown = report.drawn_from(Results(study, planned, made, space.cases))
-        cases = {name: planned.cases[name] for name in done}
-        return workspace.prune(space, cases, {case.name for case in shown})
+        return workspace.prune(space, {n: planned.cases[n] for n in done}, {c.name for c in shown})
 
 
 def _draw(

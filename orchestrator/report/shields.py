@@ -20,6 +20,7 @@ from orchestrator.report.results import Results, case_names, drawable, held, spl
 from orchestrator.report.style import Figure, Look
 from orchestrator.report.theory import BINS, Line
 from orchestrator.study import fields
+from orchestrator.types import BoolArray
 
 SHAPES = "os^DvP<X>p8hd*"
 SHAPE, LABEL = "marker", "label"
@@ -164,10 +165,10 @@ def draw_line(
 
 def draw_points(
     ax: Axes, rows: pd.DataFrame, colour: str, columns: Sequence[str], size: float = 4.2
-) -> list[tuple[Line2D, pd.DataFrame]]:
+) -> list[tuple[Line2D, BoolArray]]:
     """Intervals and the rows' own markers, by the columns of x, y and its ends.
 
-    Hollow where a threshold is not usable. Returns the rows of each group of markers.
+    Hollow where a threshold is not usable. Returns which rows each group of markers shows.
     """
     x, y, low, high = (rows[column].to_numpy(float) for column in columns)
     # as one line with gaps: bars and caps by themselves take three times as long
@@ -175,15 +176,15 @@ def draw_points(
     look: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "gid": "intervals"}
     look |= {"marker": "_", "ms": size + 0.8, "mew": 0.7, "alpha": 0.5}
     ax.plot(np.repeat(x, 3), ends, zorder=2.5, **look)
-    drawn, usable = [], valid(rows).to_numpy()
-    for (marker, label), _ in split(rows, SHAPE, LABEL):
+    drawn, usable, shape = [], valid(rows).to_numpy(), rows[SHAPE].to_numpy(str)
+    for marker, label in sorted(set(zip(rows[SHAPE], rows[LABEL], strict=True))):
         for solid in (True, False):
-            at = (rows[SHAPE] == marker).to_numpy() & (usable == solid)
+            at = (shape == marker) & (usable == solid)
             look = {"ls": "", "marker": marker, "ms": size, "color": colour, "mew": 0.8}
             told: Look = {"gid": RESULT[2], "label": "hollow: not usable, see why_not"}
             look |= {"gid": RESULT[1], "label": label} if solid else {**told, "mfc": "white"}
             if solid or at.any():
-                drawn.append((ax.plot(x[at], y[at], zorder=3, **look)[0], rows[at]))
+                drawn.append((ax.plot(x[at], y[at], zorder=3, **look)[0], at))
     return drawn
 
 
@@ -263,9 +264,9 @@ def draw(results: Results) -> Iterator[Figure]:
         for (alpha,), part in split(rows, "alpha_deg"):
             label = f"{name}, {labels.plain('alpha_deg', alpha)}"
             marked = part.assign(**{SHAPE: shape, LABEL: label})
-            for line, group in draw_points(ax, marked, shades[alpha], columns, size):
+            for line, drawn in draw_points(ax, marked, shades[alpha], columns, size):
                 line.set_gid(f"{NAME}-{len(points)}")  # by which the page's script finds the points
-                texts = [_texts(row, columns, telling) for _, row in group.iterrows()]
+                texts = [_texts(row, columns, telling) for _, row in marked[drawn].iterrows()]
                 points[f"{NAME}-{len(points)}"] = texts
     for at, closed in enumerate(lines):
         # a law on another bed has a thinner line
