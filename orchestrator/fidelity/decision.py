@@ -174,11 +174,21 @@ def _good_enough(
     cheap_first = sorted(known, key=lambda pair: known[pair].cost_core_s)
     within, why = [pair for pair in cheap_first if known[pair].total <= tolerance], "cheapest"
     if not within:
-        best = min((error.total for error in known.values()), default=math.inf)
-        if math.isinf(best):
+        best = min(known, key=lambda pair: known[pair].total, default=None)
+        if best is None or math.isinf(known[best].total):
             return (), f"no error is known: {ASKED}"
-        # errors below the uncertainty of the reference cannot be ranked
-        within = [pair for pair in cheap_first if known[pair].error <= best]
+        # errors below the uncertainty of the reference cannot be ranked, but for those of the flow,
+        # beside which that of the reference of the grains is none
+        flow = {
+            one: levels.known_of_classes(one, levels.GRAINS[-1], *classes).error
+            for one in offered[0]
+        }
+        limit = max(tolerance, flow[best.flow])
+        within = [
+            pair
+            for pair in cheap_first
+            if known[pair].error <= known[best].total and flow[pair.flow] <= limit
+        ]
         why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:
