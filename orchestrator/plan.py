@@ -1,10 +1,12 @@
 """From scenes to cases: which runs a study needs, shared where scenes agree."""
 
 import time
+import timeit
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +24,7 @@ from orchestrator.study.study import Study
 
 START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
 """Times of imports and first figures, of a scene, and of a grain of a bed without a run, s."""
-SORT_S = 4.3e-3
-"""Time of `pace` on the machine of these times, and of those that cases expect, s."""
+SORT_S = 4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
 
 
@@ -164,16 +165,9 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
 
 
 def pace() -> float:
-    """How many times slower this machine is than that of the times that cases expect.
-
-    The least time of a fixed calculation of some ms, the sorting of 1e5 numbers, tells it.
-    """
-    values, times = np.random.default_rng(0).random(100_000), list[float]()
-    for _ in range(5):
-        started = time.process_time()
-        np.sort(values, kind="stable")
-        times.append(time.process_time() - started)
-    return min(times) / SORT_S
+    """How many times longer a fixed calculation takes than where cases' times were found."""
+    sort = partial(np.sort, np.random.default_rng(0).random(100_000), kind="stable")
+    return min(timeit.repeat(sort, timer=time.process_time, number=1)) / SORT_S
 
 
 def _counted(names: Iterable[str]) -> str:

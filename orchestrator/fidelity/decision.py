@@ -177,18 +177,11 @@ def _good_enough(
         best = min(known, key=lambda pair: known[pair].total, default=None)
         if best is None or math.isinf(known[best].total):
             return (), f"no error is known: {ASKED}"
-        # errors below the uncertainty of the reference cannot be ranked, but for those of the flow,
-        # beside which that of the reference of the grains is none
-        flow = {
-            one: levels.known_of_classes(one, levels.GRAINS[-1], *classes).error
-            for one in offered[0]
-        }
-        limit = max(tolerance, flow[best.flow])
-        within = [
-            pair
-            for pair in cheap_first
-            if known[pair].error <= known[best].total and flow[pair.flow] <= limit
-        ]
+        # errors below the uncertainty of the reference cannot be ranked, but those of flows can
+        exact, most = levels.GRAINS[-1], known[best].total
+        flow = {pair: levels.known_of_classes(pair.flow, exact, *classes).error for pair in known}
+        limit = max(tolerance, flow[best])
+        within = [one for one in cheap_first if known[one].error <= most and flow[one] <= limit]
         why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:

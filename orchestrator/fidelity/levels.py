@@ -38,7 +38,7 @@ FOLDER = Path(__file__).with_name("calibration")
 DISORDERS = (0.02, 0.05, 0.2)  # ends of the ranges of disorder that share their known errors, d
 VISCOUS, ROUGH = 3.0, 30.0  # Re* below which a bed is smooth, and from which it is rough
 LEVEL_BED = "level bed"  # class for the flow of beds over which u* is u*_0 everywhere
-LIMITING, LIFTED = ", limiting slope", ", lifted"  # ends of the names of classes
+LIMITING = ", limiting slope"  # end of the name of a class
 LIFTED_TO = 1.235  # lift over the weight normal to the bed, up to which lifted grains were measured
 BETWEEN_DEG = 5.0  # below the limiting slope, from which slopes were measured as below it
 AT_LEAST = ("flow.lid", "flow.upstream", "flow.downstream")  # as good where larger
@@ -234,7 +234,7 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
 
     For the flow it names how the stress is read and what is above the bed, for the grains their
     packing, and whether lift takes them off before they roll; both name the form, the limiting
-    slope of those that roll, and obstacles, unless these are left out.
+    slope, and obstacles, unless these are left out.
     """
     bed, name = scene.bed, packing(scene)
     assert isinstance(bed, PileBed)
@@ -245,11 +245,9 @@ def scene_class(part: str, scene: Scene, *, obstacles: bool = True) -> str:
     elif name == "disordered":
         name = f"disordered up to {next(end for end in DISORDERS if bed.disorder <= end):g} d"
     if part == "grains" and _lift(scene) > 1:
-        name += LIFTED
-    elif bed.is_triangle:
-        name += LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else ""
+        name += ", lifted"
     if bed.is_triangle:
-        return name
+        return name + (LIMITING if scene.limiting_slope_deg - bed.slope_deg < 1 else "")
     if bed.obstacles and obstacles:
         return f"{name}, obstacles"
     if bed.shape == "flat" and not bed.profile:
@@ -269,8 +267,6 @@ def classes(part: str, scene: Scene) -> tuple[str, ...]:
     bed, name = scene.bed, scene_class(part, scene)
     assert isinstance(bed, PileBed)
     base, below_deg = name.removesuffix(LIMITING), scene.limiting_slope_deg - bed.slope_deg
-    if base.endswith(LIFTED):
-        return (base,)
     if bed.is_triangle and (1 <= below_deg < BETWEEN_DEG or base == "horizontal"):
         return base, base + LIMITING
     return (name, scene_class(part, scene, obstacles=False)) if bed.obstacles else (name,)

@@ -292,8 +292,10 @@ class PileCase(GrainCase):
         """Expected time of one core, s."""
         rules, grain, width = self.scene.protocol, self.scene.grain, self.geometry.bed.width
         load_steps = np.log(3.5) / np.log1p(rules.load_increment) / rounds(self.scene)
-        size = self._size * (IN_SPACE if width else 1)
-        exposed = self._length * (width or 1) if self.geometry.pouring else np.nan
+        # of a lattice the layers that may move take the time, and decks of one of four were timed
+        size, exposed = 4 * self._length * self._layers, np.nan
+        if self.geometry.pouring:
+            size, exposed = self._size * (IN_SPACE if width else 1), self._length * (width or 1)
         return deck.cost_s(load_steps, size, REST, rules, grain, exposed)
 
     @property
@@ -304,10 +306,14 @@ class PileCase(GrainCase):
     @property
     def _size(self) -> int:
         """About how many grains the deck has, from the lengths of the bed alone."""
+        return int(self._length * (self._layers + 3) * (self.geometry.bed.width or 1))
+
+    @property
+    def _layers(self) -> float:
+        """Mobile layers: at most the whole bed; a pile is half its rows thick on average."""
         bed = self.geometry.bed
-        # the whole pile is half its rows thick on average
         most = bed.poured_depth if self.geometry.pouring else self.geometry.line.h / 2
-        return int(self._length * (min(bed.mobile_layers, most) + 3) * (bed.width or 1))
+        return min(bed.mobile_layers, most)
 
     @property
     def _length(self) -> float:

@@ -112,6 +112,7 @@ def test_grains_that_lift_takes_off_have_a_class_of_their_own(pile: MakePile) ->
     for packing in ("aligned", "horizontal"):
         scene = pile(low, packing=packing)
         assert levels.classes("grains", scene) == (f"{packing}, lifted",)
+        assert math.isfinite(levels.known(COARSE, scene).total) == (packing == "aligned")
 
 
 def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: MakePile) -> None:
