@@ -117,11 +117,6 @@ class Packing:
         """N(d): how many grains are counted."""
         return int(self.windward.sum())
 
-    @property
-    def pushed(self) -> BoolArray:
-        """Which grains feel the flow: exposed ones that may move, shape (n,)."""
-        return np.asarray(self.mobile & (self.windward | self.lee))
-
 
 @dataclass(frozen=True)
 class Lattice:

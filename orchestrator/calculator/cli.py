@@ -80,13 +80,13 @@ def _run(options: argparse.Namespace) -> int:
     table, asked = answered(points, options.law, options.fluid, options.temperature, OPTIONS)
     if asked:
         print(f"orchestrator: {'; '.join(asked)}", file=sys.stderr)
-    cells = zip(*(column.tolist() for column in table.values()), strict=True)
-    rows = [dict(zip(table, row, strict=True)) for row in cells]
+    columns = [column.tolist() for column in table.values()]
     if options.csv:
-        lines = csv.writer(sys.stdout, lineterminator="\n")
-        lines.writerow(table)
-        lines.writerows(["" if _is_nan(x) else x for x in row.values()] for row in rows)
-    elif options.json:
+        cells = ([x if x == x else None for x in column] for column in columns)  # NaN: no text
+        csv.writer(sys.stdout, lineterminator="\n").writerows([table, *zip(*cells, strict=True)])
+        return 0
+    rows = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    if options.json:
         print(as_json(rows))
     else:
         varied = [name for name, axis in axes.items() if len(axis) > 1]

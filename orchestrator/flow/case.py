@@ -232,7 +232,7 @@ class FlowCase(Case):
         types = {**PATCHES, "inlet": PATCHES["inlet"].format(-h)}
         types |= {"lid": "wall"} if closed else {}
         (directory / "pile.msh").unlink()  # the mesh of the template
-        middles = write_poly_mesh(*made_by_gmsh(directory), directory, types)
+        middles = write_poly_mesh(made_by_gmsh(directory), directory, types)
         x, z = middles[:, 0, 0], middles[..., 2]
         if coarser:
             line, omega = self.bed_line, settings.turbulence_model == "kOmegaSST"

@@ -35,6 +35,8 @@ ARGUMENTS = ["gmsh", "-v", "0", "-no_signal_handler"]
 LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each corner, m;
 // cells from it to the next one, and the ratio of each of these to the one upstream of it.
 """
+Mesh = tuple[FloatArray, IntArray, dict[str, IntArray]]
+"""Points (n, 3), m; by their numbers the corners of cells (n, 8) and of faces of patches (n, 4)."""
 _GMSH = threading.Lock()  # gmsh has one global state
 _QUADRANGLE, _HEXAHEDRON = 3, 5  # gmsh's types of elements
 
@@ -172,12 +174,11 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-def made_by_gmsh(directory: Path) -> tuple[FloatArray, IntArray, dict[str, IntArray]]:
+def made_by_gmsh(directory: Path) -> Mesh:
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
-    It has points (m), shape (n, 3), and by their numbers the corners of cells, (n, 8), and of the
-    faces of each patch, (n, 4). Any thread may call; one at a time makes its mesh. Raises a
-    SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is missing.
+    Any thread may call; one at a time makes its mesh. Raises a SolverError if gmsh fails, cells are
+    inverted or no hexahedra, or one of `GROUPS` is missing.
     """
     try:
         import gmsh

@@ -1,6 +1,5 @@
 """The bed of a scene in grains, and the flow's forces on them: what each needs to move."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from orchestrator.flow.case import FlowCase
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, sheltering
-from orchestrator.grains.peeling import FEWER, PLACES, RANGE, ForceTable, Loading
+from orchestrator.grains.peeling import FEWER, PLACES, RANGE, Force, ForceTable, Loading
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
@@ -37,7 +36,6 @@ DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
 _covered, _poured = cache(packing.cover), cache(poured.read)
-Force = Callable[[ArrayLike], FloatArray]  # a force (N) of friction velocities (m/s)
 
 
 @cache

@@ -32,7 +32,7 @@ STEPS = 8
 FLAT = 1e-9
 """Contacts whose directions are nearer than this to a plane through the centre lie in it."""
 Place = tuple[float, float]
-Force = Callable[[FloatArray], FloatArray]
+Force = Callable[[ArrayLike], FloatArray]
 """Size of a force (N) at local friction velocities (m/s) of at least 0."""
 Renew = Callable[[int], "Mapping[int, ForceTable]"]
 """Tables of the grains whose forces change when a grain, by its number, has left."""
@@ -77,8 +77,7 @@ class ForceTable:
 
     def __init__(self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray) -> None:
         self._log_ustar, self._forces, self._pieces = log_ustar, forces, pieces
-        # a grain asks again when a neighbour has left
-        self.reaching = cache(self._reaching)
+        self.reaching = cache(self._reaching)  # a grain asks again when a neighbour has left
 
     @classmethod
     def of(

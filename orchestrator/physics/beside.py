@@ -25,6 +25,12 @@ doi:10.1029/2017JF004416: sand of 0.40 to 0.53 mm."""
 MEASURED = tuple(f"measured_{name}" for name in ("curve", "median", "low", "high", "rows"))
 TESTED = tuple(f"tested_{name}" for name in ("low", "high", "rows", "held"))
 """Columns of what was measured at the Re*, and of the interval; `tables/columns.csv` tells them."""
+OF_KIND = (
+    *("alpha_s", "cohesion_n_m", "alpha_deg", "relative_size", "rho_f_kg_m3", "force_law", "d_m"),
+    *("z0_m", "bed", "beta_deg", "bed_shape", "profile", "obstacles", "width", "answered_method"),
+    *("sizes", "exposure", "sheltering", "fraction", "gusts"),
+)
+"""Columns that the kind of a threshold follows from."""
 
 
 def beside(table: Any) -> dict[str, FloatArray]:
@@ -42,9 +48,13 @@ def beside(table: Any) -> dict[str, FloatArray]:
     near = (re > 4.4) & (re < 27) & (rho_s / rho > 1085) & (rho_s / rho < 4580)
     ends = (float(np.median(FIELD)), min(FIELD), max(FIELD), float(len(FIELD)))
     rows = np.where(is_gas[..., None], np.where(near[..., None], ends, none), flumes)
-    given = {str(name): np.asarray(table[name]).tolist() for name in table}
-    each = (dict(zip(given, one, strict=True)) for one in zip(*given.values(), strict=True))
-    held = np.array([interval(kind_of(row), row["reynolds"]) for row in each], float).T
+    given = {name: np.asarray(table[name]).tolist() for name in OF_KIND if name in table}
+    # rows of one kind are alike but for d, of which it has three digits of d/z0
+    parts = (d / np.asarray(table["z0_m"], float)).tolist()
+    given |= {"d_m": [float(f"{part:.3g}") for part in parts], "z0_m": [1.0] * len(parts)}
+    keys = [*zip(*([x if x == x else np.nan for x in c] for c in given.values()), strict=True)]
+    kinds = {key: kind_of(dict(zip(given, key, strict=True))) for key in {*keys}}
+    held = np.array(list(map(interval, map(kinds.__getitem__, keys), re.tolist())), float).T
     held[:2] *= theta
     return dict(zip((*MEASURED, *TESTED), [curve, *rows.T, *held], strict=True))
 

@@ -180,8 +180,7 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     It alone must survive a crash: what it names is compared with it. The times are `solver_s`,
     `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
-    patterns = case.results, case.derived, case.bulky
-    *made, bulky = (_matching(directory, each) for each in patterns)
+    *made, bulky = (_matching(directory, p) for p in (case.results, case.derived, case.bulky))
     results, derived = ({n: files.digest_file(directory / n) for n in names} for names in made)
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     (directory / CHECKSUMS).write_text(sums)

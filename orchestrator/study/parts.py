@@ -93,8 +93,7 @@ class Part(BaseModel):
     @model_validator(mode="after")
     def _without_minus_zero(self) -> Self:
         """Make one number of 0.0 and -0.0, which are equal: else they are two scenes."""
-        fields = self.__dict__
-        fields |= {n: 0.0 for n, value in fields.items() if type(value) is float and not value}
+        vars(self).update({n: 0.0 for n, v in vars(self).items() if type(v) is float and not v})
         return self
 
 

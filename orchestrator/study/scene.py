@@ -141,9 +141,9 @@ class Scene(parts.Part):
             yield not gentle, "bed.slope_deg", f"{slope:g} deg", f"choose {low:g} to {high:g}"
             yield slope and not rises, "bed.slope_deg", f"the shape {shape} does not rise", OUT
             yield bed.smoothing, "bed.smoothing", "it is of a profile", OUT
-            for name in sorted({field for facts in SHAPES.values() for field in facts.fields}):
-                foreign = name not in bed.form.fields
-                foreign &= getattr(bed, name) != PileBed.model_fields[name].default
+            others = {name for facts in SHAPES.values() for name in facts.fields}
+            for name in sorted(others - {*bed.form.fields}):
+                foreign = getattr(bed, name) != PileBed.model_fields[name].default
                 shapes = [each for each, facts in SHAPES.items() if name in facts.fields]
                 yield foreign, f"bed.{name}", f"it is of: {', '.join(shapes)}", OUT
             return

@@ -20,7 +20,7 @@ SOUND = {
 SCENE = {
     **{"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0, "h_m": 0.02},
     **{"flow_top": "boundary layer", "depth_m": None, "relative_size": 1.0, "beta_deg": 60.0},
-    **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81},
+    **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5},
 }
 UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
 
