@@ -290,7 +290,7 @@ def read_dump(path: Path, columns: tuple[str, ...]) -> tuple[IntArray, pd.DataFr
         heads = [frame.split("\n", 8) for frame in text.split("ITEM: TIMESTEP\n")[1:]]
         steps, counts = (np.array([int(head[row]) for head in heads]) for row in (0, 2))
         body = StringIO("".join(head[8] for head in heads))
-        rows = pd.read_csv(body, sep=r"\s+", names=list(columns), header=None)
+        rows = pd.read_csv(body, sep=r"\s+", names=list(columns), header=None, low_memory=False)
         whole = text.endswith("\n") and len(rows) == counts.sum()
         if not whole or rows.isna().any(axis=None):
             raise ValueError("it is cut short or has NaN")
