@@ -22,8 +22,9 @@ from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
 from orchestrator.study.study import Study
 
-START_S, SCENE_S, GRAIN_S = 4.0, 4e-3, 4e-5
+START_S, SCENE_S, GRAIN_S = 2.5, 4e-3, 4e-5
 """Times of imports and first figures, of a scene, and of a grain of a bed without a run, s."""
+BESIDE = 1.3  # time of a case with the Python beside its solver, over that of the solver
 SORT_S = 4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
 
@@ -156,8 +157,8 @@ def expected(plan: Plan, directory: Path, workers: int) -> Iterator[str]:
     # a chain of cases takes at least the sum of its times, however many run beside it
     walls = {case.name: case.cost_s / min(case.ranks, workers) for case in missing}
     chains = (sum(walls.get(run.name, 0.0) for run in (case, *case.needs)) for case in missing)
-    slower = pace()
-    runs = slower * max(sum(case.cost_s for case in missing) / workers, max(chains, default=0.0))
+    slower, alone_s = pace(), sum(case.cost_s for case in missing)
+    runs = slower * BESIDE * max(alone_s / workers, max(chains, default=0.0))
     drawing = slower * plan.drawing_s
     wall = f"about {human(runs + drawing)} with {_number(workers, 'worker')}"
     rest = f"{human(drawing)} of them for tables and figures"
