@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
-from orchestrator.flow.mesh import Mesh
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.types import FloatArray, IntArray
@@ -48,14 +47,15 @@ def read_list(path: Path, after: str = "", kind: type = float) -> NDArray[Any]:
     return np.fromstring(numbers, kind, sep=" ").reshape(count, -1)
 
 
-def write_poly_mesh(mesh: Mesh, directory: Path, types: Mapping[str, str]) -> FloatArray:
-    """Write the ``constant/polyMesh`` of a case from a mesh of hexahedra one cell thick.
+def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> FloatArray:
+    """Write the ``constant/polyMesh`` of a case from a `meshio.Mesh` of hexahedra one cell thick.
 
-    The patches are of the given types with their entries, else of the type "patch"; ``bed`` has one
-    face for each column of cells. Returned are the middles of the cells in their order, m:
+    Its cell sets become the patches, of the given types with their entries, else "patch"; ``bed``
+    has one face for each column of cells. Returned are the middles of the cells in their order, m:
     downstream, in a column upwards; shape (columns, cells of a column, 3).
     """
-    points, cells, patches = mesh
+    points, cells, quads = mesh.points, mesh.cells_dict["hexahedron"], mesh.cells_dict["quad"]
+    patches = {name: quads[rows["quad"]] for name, rows in mesh.cell_sets_dict.items()}
     middles = points[cells].mean(axis=1)
     columns = np.argsort(middles[:, 0]).reshape(len(patches["bed"]), -1)
     columns = np.take_along_axis(columns, np.argsort(middles[columns, 2], axis=1), axis=1)

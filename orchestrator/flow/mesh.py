@@ -8,12 +8,16 @@ import threading
 from dataclasses import dataclass, replace
 from math import ceil, expm1, inf, log, radians, tan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine
 from orchestrator.errors import SolverError
-from orchestrator.types import FloatArray, IntArray
+from orchestrator.types import FloatArray
+
+if TYPE_CHECKING:
+    import meshio
 
 SHARP_DEG = 8.0
 """Least bend of the bed that is a corner, not a part of a curve."""
@@ -35,8 +39,6 @@ ARGUMENTS = ["gmsh", "-v", "0", "-no_signal_handler"]
 LINE_HEAD = """// The bed line from the inlet to the outlet: x and z of each corner, m;
 // cells from it to the next one, and the ratio of each of these to the one upstream of it.
 """
-Mesh = tuple[FloatArray, IntArray, dict[str, IntArray]]
-"""Points (n, 3), m; by their numbers the corners of cells (n, 8) and of faces of patches (n, 4)."""
 _GMSH = threading.Lock()  # gmsh has one global state
 _QUADRANGLE, _HEXAHEDRON = 3, 5  # gmsh's types of elements
 
@@ -174,12 +176,15 @@ def _first(piece: tuple[int, float], length: float) -> float:
     return length / cells if ratio == 1 else length * (ratio - 1) / float(expm1(cells * log(ratio)))
 
 
-def made_by_gmsh(directory: Path) -> Mesh:
+def made_by_gmsh(directory: Path) -> "meshio.Mesh":
     """The mesh of a case, which gmsh makes of `pile.geo` and the files that it includes.
 
-    Any thread may call; one at a time makes its mesh. Raises a SolverError if gmsh fails, cells are
-    inverted or no hexahedra, or one of `GROUPS` is missing.
+    Its cell sets are the faces of each patch. Any thread may call; one at a time makes its mesh.
+    Raises a SolverError if gmsh fails, cells are inverted or no hexahedra, or one of `GROUPS` is
+    missing.
     """
+    import meshio
+
     try:
         import gmsh
     except OSError as error:
@@ -207,10 +212,14 @@ def made_by_gmsh(directory: Path) -> Mesh:
             for group in model.getPhysicalGroups(2):
                 faces = model.getEntitiesForPhysicalGroup(*group)
                 quads = [mesh.getElementsByType(_QUADRANGLE, face)[1] for face in faces]
-                patches[model.getPhysicalName(*group)] = number[np.concatenate(quads)].reshape(
-                    -1, 4
-                )
-            return points.reshape(-1, 3), number[cells].reshape(-1, 8), patches
+                corners = number[np.concatenate(quads)].reshape(-1, 4)
+                patches[model.getPhysicalName(*group)] = corners
+            ends = np.cumsum([len(corners) for corners in patches.values()])
+            rows = np.split(np.arange(ends[-1]), ends[:-1])
+            sets = {name: [None, of] for name, of in zip(patches, rows, strict=True)}
+            sides, hexahedra = np.concatenate([*patches.values()]), number[cells].reshape(-1, 8)
+            blocks = [("hexahedron", hexahedra), ("quad", sides)]
+            return meshio.Mesh(points.reshape(-1, 3), blocks, cell_sets=sets)
         except Exception as error:  # gmsh raises nothing narrower
             remedy = "check the slope, the height and the first cell in parameters.geo"
             where = str(directory / "pile.geo")

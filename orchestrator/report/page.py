@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from orchestrator.report.style import Figure
 
 HERE = Path(__file__).parent
-PACKAGES = ("gmsh", "matplotlib", "numpy", "pandas", "pyvista", "scipy", "vtk")
+PACKAGES = ("gmsh", "matplotlib", "meshio", "numpy", "pandas", "pyvista", "scipy", "vtk")
 
 
 def fill(template: str, folder: Path = HERE, /, **values: Any) -> str:

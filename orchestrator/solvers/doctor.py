@@ -14,7 +14,7 @@ from orchestrator.runs import process
 from orchestrator.solvers import liggghts, openfoam
 
 SOLVERS = {"OpenFOAM": openfoam.version, "LIGGGHTS": liggghts.version}
-LIBRARIES = ("numpy", "scipy", "pandas", "pydantic", "gmsh", "pyvista", "matplotlib")
+LIBRARIES = ("numpy", "scipy", "pandas", "pydantic", "gmsh", "meshio", "pyvista", "matplotlib")
 TOOLS = ("stdbuf", "sha256sum", "setpriv")
 _NEEDS = {"gmsh": "apt-get install libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"}
 """Packages that a library needs beside itself."""
