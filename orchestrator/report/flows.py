@@ -113,9 +113,8 @@ def eq10_over_wall(results: Results, flow_cases: tuple[str, ...]) -> tuple[float
     """Relative difference of u* by Eq. 10: mean of the windward faces, largest at their crests."""
     table = results.tables["wall_stress"]
     ratios = []
-    for name in flow_cases:
-        rows = table[table["flow_case"] == name]
-        face = rows[(rows["s_m"] > 0) & (rows["s_m"] < results.flows[name].model.line.crest_s)]
+    for name, rows in table[table["flow_case"].isin(flow_cases)].groupby("flow_case"):
+        face = rows[(rows["s_m"] > 0) & (rows["s_m"] < results.flows[str(name)].model.line.crest_s)]
         wall, eq10 = face["ustar_over_ustar0_wall"], face["ustar_over_ustar0_eq10"]
         ratios.append((eq10.mean() / wall.mean() - 1, eq10.max() / wall.max() - 1))
     return float(np.mean(ratios, axis=0)[0]), float(np.max(ratios, axis=0)[1])

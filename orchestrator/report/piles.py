@@ -99,9 +99,9 @@ def wear(results: Results) -> Iterator[Figure]:
 
 def poured(results: Results) -> Iterator[Figure]:
     """Poured beds: the flow at which each grain goes, its pocket, and the hiding of sizes."""
-    rows = results.joined("pile_grain")
-    if "size_over_d" not in rows:
+    if "size_over_d" not in results.tables.get("pile_grain", ()):
         return
+    rows = results.joined("pile_grain")
     rows = rows[rows["size_over_d"].notna()]
     firsts = rows.drop_duplicates("answered_method").sort_values("answered_method")["scene_id"]
     # a grain that lies loose goes at no flow at all
