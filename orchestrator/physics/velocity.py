@@ -226,10 +226,7 @@ def _tables() -> tuple[FloatArray, FloatArray]:
     slope = -KARMAN * np.expm1(-y / DAMPING) + KARMAN * y / DAMPING * np.exp(-y / DAMPING)
     bend = -2 * length * slope * g**2 / np.sqrt(1 + 4 * length**2)
     tables = []
-    for nodes in (
-        (speed, y * g, y * g + y**2 * bend),
-        (integral, y * speed, y * speed + y**2 * g),
-    ):
+    for nodes in ((speed, y * g, y * g + y**2 * bend), (integral, y * speed, y * speed + y**2 * g)):
         c0, c1, c2 = (node * STEP**n / max(n, 1) for n, node in enumerate(nodes))
         # what is left of value and derivatives at the next node
         d = (c0[1:] - (c0 + c1 + c2)[:-1], c1[1:] - (c1 + 2 * c2)[:-1], (c2[1:] - c2[:-1]) * 2)
