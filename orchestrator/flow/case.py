@@ -26,18 +26,15 @@ from orchestrator.study.profile import Profile
 
 WALL_STRESS = "wall_stress.csv"
 DIAGNOSTICS = "diagnostics.csv"
-SPEED_HEIGHT = 10.0
-"""Height above the flat bed at which U_e is given, h."""
+SPEED_HEIGHT = 10.0  # height above the flat bed at which U_e is given, h
 RESIDUAL, CELLS_ALONG = (5e-4, 2e-4), 150
 """Residuals of p, of a layer and of a channel, at which the stress on a pile is within 0.2 % of
 where it ends, on a steep and rough one 0.7 %, and the cells along the bed up to which it is."""
-FINE = 80
-"""Cells per face from which a flow starts from that on half of them."""
+FINE = 80  # cells per face from which a flow starts from that on half of them
 LEAST_CELL = 0.04
 """Shortest cell along the bed, over the height of the first cells: with cells of a hundredth the
 stress upstream was 3 to 12 % off, and up to fourfold with cells of a thousandth."""
-MOST_GROWTH = 3.0
-"""Largest ratio of neighbouring cells: rows of more do not fit under a crest."""
+MOST_GROWTH = 3.0  # largest ratio of neighbouring cells: rows of more do not fit under a crest
 LEAST_LID = 5.0
 """Lowest lid of a boundary layer, h: under lower ones iterations cycle, and none ends."""
 PATCHES = {

@@ -18,8 +18,7 @@ from orchestrator.study.scene import Scene
 
 NODES_PER_DECADE, NODES = 2, 4
 """Nodes in each tenfold of z0/h, and how many of them a flow in between is interpolated from."""
-FACE_DEG = 2.0
-"""Least slope of a profile whose cells are as fine as on a face."""
+FACE_DEG = 2.0  # least slope of a profile whose cells are as fine as on a face
 
 
 @dataclass(frozen=True)

@@ -35,17 +35,13 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.constants import KARMAN
 from orchestrator.types import FloatArray
 
-FACES = 100
-"""Faces of the bed, per h."""
-CELLS = 2 * FACES
-"""Cells of the transform, per h."""
+FACES = 100  # faces of the bed, per h
+CELLS = 2 * FACES  # cells of the transform, per h
 LASTS = 0.05
 """The stress of a brink lasts for this far behind it, h: in the solved flow it falls to half
 within 0.01 to 0.12, and a grain on the brink is not half in the lee."""
-STEEPEST = 0.25
-"""Slope of a separation streamline, and of a bed that the flow still follows down."""
-SHARP_DEG = 15.0
-"""Bend of a brink that the flow does not follow."""
+STEEPEST = 0.25  # slope of a separation streamline, and of a bed that the flow still follows down
+SHARP_DEG = 15.0  # bend of a brink that the flow does not follow
 
 
 @cache
