@@ -452,8 +452,7 @@ class Loads:
         """
         bed, scene, counted = self.geometry, self.geometry.scene, self.geometry.packing.windward
         hold = 2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg)) + bed.tangents[:, 0]
-        # straight up a neighbour in front, rolling is being lifted
-        hold *= scene.weight * bed.packing.sizes**3 / LIFT_OFF
+        hold *= scene.weight * bed.packing.sizes**3 / LIFT_OFF  # to climb straight up is to lift
         ratio = np.abs(self.ratio) * np.sqrt(scene.gust)
         last = np.full(len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity))
         with np.errstate(divide="ignore", invalid="ignore"):

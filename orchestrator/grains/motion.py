@@ -70,8 +70,7 @@ class Motion:
         # before the first level nothing moves
         flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
         level = np.where(moves, np.searchsorted(levels, flows) + 1, 0)
-        none, rolled, _, lifted = range(len(MODES))
-        mode = np.select([carried, moves], [lifted, rolled], none)
+        mode = np.select([carried, moves], [MODES.index("lifted"), MODES.index("rolled")], 0)
         return cls(flow, level, np.zeros_like(level), carried, mode, exact=True)
 
     @classmethod
