@@ -257,7 +257,7 @@ def write_grains(
     (directory / "grains.data").write_text(f"{head}{box}\nAtoms\n\n{rows}")
 
 
-def read_columns(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
+def read_texts(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
     """The texts in each column of a CSV of the deck or of `collect`, which quotes none.
 
     A SolverError if it is not whole or has less rows.
@@ -275,7 +275,7 @@ def read_columns(path: Path, rows: int = 1) -> dict[str, NDArray[Any]]:
 
 def read_table(path: Path, rows: int = 1) -> pd.DataFrame:
     """The numbers of such a CSV, to the last digit; NaN where one is missing."""
-    columns = read_columns(path, rows).items()
+    columns = read_texts(path, rows).items()
     return pd.DataFrame({n: np.where(c == "", "nan", c).astype(float) for n, c in columns})
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from orchestrator.bed.deck import read_columns
+from orchestrator.bed.deck import read_texts
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import KARMAN
 from orchestrator.types import FloatArray
@@ -112,7 +112,7 @@ class WallStress:
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
         """Read a table of `to_csv`, to the last digit."""
-        columns = read_columns(path)
+        columns = read_texts(path)
         return cls(**{each.name: columns[each.name].astype(float) for each in fields(cls)})
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_columns, read_dump, read_table
+from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_dump, read_table, read_texts
 from orchestrator.bed.packing import across
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.types import BoolArray, FloatArray, IntArray
@@ -158,9 +158,9 @@ class Motion:
     @classmethod
     def from_csv(cls, directory: Path) -> "Motion":
         """Read what `to_csv` wrote."""
-        grains = read_columns(directory / MOTION)
+        grains = read_texts(directory / MOTION)
         return cls(
-            flow=read_columns(directory / LOAD_STEPS)["flow"].astype(float),
+            flow=read_texts(directory / LOAD_STEPS)["flow"].astype(float),
             level=grains["moved_in"].astype(np.int64),
             fallen=grains["fallen_in"].astype(np.int64),
             carried=grains["carried_off"] == "1",

@@ -28,9 +28,6 @@ def write(
     `failures` are the cases that failed, with why. A figure that fails, such as for memory, costs a
     line of the page. Those that the page folds away are drawn only if `every` one is asked for.
     """
-    from matplotlib import artist
-
-    artist.kwdoc = lambda artist: ""  # texts of help, which take 0.3 s
     from orchestrator.report import along, bed, flows, page, piles, shields, style, words
 
     figures: list[style.Figure] = []
