@@ -7,7 +7,7 @@ ARGS =
 PARALLEL = -n auto --maxprocesses 4 --dist worksteal
 
 .DEFAULT_GOAL = help
-.PHONY: help study test test-faults calibration docs lint size setup lock clean
+.PHONY: help study test test-faults calibration docs lint setup lock clean
 
 help:  ## list the targets
 	@echo 'Targets (each first installs what it needs; ARGS="..." goes to the program or to pytest):'
@@ -43,9 +43,6 @@ lint:  ## ruff and mypy
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
-
-size:  ## lines of each package against its budget
-	@python3 tools/size.py
 
 setup:  ## install all that the study needs: Debian packages (as root or by sudo) and .venv
 	@sh tools/setup.sh run

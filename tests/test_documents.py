@@ -2,7 +2,6 @@
 
 import copy
 import re
-import runpy
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +20,6 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted(ROOT.glob("*/*/README.md")),
 ]
-
-
-@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="the files are listed by git")
-def test_the_lines_are_within_their_budget() -> None:
-    assert runpy.run_path(str(ROOT / "tools" / "size.py"))["main"]() == 0
 
 
 def test_the_citation_and_the_index_follow() -> None:
