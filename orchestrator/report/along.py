@@ -1,6 +1,6 @@
 """Beds that are more than one triangle: the stress along each, and where motion starts."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,27 +22,24 @@ FIRST = "#c1121f"  # colour of the place where motion starts
 def draw(results: Results) -> Iterator[Figure]:
     """Each bed by its first scene: stress, threshold of each place or grain, bed line, in m."""
     grains = results.tables.get("pile_grain", pd.DataFrame())
-    scenes = {} if grains.empty else dict(iter(grains.groupby("scene_id")))
-    lines: dict[Any, str] = {}
-    for scene_id, pile in results.plan.piles.items():
-        if scene_id in scenes and not pile.bed.is_triangle and np.ptp(pile.model.line.z) > 0:
-            lines.setdefault(pile.model.line, scene_id)
-    if not lines:
+    scenes: dict[str, pd.DataFrame] = {}
+    if len(grains):
+        scenes = {str(scene_id): rows for scene_id, rows in grains.groupby("scene_id")}
+    shown = _first_scenes(results, scenes)[:BEDS]
+    if not shown:
         return
-    shown = list(lines.values())[:BEDS]
     figure = style.canvas(5.0 * len(shown) + 0.9)
-    axes = figure.subplots(3 * len(shown), 1, height_ratios=[1.5, 1.3, 0.7] * len(shown))
-    for (top, middle, below), scene_id in zip(axes.reshape(-1, 3), shown, strict=True):
+    heights = [1.5, 1.3, 0.7] * len(shown)
+    axes = figure.subplots(3 * len(shown), 1, height_ratios=heights)
+    for panels, scene_id in zip(axes.reshape(-1, 3), shown, strict=True):
+        top, middle, below = panels
         pile = results.plan.piles[scene_id]
         dots = _thresholds(middle, scenes[scene_id])
         _stress(results, pile, scenes[scene_id], top)
-        x, z = pile.model.line.corners.T
-        below.fill_between(x, z, z.min() - 0.1 * np.ptp(z), color=style.BED, lw=0)
-        below.plot(x, z, color="0.2", lw=0.8, gid="bed")
-        below.set(xlabel="x, m, from the foot of the first form", ylabel="z, m")
+        _bed_line(below, pile)
         low, high = pile.model.line.x[1], pile.model.line.x[-2]
         reach = 0.1 * (high - low)
-        for ax in (top, middle, below):
+        for ax in panels:
             ax.set_xlim(low - reach, high + reach)
         for ax in (top, middle):
             ax.tick_params(labelbottom=False)
@@ -52,9 +49,28 @@ def draw(results: Results) -> Iterator[Figure]:
     style.legends(figure, [], style.samples([*axes]))
     piles = [results.plan.piles[scene_id] for scene_id in shown]
     names = tuple(dict.fromkeys(run.name for pile in piles for run in pile.runs))
-    local = any(pile.length == 0 for pile in piles)
-    text, leads = caption("where", local=local), local or bool(piles[0].bed.profile)
+    is_local = any(pile.length == 0 for pile in piles)
+    leads = is_local or bool(piles[0].bed.profile)
+    text = caption("where", local=is_local)
     yield Figure("where", "Where motion starts", text, names, figure, leads=leads)
+
+
+def _first_scenes(results: Results, scenes: Mapping[str, pd.DataFrame]) -> list[str]:
+    """The first scene of each bed that is neither the paper's triangle nor level."""
+    lines: dict[Any, str] = {}
+    for scene_id, pile in results.plan.piles.items():
+        line = pile.model.line
+        is_level = np.ptp(line.z) == 0
+        if scene_id in scenes and not pile.bed.is_triangle and not is_level:
+            lines.setdefault(line, scene_id)
+    return list(lines.values())
+
+
+def _bed_line(ax: Axes, pile: Pile) -> None:
+    x, z = pile.model.line.corners.T
+    ax.fill_between(x, z, z.min() - 0.1 * np.ptp(z), color=style.BED, lw=0)
+    ax.plot(x, z, color="0.2", lw=0.8, gid="bed")
+    ax.set(xlabel="x, m, from the foot of the first form", ylabel="z, m")
 
 
 def _stress(results: Results, pile: Pile, rows: pd.DataFrame, ax: Axes) -> None:
@@ -62,20 +78,34 @@ def _stress(results: Results, pile: Pile, rows: pd.DataFrame, ax: Axes) -> None:
     if pile.model.cases:
         table = results.tables["wall_stress"]
         wall = table[table["flow_case"] == pile.flow.name]
-        x, ustar = wall["x_m"].to_numpy(), wall["ustar_over_ustar0_wall"].to_numpy()
+        x = wall["x_m"].to_numpy()
+        ustar = wall["ustar_over_ustar0_wall"].to_numpy()
         ax.plot(x, ustar, color="black", lw=1.1, label="wall stress", gid="wall")
         ax.fill_between(x, ustar, 0, where=(ustar < 0).tolist(), **REVERSED)
-    label = "averaged, where the bed is counted"
-    ax.plot(rows["x_m"], rows["ustar_over_ustar0"], label=label, **FELT)
+    felt = {**FELT, "label": "averaged, where the bed is counted"}
+    ax.plot(rows["x_m"], rows["ustar_over_ustar0"], **felt)
     ax.axhline(0, color="0.4", lw=0.6)
-    bed, names = pile.bed, ["alpha_deg", "d_m", *results.flow_fields]
-    forms = f"{bed.forms} × " * (bed.forms > 1)
-    shape = bed.profile.name if bed.profile else forms + (bed.form.label or bed.shape)
-    values = pd.Series([results.beds("pile")[name].iloc[0] for name in names], names, dtype=object)
-    values["alpha_deg"], values["d_m"] = bed.slope_deg, pile.scene.grain.diameter
-    title = [shape, f"h = {bed.height:.3g} m", *map(str, bed.obstacles)]
-    ax.set_title(f"{', '.join(title)}, {labels.panel(values, names)}", loc="left")
+    ax.set_title(_title(results, pile), loc="left")
     ax.set_ylabel(USTAR)
+
+
+def _title(results: Results, pile: Pile) -> str:
+    """A bed by its shape, height and obstacles, and the fields in which flows differ."""
+    bed = pile.bed
+    if bed.profile:
+        shape = bed.profile.name
+    else:
+        shape = bed.form.label or bed.shape
+        if bed.forms > 1:
+            shape = f"{bed.forms} × {shape}"
+    names = ["alpha_deg", "d_m", *results.flow_fields]
+    first = results.beds("pile").iloc[0]
+    values = pd.Series([first[name] for name in names], names, dtype=object)
+    values["alpha_deg"] = bed.slope_deg
+    values["d_m"] = pile.scene.grain.diameter
+    obstacles = [str(obstacle) for obstacle in bed.obstacles]
+    title = [shape, f"h = {bed.height:.3g} m", *obstacles, labels.panel(values, names)]
+    return ", ".join(title)
 
 
 def _thresholds(ax: Axes, rows: pd.DataFrame) -> Any:
