@@ -82,11 +82,7 @@ LIMITS = {
         "raise it",
     ),
     "flow.viscosity": ("a solved flow whose first cell is not turbulent", "lower it"),
-    "flow.model": (
-        f"`waves` and `hill` over a bed that rises by more than {HIGH:g}°; `hill` over one that "
-        "does not fall to half its height on both sides",
-        "`solve`",
-    ),
+    "flow.model": (f"`waves` over a bed that rises by more than {HIGH:g}°", "`solve`"),
     "grain.stiffness": (
         f"above {scene.MOST_POURED_STIFFNESS:g} in DEM on a poured bed",
         "lower it",

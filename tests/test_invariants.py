@@ -10,7 +10,7 @@ from orchestrator.study.study import parse
 PILE = (
     "fluid.density = 1000.0; fluid.viscosity = 1e-6; grain.density = 2650.0; grain.diameter = 1e-3;"
     'bed.kind = "pile"; bed.slope_deg = 15.0; bed.height = 0.02;'
-    'flow.model = "hill"; protocol.method = "pivot"'
+    'flow.model = "waves"; protocol.method = "pivot"'
 )
 PROFILE = "x_m,z_m\n0,0\n0.0746410162,0.02\n0.1492820323,0\n"
 

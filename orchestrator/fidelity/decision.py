@@ -78,7 +78,6 @@ class Bound(NamedTuple):
 
 NO_BOUND = Bound()
 NO_BOUNDS: Mapping[str, Bound] = {}
-THEORY = level("flow", "waves")  # above it the flow is solved
 CHECK = Bound(level("flow", "coarse"), levels.PEELING, "it checks answers without DEM")
 
 
@@ -134,7 +133,6 @@ def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Seque
             return (), ASKED
         tolerance, start = min(floors.values()), "chosen by default: "
         limit = f"within the model's own spread of {tolerance:.0%}"
-        above = above._replace(flow=above.flow or THEORY)
     if not tolerance:
         return (), ASKED
     # the levels approximate DEM in a held, solved flow
@@ -166,7 +164,7 @@ def _good_enough(
     offered = []
     for part, bound in zip(taken, above[:2], strict=True):
         start = part.index(bound) + 1 if bound in part else 0
-        offered.append([level for level in part[start:] if level.same_model])
+        offered.append([level for level in part[start:] if level.is_offered])
     if classes[0] == (levels.LEVEL_BED,):
         offered[0] = [levels.FLAT]
     pairs = (Pair(*pair) for pair in itertools.product(*offered))
@@ -185,11 +183,9 @@ def _good_enough(
         why = "cheapest whose error is below the uncertainty of the reference: none is"
     kept: list[Pair] = []
     for pair in within:
-        cost, at_nodes = known[pair], "flow.nodes" in pair.flow.sets
+        cost = known[pair]
         if not any(
-            known[other].flow_s <= cost.flow_s
-            and known[other].grains_s <= cost.grains_s
-            and (known[other].flow_s == 0 or ("flow.nodes" in other.flow.sets) == at_nodes)
+            known[other].flow_s <= cost.flow_s and known[other].grains_s <= cost.grains_s
             for other in kept
         ):
             kept.append(pair)

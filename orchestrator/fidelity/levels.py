@@ -62,8 +62,9 @@ class Level:
 
     `on_poured` are those that it sets to something else on a poured bed, `derived` names the one
     that follows from the scene ("threshold_speed", "paper_stiffness", "strip_width"). A level that
-    is not of the reference's model is measured and never chosen; the ladder measures an expensive
-    one on piles of at most `most_grains` exposed grains. Packings `not_on` it cannot answer.
+    is not of the reference's model, or not `offered`, is measured and never chosen; the ladder
+    measures an expensive one on piles of at most `most_grains` exposed grains. Packings `not_on` it
+    cannot answer.
     """
 
     name: str
@@ -72,20 +73,24 @@ class Level:
     on_poured: Fields = field(default_factory=dict)
     derived: str = ""
     same_model: bool = True
+    offered: bool = True
     most_grains: float = math.inf
     not_on: Sequence[str] = ()
+
+    @property
+    def is_offered(self) -> bool:
+        """Whether a choice may take it."""
+        return self.offered and self.same_model
 
     def takes(self, scene: Scene) -> bool:
         """Whether the level can answer a pile.
 
-        The linear theories know boundary layers over beds without obstacles; that of a hill needs a
-        form that falls on both sides.
+        Linear theory knows boundary layers over beds without obstacles.
         """
-        bed, model = scene.bed, self.sets.get("flow.model")
+        bed = scene.bed
         assert isinstance(bed, PileBed)
-        if model in ("hill", "waves") and (scene.flow.top != "boundary layer" or bed.obstacles):
-            return False
-        if model == "hill" and (bed.profile or bed.shape.startswith("step")):
+        beyond_theory = scene.flow.top != "boundary layer" or bool(bed.obstacles)
+        if self.sets.get("flow.model") == "waves" and beyond_theory:
             return False
         return packing(scene) not in self.not_on
 
@@ -111,8 +116,6 @@ class Level:
         """The fields that it sets in a scene."""
         fields, bed = {**self.sets, **(self.on_poured if scene.is_poured else {})}, scene.bed
         assert isinstance(bed, PileBed)
-        if fields.get("flow.model") == "solve":
-            fields = {"flow.nodes": False, **fields}
         if self.derived == "threshold_speed":
             ustar = float(closed_form(scene).friction_velocity)
             speed = ustar / KARMAN * math.log1p(10 * bed.height / bed.roughness)

@@ -16,7 +16,7 @@ from orchestrator.errors import InputError
 from orchestrator.fidelity.decision import along_if_long
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import FlowModel
-from orchestrator.flow.theory import half_length, seen_by_the_flow
+from orchestrator.flow.theory import seen_by_the_flow
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
@@ -160,9 +160,6 @@ def _theory(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if slope > PILE_SLOPES_DEG[1] + 1e-6:
         what = f"a bed that rises by {slope:.3g} deg at x = {seen.x[at]:.4g} m is no low one"
         yield Limit("slope", "flow.model", what, 'choose "solve"')
-    if scene.flow.model == "hill" and half_length(line) is None:
-        what = "the bed does not fall to half of its height before and behind its top"
-        yield Limit("slope", "flow.model", what, 'choose "waves" or "solve"')
 
 
 def _solve(scene: Scene, bed: PileBed) -> Iterator[Limit]:

@@ -4,35 +4,26 @@ The stress on a bed z = f(x) is, mode by mode of its Fourier transform, ::
 
     tau/tau_0 = 1 + A H(x) + B f'(x),    H(x) = 1/pi p.v. int f'(x')/(x - x') dx'
 
-Two theories give A and B. `hill` is that of Jackson and Hunt (1975) as Hunt, Leibovich and Richards
-(1988) completed it and Kroy, Sauermann and Herrmann (2002) reduced it for dunes: one A and one B
-for the whole bed, of the half length L at half height of its highest form over z0. With
-Lambda = ln(l/z0) of the inner layer, l ln(l/z0) = 2 kappa^2 L, the middle layer
-h_m = L/sqrt(ln(L/z0)), and Euler's gamma ::
-
-    b = 1 + Lambda + 2 ln(pi/2) + 4 gamma
-    A = 2 b ln(h_m/z0)^2/Lambda^3,    B = A pi/b
-
-`waves` takes the A0 and B0 of Fourriere, Claudin and Andreotti (J. Fluid Mech. 649, 2010) for the
-wavelength lambda of each mode, by the rational fit of a public dune code in ln(lambda/z0).
+The flow model `waves` takes the A0 and B0 of Fourriere, Claudin and Andreotti (J. Fluid Mech. 649,
+2010) for the wavelength lambda of each mode, by the rational fit of a public dune code in
+ln(lambda/z0).
 
 The bed that the flow sees has separation streamlines where it falls too steeply or bends too
 sharply: cubics that leave it smoothly, land on it level and fall by 14 degrees at most. Under them
-the stress is zero (`LASTS` says from where). So is it where a theory gives less than nothing, at
-the toe of steep faces. docs/flow.md has what either is worth against the solved flow.
+the stress is zero (`LASTS` says from where). So is it where the theory gives a negative stress, at
+the toe of steep faces. docs/flow.md compares the theory with the solved flow.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from math import ceil, log, pi, sqrt
+from math import ceil, pi
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine
 from orchestrator.flow.stress import WallStress
-from orchestrator.physics.constants import KARMAN
 from orchestrator.types import FloatArray
 
 FACES = 100  # faces of the bed, per h
@@ -51,32 +42,22 @@ def flat(line: BedLine) -> WallStress:
 
 
 @cache
-def hill(line: BedLine, roughness_m: float) -> WallStress:
-    """The stress by the theory of one hill, averaged over each face.
-
-    The line (m) falls to half of its height before and behind its top; z0 is in m.
-    """
-    length = half_length(line)
-    assert length is not None, "fidelity/limits.py refuses such a bed"
-    strength, asymmetry = of_hill(length / roughness_m)
-    return _stress(line, lambda _: (strength, strength * asymmetry))
-
-
-@cache
 def waves(line: BedLine, roughness_m: float) -> WallStress:
-    """The stress on a line (m) by the theory of each wavelength, averaged over each face."""
+    """The stress on a bed by the theory of each wavelength, averaged over each face.
+
+    Parameters
+    ----------
+    line
+        The bed line, m.
+    roughness_m
+        The roughness length z0, m.
+
+    Returns
+    -------
+    WallStress
+        The stress over the undisturbed one, on faces of h/100.
+    """
     return _stress(line, lambda wavelength: of_wavelength(wavelength / roughness_m))
-
-
-def of_hill(length_over_roughness: float) -> tuple[float, float]:
-    """A and B/A for a hill's half length L over z0."""
-    inner = asked = 2 * KARMAN**2 * length_over_roughness
-    for _ in range(40):  # Newton's iteration for l ln(l/z0) = 2 kappa^2 L
-        inner = (inner + asked) / (1 + log(inner))
-    depth = log(inner)
-    middle = log(length_over_roughness / sqrt(log(length_over_roughness)))
-    b = 1 + depth + 2 * log(pi / 2) + 4 * np.euler_gamma
-    return 2 * b * middle**2 / depth**3, pi / b
 
 
 def of_wavelength(wavelength_over_roughness: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -143,23 +124,6 @@ def _streamline(
     t = (x[behind] - start) / length
     fall, rise = top - z[lands], slope * length
     return behind, z[lands] + (1 - t) ** 2 * (fall * (1 + 2 * t) + rise * t)
-
-
-def half_length(line: BedLine) -> float | None:
-    """Half of the length of the highest form at half of its height, m, up to where the flow lands.
-
-    None where the bed does not fall that far before and behind its top.
-    """
-    seen, crest = seen_by_the_flow(line), line.crest
-    half = (float(crest[1]) + min(line.z)) / 2
-    top = int(np.searchsorted(seen.x, crest[0] - line.h / CELLS / 2))
-    below = seen.z <= half
-    if half >= crest[1] or not below[:top].any() or not below[top:].any():
-        return None
-    before, behind = top - 1 - int(np.argmax(below[:top][::-1])), top + int(np.argmax(below[top:]))
-    up = np.interp(half, seen.z[before : before + 2], seen.x[before : before + 2])
-    down = np.interp(-half, -seen.z[behind - 1 : behind + 1], seen.x[behind - 1 : behind + 1])
-    return float(down - up) / 2
 
 
 Coefficients = Callable[[FloatArray], tuple[FloatArray | float, FloatArray | float]]

@@ -106,7 +106,7 @@ class Geometry:
 
     @property
     def flow(self) -> FlowCase:
-        """The run of the flow, of a scene whose flow is solved; of nodes that of the nearest."""
+        """The run of the flow, of a scene whose flow is solved."""
         return self.model.cases[0]
 
     @cached_property

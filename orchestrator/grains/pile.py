@@ -594,9 +594,8 @@ class Pile(Geometry):
 
     @property
     def solves(self) -> "dict[str, Pile]":
-        """By the name of each solved flow over the whole bed, the pile under that flow alone."""
-        solves = zip(self.model.cases, self.model.solves, strict=True)
-        return {run.name: Pile(scene, self.cases) for run, scene in solves}
+        """The pile by the name of the solved flow over the whole bed, if its flow is solved."""
+        return {run.name: self for run in self.model.cases}
 
     def stress(self, cases: Path) -> WallStress:
         """The stress along the whole bed; `cases` is the directory of the finished runs."""

@@ -265,13 +265,10 @@ class Gusts(Part):
 class Flow(Part):
     """The flow over the bed, and how a grain feels it."""
 
-    model: Literal["solve", "waves", "hill", "flat"] = _answer(
-        "solve", "", "", "flow_model", "flow model"
-    )
+    model: Literal["solve", "waves", "flat"] = _answer("solve", "", "", "flow_model", "flow model")
     """where the stress on a pile comes from
     - solve: OpenFOAM
     - waves: linear theory with A and B of each wavelength (Fourrière et al. 2010)
-    - hill: linear theory with A and B of one low hill (Kroy et al. 2002)
     - flat: log law of a flat bed, u* = u*₀"""
     speed: float = _solved(
         10.0, "U_e", "m/s", "solve_u_e_m_s", "speed of the solve", ge=1e-6, le=1e3
@@ -297,8 +294,6 @@ class Flow(Part):
     )
     """roughness length at which the flow is solved, which similar beds can share; by default the
     bed's"""
-    nodes: bool = _solved(False, label="nodes of z₀", since=True)
-    """whether the flow is interpolated in ln z₀ between solves that beds of one form share"""
     turbulence_model: Turbulence = _solved("kEpsilon")
     """OpenFOAM's turbulence model
     - kEpsilon: k-ε

@@ -162,12 +162,12 @@ class Scene(parts.Part):
         shallow = depth < LEAST_DEPTH * max([height, *(each.height for each in bed.obstacles)])
         what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
         yield shallow, "flow.depth" if is_open else "flow.lid", what, "raise it"
-        topped = is_open and flow.model not in ("solve", "flat")
-        yield topped, "flow.model", "the theories have no top", 'choose "solve" or "flat"'
+        topped = is_open and flow.model == "waves"
+        yield topped, "flow.model", "linear theory has no top", 'choose "solve" or "flat"'
         coarse = solved and cell > height / 4
         yield coarse, "flow.first_cell_height", "above a quarter of the pile", "lower it"
-        frozen = flow.nodes or not solved or self.protocol.method in CLOSED
-        what = 'it needs a flow that is solved, without nodes, and the method "dem"'
+        frozen = not solved or self.protocol.method in CLOSED
+        what = 'it needs a flow that is solved and the method "dem"'
         yield update and frozen, "protocol.update", what, OUT
         coarse, what = bool(update) and cell > self.grain.diameter, "higher than a grain"
         yield coarse, "flow.first_cell_height", f"{what}, with protocol.update", "lower it"

@@ -30,6 +30,20 @@ from orchestrator.study.shapes import SHAPES
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
 MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
+GONE_KEYS = {
+    "flow.nodes": (
+        "flows are no longer interpolated between roughness lengths",
+        "leave it out; beds that are alike share a flow with one flow.roughness, in m",
+    ),
+}
+"""Keys that study files had before: what became of them, and what to write now."""
+GONE_VALUES = {
+    ("flow.model", "hill"): (
+        "the linear theory of one low hill is gone",
+        'write "waves", the linear theory of each wavelength, or "solve"',
+    ),
+}
+"""Values that keys of study files had before: what became of them, and what to write now."""
 Table = dict[str, Any]
 Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
@@ -242,12 +256,19 @@ def _explained(error: ValidationError, where: str) -> InputError:
         where, path, keys = f"{where}: group {int(path[1]) + 1}", path[2:], [*_Group.model_fields]
     branch = path.pop(1) if path[0] == "bed" and path[1:] else ""
     path = [step for step in path if step not in ("", "rows")]
-    place, key = f"{where}: {'.'.join(map(str, path))}", str(path[-1])
+    name, key = ".".join(map(str, path)), str(path[-1])
+    place, value = f"{where}: {name}", first.get("input")
+    if name in GONE_KEYS:
+        what, remedy = GONE_KEYS[name]
+        return InputError(what, place, remedy)
+    if isinstance(value, str) and (name, value) in GONE_VALUES:
+        what, remedy = GONE_VALUES[name, value]
+        return InputError(f"{value!r}: {what}", place, remedy)
     if first["type"] == "missing":
         return InputError("is missing", place, "add it to the file")
     if first["type"] != "extra_forbidden":
         remedy = first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
-        return InputError(f"{first.get('input')!r} is not accepted", place, remedy)
+        return InputError(f"{value!r} is not accepted", place, remedy)
     if branch == "grain" and key in PileBed.model_fields:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
     here = str(path[0]) if path[1:] else ""

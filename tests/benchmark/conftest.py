@@ -34,7 +34,7 @@ bed = {{ slope_deg = 10.0 }}
 THEORY = f"""{PROTOCOL}
 final_fraction = 0.8
 [flow]
-model = "hill"
+model = "waves"
 [grain]
 diameter = 5e-4
 stiffness = 1e3
@@ -48,7 +48,7 @@ bed = {{ kind = "pile", height = 0.005, slope_deg = 20.0, roughness = "d/30", %s
 POURED = f"""
 fluid = {{ density = 1000.0, viscosity = 1e-6 }}
 grain = {{ diameter = 1e-3, density = 2650.0, sizes = {{ sigma_g = 1.3 }}, stiffness = 1e3 }}
-flow.model = "hill"
+flow.model = "waves"
 [bed]
 kind = "pile"
 shape = "gaussian"

@@ -20,7 +20,7 @@ reference = { "protocol.method" = "peeling" }
 bed = { kind = "pile", slope_deg = 20.0, roughness = "d/30" }
 grain = { diameter = 1e-3, stiffness = 1e3 }
 protocol = { load_increment = 0.05, waiting_time = 6.0, final_fraction = 0.75 }
-flow = { model = "hill" }
+flow = { model = "waves" }
 forces = { law = "high" }
 """
 

@@ -37,7 +37,7 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
     known = {
         pair: levels.known(pair, scene)
         for pair in pairs
-        if all(one.same_model and one.takes(scene) for one in pair)
+        if all(one.is_offered and one.takes(scene) for one in pair)
     }
     assert chosen.levels in known
     assert chosen.error_estimate == chosen.known.total == known[chosen.levels].total
@@ -56,11 +56,10 @@ def test_the_choice_is_within_the_tolerance_or_says_that_none_is(
 def test_a_flow_that_many_piles_share_counts_once(
     pile: MakePile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By DEM a pile is dear; by pivots on the best flow it needs that flow, or its nodes."""
+    """By DEM a pile is dear; by pivots on the best flow it needs that flow."""
     errors_and_times = {
         ("flow", "coarse", "wall"): (0.04, 1.0),
         ("flow", "fine", "wall"): (0.0, 5.0),
-        ("flow", "fine at nodes", "wall"): (0.0, 20.0),
         ("grains", "1 layer, slow", "aligned"): (0.0, 9.0),
         ("grains", "pivot", "aligned"): (0.04, 0.01),
     }
@@ -72,7 +71,7 @@ def test_a_flow_that_many_piles_share_counts_once(
     small = [pile({"grain.diameter": 2e-3})]
     for asked, text in (
         (scenes[:1], "fine | pivot"),
-        (scenes, "fine at nodes | pivot"),
+        (scenes, "fine | pivot"),
         (small, "coarse | 1 layer, slow"),
     ):
         chosen = decision.decide(asked, 0.05).values()
@@ -84,7 +83,7 @@ def test_a_flow_that_many_piles_share_counts_once(
     [
         ({"protocol.waiting_time": 1.0}, "ramp"),
         ({"protocol.method": "peeling"}, "peeling"),
-        ({"flow.model": "hill"}, "hill"),
+        ({"flow.model": "waves"}, "waves"),
         ({"protocol.update": 0.1, "flow.first_cell_height": 5e-4}, "changes"),
         ({"bed.packing": "disordered", "bed.disorder": 0.2}, "no error is known"),
         ({"forces.averaging_length": 10.0}, "averaging_length = 10"),

@@ -54,7 +54,7 @@ def test_what_a_track_counts_as(
 LIFT_OFF = """
 fluid = { density = 1.0, viscosity = 1e-5 }
 grain = { diameter = 5e-4, density = 2500.0, stiffness = 1e3 }
-flow = { model = "hill" }
+flow = { model = "waves" }
 forces = { law = "low" }
 bed = { kind = "pile", height = 0.005, slope_deg = 20.0, mobile_layers = 1, roughness = "d/30" }
 [protocol]
