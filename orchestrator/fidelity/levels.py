@@ -285,6 +285,8 @@ def unmeasured(scene: Scene) -> str:
     """The property of a pile for which no level was measured, in words; empty if there is none."""
     if (lift := _lift(scene)) > LIFTED_TO:
         return f"a lift of {lift:.3g} times the weight normal to the bed"
+    if scene.flow.gusts:
+        return f"flow.gusts = {scene.flow.gusts}"
     solved, roughness = scene.flow.model == "solve", scene.flow.roughness
     for name, default in DEFAULTS.items():
         value = value_of(scene, name)

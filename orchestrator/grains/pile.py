@@ -27,7 +27,7 @@ from orchestrator.grains.cells import GrainCase
 from orchestrator.grains.loads import Geometry, Loads
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.threshold import PileThreshold, of_grains, of_pile
-from orchestrator.physics.gusts import gust_stresses, peak_over_mean
+from orchestrator.physics.gusts import gust_stresses
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.parts import Gusts
@@ -54,6 +54,7 @@ coincide make cells that are far too short."""
 AROUND = 1000.0  # length of bed that is packed around the place where motion starts, d
 LEVEL = 1e-6  # a bed that is less above the flat bed lies on it, d
 FAR = 1e9
+STRONGER = 2.0  # stress over the mean at which forces are compared where no gust exceeds the mean
 
 
 @dataclass(frozen=True)
@@ -265,7 +266,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 13
+    recipe: ClassVar[int] = 14
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
 
     @cached_property
@@ -354,8 +355,7 @@ class PileCase(GrainCase):
         }
         force, gusts = loads.loading.at(rising), deck.STEADY
         if scene.flow.gusts:
-            mean = loads.loading.at(rising / np.sqrt(scene.gust))
-            gusts = in_time(scene.flow.gusts, force[1:], mean[1:], geometry.bed.seed)
+            gusts = in_time(scene.flow.gusts, loads, rising[1:])
         deck.write(directory, grains, numbers, rising, force, MARGIN * d, self.ranks, gusts)
 
     def collect(self, directory: Path) -> None:
@@ -422,18 +422,30 @@ def flows(loads: Loads) -> FloatArray:
     return deck.flows(deck.START * first, beyond * last, rules.load_increment)
 
 
-def in_time(gusts: Gusts, peak: FloatArray, mean: FloatArray, seed: int) -> FloatArray:
+def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
     """Force in each event and after the last over that of the largest, for `deck.write`.
 
-    `peak` and `mean` are the forces under that and under the mean stress in each load step, N,
-    shape (steps, n, 2). Between them the force is a power of the stress.
+    `rising` are the flows (u*_0, m/s) of the load steps; the forces of `loads` are those under the
+    largest stress. The force is a power of the stress, which is found between the mean and the
+    largest stress. Where no event exceeds the mean, it is found above the mean.
     """
-    stress = gust_stresses(gusts.intensity, gusts.events, len(peak), seed)
-    over = peak_over_mean(gusts.intensity, gusts.events)
-    ratio = np.abs(peak).sum(axis=(1, 2)) / np.abs(mean).sum(axis=(1, 2))
-    power = np.log(ratio)[:, None] / np.log(over)
-    each = (np.pad(stress, ((0, 0), (0, 1)), constant_values=1.0) / over) ** power
-    return np.concatenate([over ** -power[0], each.ravel()])
+    peak = loads.geometry.scene.gust
+    force, mean = _size(loads, rising), _size(loads, rising / np.sqrt(peak))
+    if peak > 1:
+        power = np.log(force / mean) / np.log(peak)
+    else:
+        stronger = _size(loads, rising * np.sqrt(STRONGER))
+        power = np.log(stronger / mean) / np.log(STRONGER)
+    stress = gust_stresses(gusts.intensity, gusts.events, len(rising), loads.geometry.bed.seed)
+    with_mean = np.pad(stress, ((0, 0), (0, 1)), constant_values=1.0)
+    each = (with_mean / peak) ** power[:, None]
+    settling = peak ** -power[0]
+    return np.concatenate([[settling], each.ravel()])
+
+
+def _size(loads: Loads, flows: FloatArray) -> FloatArray:
+    """Sum of the components' sizes of the forces on all grains at some flows, N, (flows,)."""
+    return np.asarray(np.abs(loads.loading.at(flows)).sum(axis=(1, 2)))
 
 
 def _first(thresholds: FloatArray, geometry: Geometry) -> float:

@@ -9,12 +9,15 @@ from orchestrator.types import FloatArray
 
 
 def peak_over_mean(intensity: float, events: float) -> float:
-    """The stress that is exceeded once in n independent events, over the mean stress.
+    """The largest stress of n independent events and of the mean flow, over the mean stress.
 
     Stresses on a wall under turbulence are close to log-normal: with an intensity I (standard
     deviation over mean) of 0.4 the distribution has a skewness of 1.3, measured is 1. With
-    ``sigma^2 = ln(1 + I^2)`` the quantile 1 - 1/n is ``exp(sigma z - sigma^2/2)``, z that of the
-    normal distribution.
+    ``sigma^2 = ln(1 + I^2)`` the stress that is exceeded once in n events, the characteristic
+    largest value of E. J. Gumbel, Statistics of Extremes, 1958, is the quantile 1 - 1/n,
+    ``exp(sigma z - sigma^2/2)``, z that of the normal distribution. The median of the distribution
+    is below its mean, and so is this quantile of few events. The mean stress acts as well, after
+    the events and between them: the result is at least 1.
 
     Parameters
     ----------
@@ -23,17 +26,25 @@ def peak_over_mean(intensity: float, events: float) -> float:
         doi:10.1063/1.866783).
     events
         How many there are while the bed is watched; 1 is no gust.
+
+    Returns
+    -------
+    float
+        The stress over the mean stress, at least 1.
     """
     if events <= 1:
         return 1.0
     variance = log1p(intensity**2)
-    return exp(sqrt(variance) * NormalDist().inv_cdf(1 - 1 / events) - variance / 2)
+    normal = NormalDist().inv_cdf(1 - 1 / events)
+    quantile = exp(sqrt(variance) * normal - variance / 2)
+    return max(quantile, 1.0)
 
 
 def gust_stresses(intensity: float, events: int, load_steps: int, seed: int) -> FloatArray:
     """Stress of each event over the mean, in random order for each load step, (steps, events).
 
-    They are evenly spread over the log-normal distribution up to `peak_over_mean`.
+    They are evenly spread over the log-normal distribution up to its quantile 1 - 1/n, which is
+    `peak_over_mean` where that is above 1.
     """
     parts = np.linspace(1 / events, 1 - 1 / events, events).tolist()
     variance, normal = log1p(intensity**2), NormalDist()
