@@ -81,10 +81,9 @@ class FlowCase(Case):
         *results,
         *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
         "[1-9]*/uniform/functionObjects/functionObjectProperties",
-        "postProcessing/wallShearStress/*/wallShearStress.dat",
     )
     needs_bulky: ClassVar[bool] = True
-    made: ClassVar[tuple[str, ...]] = ("log.simpleFoam",)
+    made: ClassVar[tuple[str, ...]] = ("log.simpleFoam", "log.wallShearStress")
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -130,12 +130,19 @@ class SolvedFlow:
         fields = ([np.interp(up, old[:, 0], c) for c in old[:, 1:].T] for up, old in pairs)
         return np.concatenate([np.column_stack(each) for each in fields])
 
+    @property
+    def last_iteration(self) -> Path:
+        """The directory with the fields of the last iteration, of those that were written."""
+        names = (path.name for path in self.directory.glob("[1-9]*") if path.is_dir())
+        iterations = [int(name) for name in names if name.isdecimal()]
+        if not iterations:
+            raise SolverError("no results", str(self.directory), "run ./Allrun there")
+        return self.directory / str(max(iterations))
+
     def field(self, name: str, patch: str = "") -> FloatArray:
         """Values of a field in the cells, or on the faces of a patch, shape (n, components)."""
-        path = next(self.directory.glob(f"[1-9]*/{name}"), None)
-        if path is None:
-            raise SolverError("no results", str(self.directory), "run ./Allrun there")
-        return read_list(path, f"\n    {patch}\n" if patch else "internalField   nonuniform")
+        after = f"\n    {patch}\n" if patch else "internalField   nonuniform"
+        return read_list(self.last_iteration / name, after)
 
     @cached_property
     def mesh(self) -> tuple[FloatArray, IntArray, FloatArray]:

@@ -1,1 +1,1 @@
-"""The physics: force laws, one grain's threshold, curves and measurements."""
+"""Forces on a grain, thresholds in closed form, published curves: no scenes, no files."""
