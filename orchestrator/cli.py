@@ -117,20 +117,23 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _study(options: Namespace) -> int:
-    """Run a study, or an experiment: all but the maps of stability are on the scenes of a study."""
-    name, workers, is_study = options.command, options.workers, options.command == "study"
+    """Run a study, or an experiment: but for the maps of stability, on scenes of a study."""
+    is_study = options.command == "study"
     if is_study and not options.plan:
-        from orchestrator.runs import workspace
-
-        if answer := workspace.finished(options.source, options.out, options.tolerance):
+        answered = finished(options)
+        if answered:
             print("every case was done already; no solver was started", file=sys.stderr)
-            print(*answer, sep="\n")
+            print(*answered, sep="\n")
             return 0
     from orchestrator import pipeline, plan
     from orchestrator.study.study import load
 
-    studies = [load(options.source, options.tolerance)] if "source" in options else []
-    out = options.out or Path("results") / (studies[0].name if is_study else name)
+    workers = options.workers
+    studies = []
+    if "source" in options:
+        studies = [load(options.source, options.tolerance)]
+    name = studies[0].name if is_study else options.command
+    out = options.out or Path("results") / name
     cases = out.absolute() / "cases"
     if is_study:
         (study,) = studies
@@ -139,11 +142,30 @@ def _study(options: Namespace) -> int:
             return 0
         queue = Queue(options.cluster, study.cluster) if options.cluster else None
         return _end(pipeline.run(study, out, workers=workers, queue=queue))
-    experiment = import_module(f"orchestrator.experiments.{name}").experiment(*studies, out)
+    module = import_module(f"orchestrator.experiments.{options.command}")
+    experiment = module.experiment(*studies, out)
     if options.plan:
         print(*plan.expected(experiment.planned, cases, workers), sep="\n")
         return 0
     return _end(experiment.run(out, workers=workers))
+
+
+def finished(options: Namespace) -> tuple[str, Path] | None:
+    """The answer and the page of a study that was finished before; None if it is not.
+
+    No study is read: the bytes of its files are compared with those that it was made from.
+    """
+    from orchestrator.runs import workspace
+    from orchestrator.study.source import Source, digests_now, find
+
+    file = find(options.source).absolute()
+    root = (options.out or Path("results") / file.stem).absolute()
+    try:
+        digests = digests_now(file.parent, workspace.files_of(root))
+    except OSError:
+        return None
+    now = Source(str(file), digests, options.tolerance)
+    return workspace.finished(root, file.stem, now.described(root))
 
 
 def _other(options: Namespace) -> int:

@@ -1,6 +1,5 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
-import os
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,6 +16,7 @@ from orchestrator.runs.case import Case
 from orchestrator.runs.cluster import Queue
 from orchestrator.runs.files import text_of
 from orchestrator.runs.workspace import STATE, STUDY, Workspace, claimed, read_marker
+from orchestrator.study.profile import Files
 from orchestrator.study.study import Study, parse
 
 Failures = Mapping[str, OrchestratorError]
@@ -71,16 +71,22 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
     """Write into the directory what is asked for; whether it is something else than before."""
     about = {"study": study.text, "tolerance": study.tolerance}
-    before = read_marker(space.root, STUDY) or {}
+    before = read_marker(space.root, STUDY)
     changed = any(before.get(key, value) != value for key, value in about.items())
-    # relative: a copy of file and directory together is a study of its own
-    file = os.path.relpath(study.file, space.root) if study.file else ""
-    other = str(before.get("file", ""))
-    if changed and other not in ("", file) and (space.root / other).is_file():
+    source = study.source.described(space.root) if study.source else {}
+    other = _file_of(before)
+    is_other = other not in ("", source.get("file", ""))
+    if changed and is_other and (space.root / other).is_file():
         what = f"the directory holds the study of another file, {other}"
         raise InputError(what, str(space.root), "choose another with --out")
-    space.describe(STUDY, study.name, list(planned.cases), **about, file=file)
+    space.describe(STUDY, study.name, list(planned.cases), **about, source=source)
     return changed
+
+
+def _file_of(about: Mapping[str, Any]) -> str:
+    """The study file that a directory was made for, by its description; empty for none."""
+    source = about.get("source")
+    return str(source.get("file", "")) if isinstance(source, dict) else ""
 
 
 def complete(
@@ -105,7 +111,9 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     if "study" not in about:
         what, remedy = f"this is the experiment {about['name']}", "its own command draws it again"
         raise InputError(what, str(space.root), remedy)
-    study = parse(about["study"], name=about["name"], where=str(space.root))
+    # its text has those of the files that it names
+    files = Files(None)
+    study = parse(about["study"], name=about["name"], where=str(space.root), files=files)
     study = replace(study, tolerance=about.get("tolerance"))
     return study, plan.settled(study, space.cases)
 

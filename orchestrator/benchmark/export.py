@@ -21,6 +21,7 @@ from orchestrator.runs import case, engine, process
 from orchestrator.runs.workspace import Workspace
 from orchestrator.solvers import liggghts
 from orchestrator.study import fields, study
+from orchestrator.study.profile import Files
 from orchestrator.study.study import Group, Study
 from orchestrator.tables import Tables
 
@@ -168,17 +169,17 @@ def _with_ours(check: Problem) -> Problem:
 class Ours:
     """The solvers of this package on the scenes named of a pack, in a directory of cases.
 
-    Raises InputError if the study of the pack names a file, or lacks one of the scenes.
+    Raises InputError if the study of the pack lacks the text of a file that it names, or one of
+    the scenes.
     """
 
     def __init__(self, chosen: Pack, names: Sequence[str], root: Path) -> None:
         path = chosen.root / STUDY
         text = path.read_text(encoding="utf-8", errors="replace")
         self.pack, self.root = chosen, root
-        self.study = study.parse(text, name="benchmark", where=str(path))
-        if self.study.text != text:
-            what = "its study names a file; a pack has the text of each in [profiles]"
-            raise InputError(what, where=str(path), remedy="export the pack again")
+        # a pack has the texts of the files that its study names
+        files = Files(None)
+        self.study = study.parse(text, name="benchmark", where=str(path), files=files)
         planned = plan.make(self.study)
         digests = scene_names(planned, self.study)
         piles = planned.piles.values()

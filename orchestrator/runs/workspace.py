@@ -5,7 +5,6 @@ import csv
 import fcntl
 import os
 import socket
-import tomllib
 from collections import Counter
 from collections.abc import Container, Iterator, Mapping
 from functools import cache
@@ -146,7 +145,7 @@ class Workspace(Folder):
         """The answer on the page of these cases; None where it is not finished, or has changed."""
         marker = read_json(self.drawn)
         is_drawn = marker and {**marker, **self.drawn_of(ids)} == marker
-        return str(marker["answer"]) if is_drawn and self.is_whole() else None
+        return str(marker.get("answer", "")) if is_drawn and self.is_whole() else None
 
     def left(self, asked: Container[str]) -> tuple[str, ...]:
         """The cases that are there without being asked for: an earlier study file did."""
@@ -166,42 +165,58 @@ class Workspace(Folder):
 
 @cache
 def _code_digest() -> str:
-    """Digest of the names, sizes and times of change of all files of package and templates."""
-    roots = (case_states.PACKAGE, case_states.templates())
-    folders = (each for root in roots for each in os.walk(root))
-    paths = sorted(Path(place, name) for place, _, names in folders for name in names)
-    states = {str(path): path.stat() for path in paths if path.suffix != ".pyc"}
-    stamps = [(name, state.st_size, state.st_mtime_ns) for name, state in states.items()]
-    return digest_text(canonical_json(stamps))
+    """Digest of the content of all files of the package and of the templates, with names."""
+    digests = {}
+    for root in (case_states.PACKAGE, case_states.templates()):
+        for folder, _, names in os.walk(root):
+            for path in (Path(folder, name) for name in names if not name.endswith(".pyc")):
+                digests[f"{root.name}/{path.relative_to(root)}"] = files.digest_file(path)
+    return digest_text(canonical_json(digests))
 
 
-def finished(source: str, out: Path | None, tolerance: float | None) -> tuple[str, Path] | None:
-    """The answer and the page of a study file, or preset, that is finished and has not changed.
+def files_of(root: Path) -> list[str]:
+    """Names of the files that the study in a directory was made from; empty if unknown."""
+    source = read_json(root / STUDY.marker).get("source")
+    digests = source.get("sha256") if isinstance(source, dict) else None
+    return [*digests] if isinstance(digests, dict) else []
 
-    None where its file, its profiles, the tolerance, a case, a table, a figure or this package may
-    have changed. The scenes are not made, so no library of numbers is imported.
+
+def finished(root: Path, name: str, source: Mapping[str, object]) -> tuple[str, Path] | None:
+    """The answer and the page of a study that is finished and has not changed.
+
+    The study file is not read as a study, so no library of numbers is imported: it is told
+    from the bytes that the study in the directory was made from.
+
+    Parameters
+    ----------
+    root
+        The directory of the study.
+    name
+        Its name.
+    source
+        What is asked for: `study.source.Source.described` of the files as they are now.
+
+    Returns
+    -------
+    None where the source is another one, or a case, a table, a figure or this package may
+    have changed since.
     """
-    brought = {path.stem: path for path in case_states.PACKAGE.glob("*/presets/*.toml")}
-    file = brought.get(source, Path(source)).absolute()
-    space = Workspace((out or Path("results", file.stem)).absolute())
-    about, marker = read_json(space.root / STUDY.marker), read_json(space.drawn)
-    try:
-        study, ids = about["study"], marker["cases"]
-        text = file.read_bytes().decode("utf-8-sig")
-        profiles = tomllib.loads(study.removeprefix(text)).get("profiles", {})
-        texts = {name: (file.parent / name).read_bytes().decode("utf-8-sig") for name in profiles}
-        if tolerance is None:
-            tolerance = tomllib.loads(text).get("tolerance")
-        asked = (text, texts, tolerance, os.path.relpath(file, space.root), {*ids})
-        was = (study[: len(text)], profiles, about["tolerance"], about["file"], {*about["cases"]})
-        _check(space, STUDY, file.stem)
-        if asked != was or space.is_held() or (answer := space.answer(ids)) is None:
-            return None
-        if not all(case_states.marker_of(space.cases / name, id_) for name, id_ in ids.items()):
-            return None
-        return answer, space.page
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, OrchestratorError):
+    space = Workspace(root)
+    about = read_json(root / STUDY.marker)
+    ids = read_json(space.drawn).get("cases")
+    if about.get("source") != source or not isinstance(ids, dict):
         return None
+    try:
+        _check(space, STUDY, name)
+        answer = None if space.is_held() else space.answer(ids)
+    except (OSError, OrchestratorError):
+        return None
+    if answer is None:
+        return None
+    for case, id_ in ids.items():
+        if not case_states.marker_of(space.cases / case, id_):
+            return None
+    return answer, space.page
 
 
 def status(directory: Path) -> tuple[str, bool]:

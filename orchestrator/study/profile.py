@@ -3,8 +3,10 @@
 import csv
 import io
 import json
+import os
 from dataclasses import dataclass, field
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -39,61 +41,135 @@ class Profile:
 
 @dataclass
 class Files:
-    """The profiles and sieve tables of a study; a bad one is refused with an `InputError`."""
+    """The files that a study names: profiles and sieve tables.
 
-    folder: Path  # of the study file
-    texts: dict[str, str]  # of each file by its name, at first the study's own table `profiles`
-    added: str = ""  # TOML with the texts of files: with it a study's text is whole without them
+    Attributes
+    ----------
+    folder
+        Folder of the study file; None for a study that is whole without its files, as a
+        directory of results or a pack keeps it. Then no file is read.
+    carried
+        Texts that the study brings itself, in its table ``[profiles]``, by name.
+    digests
+        SHA-256 of each file that was asked for, by name; None of one that is carried.
+    added
+        TOML with the texts of the files that were read: with it the text of a study is
+        whole without them.
+    """
+
+    folder: Path | None
+    carried: dict[str, str] = field(default_factory=dict)
+    digests: dict[str, str | None] = field(default_factory=dict)
+    added: str = ""
+    _read: dict[str, str] = field(default_factory=dict)
 
     def bed(self, bed: dict[str, Any], where: str) -> dict[str, Any]:
-        """Fields of a bed that names a profile; `where` names the study file in messages."""
+        """Fields of a bed that names a profile.
+
+        Parameters
+        ----------
+        bed
+            The table of the bed; its `profile` is the name of a file.
+        where
+            The study file, for messages.
+
+        Returns
+        -------
+        The profile, and the height (m) and the slope (degrees) that follow from it.
+
+        Raises
+        ------
+        InputError
+            If the file is no bed line, or the table has a field that the profile replaces.
+        """
         where, name = f"{where}: bed.profile", bed["profile"]
-        replaced = ("shape", "height", "slope_deg", *(f for s in SHAPES.values() for f in s.fields))
-        for given in bed.keys() & replaced:
+        of_shapes = (field for shape in SHAPES.values() for field in shape.fields)
+        for given in bed.keys() & {"shape", "height", "slope_deg", *of_shapes}:
             raise InputError(f"it has its own {given}", where, f"leave out bed.{given}")
         smoothing = bed.get("smoothing", 0.0)
         if not isinstance(smoothing, int | float) or not 0 <= smoothing < 1e9:
             smoothing = 0.0  # the declaration of bed.smoothing refuses the value
-        place = f"{where}: {self.folder / name}"
-        profile = read_profile(self._text(name, place), Path(name).name, place, smoothing)
+        place = self._place(name, where)
+        text = self._text(name, where)
+        profile = read_profile(text, Path(name).name, place, smoothing)
         steepest = np.degrees(np.arctan(np.diff(profile.z) / np.diff(profile.x))).max()
-        height, slope = max(profile.z) - min(profile.z), round(max(float(steepest), 0.0), 2)
+        height = max(profile.z) - min(profile.z)
+        slope = round(max(float(steepest), 0.0), 2)
         return {"profile": profile, "height": height, "slope_deg": slope}
 
     def sieve(self, name: str, where: str) -> list[list[float]]:
-        """The rows of a sieve table, diameter (m) and fraction."""
-        place = f"{where}: grain.sizes: {self.folder / name}"
-        return read_columns(self._text(name, place), ("diameter_m", "fraction"), place)[1]
+        """The rows of a sieve table, diameter (m) and fraction of the mass."""
+        where = f"{where}: grain.sizes"
+        place = self._place(name, where)
+        text = self._text(name, where)
+        return read_columns(text, ("diameter_m", "fraction"), place)[1]
+
+    def _place(self, name: str, where: str) -> str:
+        """The path of a file, for messages."""
+        return f"{where}: {name if self.folder is None else self.folder / name}"
 
     def _text(self, name: str, where: str) -> str:
-        if name not in self.texts:
-            self.texts[name] = read_text(self.folder / name, LARGEST, where)
-            head = "" if self.added else "\n[profiles]\n"
-            # a JSON string is a TOML string, but for the mark of deletion
-            text = json.dumps(self.texts[name], ensure_ascii=False).replace("\x7f", "\\u007f")
-            self.added += f"{head}{json.dumps(name)} = {text}\n"
-        return self.texts[name]
+        """The text of a file by its name; `where` is the field that names it."""
+        if name in self._read:
+            return self._read[name]
+        place = self._place(name, where)
+        if name not in self.carried:
+            self._read[name] = self._of_file(name, place)
+            return self._read[name]
+        if self.folder is not None and os.path.lexists(self.folder / name):
+            what = "it is a file, and its text is in the table [profiles] too"
+            raise InputError(what, place, "remove one of the two")
+        self.digests[name] = None
+        self._read[name] = self.carried[name]
+        return self._read[name]
+
+    def _of_file(self, name: str, where: str) -> str:
+        if self.folder is None or self.carried:
+            what = "its text is not in the table [profiles] of the study"
+            raise InputError(what, where, "add it there, or remove the table")
+        content = read_bytes(self.folder / name, LARGEST, where)
+        text = decoded(content, where)
+        self.digests[name] = sha256(content).hexdigest()
+        # a JSON string is a TOML string, but for the mark of deletion
+        string = json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+        if not self.added:
+            self.added = "\n[profiles]\n"
+        self.added += f"{json.dumps(name)} = {string}\n"
+        return text
 
 
-def read_text(path: Path, largest: int, where: str) -> str:
-    """The text of a file of the user; `where` names it in messages.
+def read_bytes(path: Path, largest: int, where: str) -> bytes:
+    """The content of a file of the user; `where` names it in messages.
 
-    An `InputError` refuses one that is missing, no regular file, larger than so many bytes, or no
-    text in UTF-8.
+    An `InputError` refuses one that is missing, no regular file, or larger than so many
+    bytes.
     """
     try:
         with opened(path) as stream:
-            content = stream.read(largest + 1) or b""  # nothing of a file that would wait
-        if len(content) > largest:
-            raise ValueError(f"larger than {largest // 2**20} MiB")
-        text = content.decode("utf-8-sig")  # some editors begin with a mark of the encoding
-        if "\0" in text:
-            raise ValueError("binary, not text")
+            content = stream.read(largest + 1) or b""  # None of a file that would wait
     except (OSError, ValueError) as error:
-        what = f"not a readable text file: {getattr(error, 'strerror', None) or error}"
-        remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
-        raise InputError(what, where, remedy) from None
+        raise _unreadable(error, where) from None
+    if len(content) > largest:
+        raise _unreadable(ValueError(f"larger than {largest // 2**20} MiB"), where)
+    return content
+
+
+def decoded(content: bytes, where: str) -> str:
+    """The text in UTF-8 of a file of the user; an `InputError` refuses any other."""
+    try:
+        # some editors begin with a mark of the encoding
+        text = content.decode("utf-8-sig")
+    except ValueError as error:
+        raise _unreadable(error, where) from None
+    if "\0" in text:
+        raise _unreadable(ValueError("binary, not text"), where)
     return text
+
+
+def _unreadable(error: Exception, where: str) -> InputError:
+    why = getattr(error, "strerror", None) or error
+    remedy = "it is a text in UTF-8; a path in a study file is relative to that file"
+    return InputError(f"not a readable text file: {why}", where, remedy)
 
 
 def read_columns(

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,9 +24,10 @@ from orchestrator.physics import fluids
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
-from orchestrator.study.profile import Files, read_text
+from orchestrator.study.profile import Files, decoded, read_bytes
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
+from orchestrator.study.source import Source, find
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
@@ -106,8 +108,13 @@ class Study:
     """Relative error that tau_c may have; 0: every scene as it is asked for; None: not given."""
     cluster: dict[str, Any]  # settings of the queue that runs the cases
     erosion: Erosion  # winds and threshold of `orchestrator erosion`
-    text: str  # the file itself, and the profiles that it names
-    file: str = ""  # absolute path; empty if the text came from elsewhere
+    text: str  # the file itself, and the texts of the files that it names
+    source: Source | None = None  # None: the text came from elsewhere
+
+    @property
+    def file(self) -> str:
+        """Absolute path of the study file; empty if the text came from elsewhere."""
+        return self.source.file if self.source else ""
 
     @cached_property
     def scenes(self) -> tuple[Scene, ...]:
@@ -115,38 +122,60 @@ class Study:
         return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
 
 
-def presets() -> dict[str, Path]:
-    """The study files that the package brings, by name."""
-    files = Path(__file__).parents[1].glob("*/presets/*.toml")
-    return {path.stem: path for path in sorted(files)}
-
-
 def load(source: str | Path, tolerance: float | None = None) -> Study:
-    """Read a study file by its path, or a preset by its name; a tolerance replaces the file's.
+    """Read a study file by its path, or a preset by its name.
 
-    What is wrong raises an `InputError` with the file, the field and the remedy.
+    Parameters
+    ----------
+    source
+        The path or the name.
+    tolerance
+        Relative error that tau_c may have, in place of the file's.
+
+    Raises
+    ------
+    InputError
+        With the file, the field and the remedy.
     """
-    source, brought = str(source), presets()
-    path = brought.get(source, Path(source))
-    if not os.path.isfile(path):
-        remedy = f"presets: {', '.join(sorted(brought))}; or give the path of a TOML file"
-        raise InputError("there is no such study file, nor a preset of this name", source, remedy)
+    path = find(source)
     if tolerance is not None and not 0 <= tolerance < 1:
         what = f"{tolerance!r} is not a relative error from 0 to below 1"
         raise InputError(what, "tolerance", "0.05 allows tau_c to be 5 % off")
-    text = read_text(path, MOST_BYTES, source)
+    content = read_bytes(path, MOST_BYTES, str(source))
+    text = decoded(content, str(source))
+    files = Files(path.parent)
     # a file's name may be bytes that are no text; the page and the tables are text
     name = os.fsencode(path.stem).decode("utf-8", "replace")
-    study = replace(parse(text, name=name, where=str(path)), file=str(path.absolute()))
-    return study if tolerance is None else replace(study, tolerance=tolerance)
+    study = parse(text, name=name, where=str(path), files=files)
+    digests = {**files.digests, path.name: sha256(content).hexdigest()}
+    origin = Source(str(path.absolute()), digests, tolerance)
+    study = replace(study, source=origin)
+    if tolerance is not None:
+        study = replace(study, tolerance=tolerance)
+    return study
 
 
-def parse(text: str, *, name: str, where: str) -> Study:
+def parse(text: str, *, name: str, where: str, files: Files | None = None) -> Study:
     """Make a study of the text of a TOML file.
 
-    Only scenes that cannot be built are refused, by an `InputError` with the field and the remedy;
-    a plan refuses those beyond the methods' limits. `where` is the file's path, for messages;
-    profiles are looked for in its folder.
+    Only scenes that cannot be built are refused; a plan refuses those beyond the methods'
+    limits.
+
+    Parameters
+    ----------
+    text
+        The study file.
+    name
+        Its name, without its ending.
+    where
+        Its path, for messages.
+    files
+        The files that it may name, by default those of its folder.
+
+    Raises
+    ------
+    InputError
+        With the field and the remedy.
     """
     try:
         file = _File.model_validate(tomllib.loads(text))
@@ -154,27 +183,49 @@ def parse(text: str, *, name: str, where: str) -> Study:
         raise _explained(error, where) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"not TOML: {error}", where) from None
-    files = Files(Path(where).parent, dict(file.profiles))
-    listed, count = [], 0
-    for number, table in enumerate(file.group or [_Group()], 1):
-        place = f"{where}: group {number}" if file.group else where
-        tables = {part: {**getattr(file, part), **getattr(table, part)} for part in PARTS}
-        axes = {**file.axes, **table.axes}
-        if seeds := file.seeds if table.seeds is None else table.seeds:
-            axes["bed.seed"] = [*range(seeds)]
-        if (count := count + math.prod(map(len, axes.values()))) > MOST_SCENES:
+    if files is None:
+        files = Files(Path(where).parent)
+    files.carried = dict(file.profiles)
+    tables = file.group or (_Group(),)
+    places = [where]
+    if file.group:
+        places = [f"{where}: group {number}" for number in range(1, len(tables) + 1)]
+    listed: list[list[Scene]] = []
+    count = 0
+    for table, place in zip(tables, places, strict=True):
+        axes = _axes(file, table)
+        count += math.prod(map(len, axes.values()))
+        if count > MOST_SCENES:
             what = f"more than {MOST_SCENES} scenes in the study"
             raise InputError(what, f"{place}: axes", "shorten the lists")
-        scenes = [*_scenes(tables, axes, place, files)]
-        listed.append((table.name or f"group {number}", scenes, place))
+        parts = {n: {**getattr(file, n), **getattr(table, n)} for n in PARTS}
+        listed.append([*_scenes(parts, axes, place, files)])
     # force laws are found for the scenes of all groups at once
-    laws = resolved([scene for _, scenes, _ in listed for scene in scenes])
-    groups = tuple(
-        Group(title, tuple(itertools.chain(*itertools.islice(laws, len(scenes)))), place)
-        for title, scenes, place in listed
+    laws = resolved([*itertools.chain(*listed)])
+    groups = []
+    for number, (table, place) in enumerate(zip(tables, places, strict=True), 1):
+        count = len(listed[number - 1])
+        scenes = tuple(itertools.chain(*itertools.islice(laws, count)))
+        groups.append(Group(table.name or f"group {number}", scenes, place))
+    return Study(
+        name=name,
+        title=file.title or name,
+        groups=tuple(groups),
+        time_limit_s=file.time_limit,
+        tolerance=file.tolerance,
+        cluster=file.cluster,
+        erosion=file.erosion,
+        text=text + files.added,
     )
-    settings = (file.time_limit, file.tolerance, file.cluster, file.erosion, text + files.added)
-    return Study(name, file.title or name, groups, *settings)
+
+
+def _axes(file: "_File", table: "_Group") -> dict[str, list[Any]]:
+    """The axes of a group, with the seeds that it asks for."""
+    axes = {**file.axes, **table.axes}
+    seeds = file.seeds if table.seeds is None else table.seeds
+    if seeds:
+        axes["bed.seed"] = [*range(seeds)]
+    return axes
 
 
 def _scenes(

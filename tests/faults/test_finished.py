@@ -1,15 +1,19 @@
-"""Finished studies: their tables are not lost, and no marker vouches for the results of another."""
+"""Finished studies: their tables stay, and no edited study gets the answer of another."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from orchestrator import plan
+import orchestrator as face
+from orchestrator import cli, plan
+from orchestrator.errors import InputError
 from orchestrator.runs import case
 from orchestrator.study import study
 from tests.conftest import Command, Mount
@@ -122,6 +126,154 @@ def test_a_finished_study_is_answered_without_any_library(
     assert changed.returncode == 1
     finished.source.write_text(f"title = 'another'\n{finished.source.read_text()}")
     assert orchestrator("study", "small.toml", "--out", "out").returncode == 1
+
+
+EDITED = """title = "first"
+tolerance = 0.0
+grain = { diameter = 1e-3 }
+protocol = { method = "pivot", fractions = [0.1] }
+[fluid]
+kind = "water"
+[[group]]
+name = "profile"
+bed = { kind = "pile", profile = "scan.csv" }
+flow = { model = "waves" }
+[group.axes]
+"grain.density" = [2650.0, 3000.0]
+[[group]]
+name = "sieve"
+bed = { kind = "flat", length = 0.02, packing = "poured" }
+grain = { diameter = 1e-3, sizes = "sieve.csv" }
+[[group]]
+name = "grain"
+[group.forces]
+law = "zeng"
+"""
+SCAN = "x_m,z_m\n0,0\n0.04,0.01\n0.06,0\n"
+SIEVE = "diameter_m,fraction\n8e-4,0.5\n1.25e-3,0.5\n"
+LINES = EDITED.splitlines(keepends=True)
+
+
+def _is_finished(file: Path, out: Path, tolerance: float | None = None) -> bool:
+    options = Namespace(source=str(file), out=out, tolerance=tolerance)
+    return bool(cli.finished(options))
+
+
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a finished study that names a profile and a sieve table."""
+    folder = tmp_path_factory.mktemp("edited")
+    (folder / "scan.csv").write_text(SCAN)
+    (folder / "sieve.csv").write_text(SIEVE)
+    (folder / "edited.toml").write_text(EDITED)
+    face.run(folder / "edited.toml", out=folder / "out", workers=2)
+    return folder
+
+
+def _edits() -> dict[str, str]:
+    """The study file with something in it deleted, added or changed."""
+    made = {"empty": "", "a blank line at the end": EDITED + "\n"}
+    made["the last byte"] = EDITED[:-1]
+    made["a comment"] = EDITED + "# a comment\n"
+    made["line ends"] = EDITED.replace("\n", "\r\n")
+    made["order of groups"] = "".join([*LINES[:6], *LINES[12:], *LINES[6:12]])
+    made["a group twice"] = "".join([*LINES, *LINES[15:]])
+    made["a table of texts"] = EDITED + "\n[profiles]\n"
+    made["one digit"] = EDITED.replace("0.02", "0.03")
+    for first in range(len(LINES)):
+        made[f"from line {first + 1} to the end"] = "".join(LINES[:first])
+        made[f"line {first + 1}"] = "".join(LINES[:first] + LINES[first + 1 :])
+        made[f"to line {first + 1}"] = "".join(LINES[first + 1 :])
+    return made
+
+
+EDITS = _edits()
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edited_study_is_not_answered_with_the_old_answer(name: str, edited: Path) -> None:
+    """A deleted end, even an empty file, was once answered with the old answer."""
+    file, out = edited / "edited.toml", edited / "out"
+    stamp = file.stat()
+    assert _is_finished(file, out)
+    try:
+        file.write_bytes(EDITS[name].encode())
+        # a copy may keep the time of its original
+        os.utime(file, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+        assert not _is_finished(file, out)
+    finally:
+        file.write_text(EDITED)
+    assert _is_finished(file, out)
+
+
+@pytest.mark.parametrize("name", ["scan.csv", "sieve.csv"])
+def test_a_file_that_a_study_names_is_a_part_of_it(name: str, edited: Path) -> None:
+    file, out = edited / "edited.toml", edited / "out"
+    named = edited / name
+    content, stamp = named.read_bytes(), named.stat()
+    swapped = (SIEVE if name == "scan.csv" else SCAN).encode()
+    alike = content.replace(b"1", b"2", 1)  # of the same size
+    for other in (b"", content[:-1], content + b"\n", alike, swapped, None):
+        named.unlink()
+        if other is not None:
+            named.write_bytes(other)
+            os.utime(named, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+        assert not _is_finished(file, out)
+        named.write_bytes(content)
+        assert _is_finished(file, out)
+
+
+def test_tolerance_and_place_are_parts_of_the_question(edited: Path, tmp_path: Path) -> None:
+    file, out = edited / "edited.toml", edited / "out"
+    assert _is_finished(file, out)
+    for tolerance in (0.05, 0.0, float("nan")):
+        assert not _is_finished(file, out, tolerance)
+    # a copy of file and directory together is finished, another file is not
+    copy = tmp_path / "copy"
+    shutil.copytree(edited, copy)
+    assert _is_finished(copy / "edited.toml", copy / "out")
+    (copy / "other").mkdir()
+    shutil.move(copy / "edited.toml", copy / "other" / "edited.toml")
+    assert not _is_finished(copy / "other" / "edited.toml", copy / "out")
+
+
+def test_the_command_and_python_answer_an_edited_study_alike(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "t.toml", tmp_path / "out"
+    whole = "grain.diameter = 1e-3\nprotocol.method = 'pivot'\n[forces]\nlaw = 'zeng'\n"
+    cut = whole.partition("[forces]")[0]
+    answers: list[str] = []
+    for text in (whole, cut):
+        file.write_text(text)
+        for place in (tmp_path / f"new{len(answers)}", out):
+            assert cli.main(["study", str(file), "--out", str(place)]) == 0
+            printed = capsys.readouterr().out
+            answers.append(face.run(file, out=place).answer)
+            assert printed == f"{answers[-1]}\n{place / 'report.html'}\n"
+    assert answers[0] == answers[1] != answers[2] == answers[3]
+    file.write_text("")
+    assert cli.main(["study", str(file), "--out", str(out)]) == 2
+    assert "grain.diameter: is missing" in capsys.readouterr().err
+
+
+def test_the_text_of_a_file_comes_from_one_place(tmp_path: Path) -> None:
+    """The table of texts once won over the file, silently."""
+    file, out = tmp_path / "t.toml", tmp_path / "out"
+    body = "grain.diameter = 1e-3\nbed = { kind = 'pile', profile = 'scan.csv' }\n"
+    body += "flow.model = 'waves'\nprotocol.method = 'pivot'\n"
+    file.write_text(f"{body}[profiles]\n'scan.csv' = '''{SCAN}'''\n")
+    face.run(file, out=out)
+    assert _is_finished(file, out)
+    (tmp_path / "scan.csv").write_text(SCAN.replace("0.01", "0.012"))
+    assert not _is_finished(file, out)
+    with pytest.raises(InputError, match=r"scan.csv: it is a file, and its text is in"):
+        study.load(file)
+    # a directory of results has the texts of its files, and reads none
+    assert len(face.open(out).thresholds)
+    file.write_text(f"{body}[profiles]\n'other.csv' = ''\n")
+    with pytest.raises(InputError, match="its text is not in the table"):
+        study.load(file)
 
 
 def test_warnings_that_are_errors_end_no_command(

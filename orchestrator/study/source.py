@@ -1,0 +1,85 @@
+"""Where a study comes from: a preset by its name or a file, and the bytes it was read from.
+
+Nothing here imports a library: a finished study is told from its bytes in a tenth of a
+second.
+"""
+
+import difflib
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.errors import InputError
+from orchestrator.runs.files import digest_file
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a study was read from, byte for byte.
+
+    Attributes
+    ----------
+    file
+        Absolute path of the study file.
+    digests
+        SHA-256 of the study file, and of each file that it names, by their paths
+        relative to the folder of the study file; None for a file that is not there,
+        whose text the study file brings itself.
+    tolerance
+        The tolerance that was given in place of the file's, if one was.
+    """
+
+    file: str
+    digests: Mapping[str, str | None]
+    tolerance: float | None = None
+
+    def described(self, root: Path) -> dict[str, object]:
+        """The source as JSON, for a directory of results.
+
+        The path of the study file is relative to that directory: a copy of both together
+        is a study of its own.
+        """
+        file = os.path.relpath(self.file, root)
+        return {
+            "file": file,
+            "tolerance": self.tolerance,
+            "sha256": dict(self.digests),
+        }
+
+
+def presets() -> dict[str, Path]:
+    """The study files that the package brings, by name."""
+    files = Path(__file__).parents[1].glob("*/presets/*.toml")
+    return {path.stem: path for path in sorted(files)}
+
+
+def find(source: str | Path) -> Path:
+    """The file of a study: of a preset by its name, or of the path itself.
+
+    Raises
+    ------
+    InputError
+        If there is neither a preset of this name nor a file of this path.
+    """
+    brought = presets()
+    path = brought.get(str(source), Path(source))
+    if os.path.isfile(path):
+        return path
+    near = difflib.get_close_matches(str(source), brought, n=1)
+    names = f"presets: {', '.join(brought)}; or give the path of a TOML file"
+    remedy = f"did you mean {near[0]}? {names}" if near else names
+    what = "there is no such study file, nor a preset of this name"
+    raise InputError(what, str(source), remedy)
+
+
+def digests_now(folder: Path, names: Iterable[str]) -> dict[str, str | None]:
+    """SHA-256 of files as they are now, by their paths relative to a folder.
+
+    None for a file that is not there. Raises OSError for one that cannot be read.
+    """
+    found: dict[str, str | None] = {}
+    for name in names:
+        path = folder / name
+        found[name] = digest_file(path) if os.path.lexists(path) else None
+    return found
