@@ -50,7 +50,7 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
     rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
     known = {each.column: grains[name] for name, each in PARAMETERS.items()}
     beta, blocks = grains["entrainment_angle_deg"], []
-    flow = (grains["roughness"], grains["viscosity"], rho, np.where(rho < GAS_BELOW, np.nan, depth))
+    liquid_depth = np.where(rho < GAS_BELOW, np.nan, depth)
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
         by_law = {
             name: threshold(
@@ -62,7 +62,13 @@ def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
         picked = [LAWS_OF[each] if answer == PAPER else (answer,) for each in regimes]
         for name, at in by_law.items():
             numbers: Table = {c: getattr(at, key, rho) for c, (key, _) in QUANTITIES.items()}
-            numbers |= measurable_speeds(at.friction_velocity, *flow)
+            numbers |= measurable_speeds(
+                at.friction_velocity,
+                roughness=grains["roughness"],
+                density=rho,
+                viscosity=grains["viscosity"],
+                depth=liquid_depth,
+            )
             numbers |= {"stress_pa": rho * at.friction_velocity**2}
             reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)
             block: Table = {"law": np.full(count, name, object), **numbers}

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from orchestrator.fidelity import levels
 from orchestrator.fidelity.levels import LEVELS, LOCAL, Known, Level, Pair, changed, level, pair_of
-from orchestrator.grains.loads import LONG, Geometry
+from orchestrator.grains.loads import LONG, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study.fields import FIELDS
@@ -114,9 +114,14 @@ def decide(
 
 
 def along_if_long(scene: Scene) -> Scene:
-    """A scene by the closed form along the bed if it leaves the method open on a long lattice."""
-    rules, is_lattice = scene.protocol, isinstance(scene.bed, PileBed) and not scene.is_poured
-    if "method" in rules.model_fields_set or not is_lattice or rules.update:
+    """A scene by the closed form along the bed if it leaves the method open on long rows.
+
+    Level rows are no rows along the bed: they stay with the method that packs them.
+    """
+    rules = scene.protocol
+    if "method" in rules.model_fields_set or rules.update:
+        return scene
+    if not has_rows_along(scene):
         return scene
     return LOCAL.answer(scene) if Geometry(scene).length > LONG else scene
 

@@ -17,7 +17,7 @@ from orchestrator.fidelity.decision import along_if_long
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.theory import seen_by_the_flow
-from orchestrator.grains.loads import Geometry
+from orchestrator.grains.loads import Geometry, has_rows_along
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study.parts import PileBed, UnfitError
@@ -105,8 +105,11 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     try:
         if (count := Geometry(scene).length) > MOST_GRAINS:
             what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
-            remedy = 'protocol.method = "local", or a range of bed.counted; is a profile in mm?'
-            remedy = "a shorter bed" if scene.is_poured else remedy
+            remedy = "a range of bed.counted; is a profile in mm?"
+            if has_rows_along(scene):
+                remedy = f'protocol.method = "local", or {remedy}'
+            if scene.is_poured:
+                remedy = "a shorter bed"
             yield Limit("", "bed", f"{what}, more than {MOST_GRAINS:g}", remedy)
             return
         what = _unfit(scene, bed, of_bed(bed))

@@ -38,6 +38,18 @@ DIGITS = 9
 _covered, _poured = cache(packing.cover), cache(poured.read)
 
 
+def has_rows_along(scene: Scene) -> bool:
+    """Whether the grains of a pile lie in rows along its bed line, all in like pockets.
+
+    The closed form along the bed line (`protocol.method` "local") then answers as pivots do.
+    Level rows make stairs of a slope, where each step holds the grains of the one below it,
+    and each grain of a poured bed has a pocket of its own.
+    """
+    if not isinstance(scene.bed, PileBed):
+        return False
+    return scene.bed.packing in ("aligned", "disordered")
+
+
 @cache
 def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
     """A pile of two faces on a bed line: obstacles before it make the way along that longer."""

@@ -1,1 +1,1 @@
-"""Forces on a grain, thresholds in closed form, published curves: no scenes, no files."""
+"""The physics: force laws, one grain's threshold, curves and measurements."""

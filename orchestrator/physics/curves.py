@@ -1,8 +1,8 @@
-"""Reference curves of the threshold of motion on a flat bed, each with its source and range.
+"""Reference curves of the threshold of motion on a flat bed, with source and range.
 
-A curve is drawn in the Shields diagram, (Re*, theta_c). Many are published in another variable,
-the dimensionless diameter D* = d ((s-1) g/nu^2)^(1/3); since Re* = sqrt(theta) D*^1.5 they need no
-fluid to be drawn. The curves for air need one.
+A curve is drawn in the Shields diagram, (Re*, theta_c). Many are published in another
+variable, the dimensionless diameter D* = d ((s-1) g/nu^2)^(1/3); since
+Re* = sqrt(theta) D*^1.5 they need no fluid to be drawn. The curves for air need one.
 """
 
 from collections.abc import Callable
@@ -15,14 +15,31 @@ from orchestrator.physics.constants import GRAVITY
 from orchestrator.types import FloatArray
 
 Formula = Callable[[FloatArray], FloatArray]
+"""The Shields number as a function of Re* or D*."""
 
 
 @dataclass(frozen=True)
 class Curve:
     """One published curve for water: the Shields number as a function of Re* or D*.
 
-    ``low`` and ``high`` are the range of that variable in which the curve was published; where its
-    source gives none, the range in which it is drawn.
+    Attributes
+    ----------
+    name
+        Authors and year, for legends.
+    variable
+        The variable of the formula, Re* or D*.
+    low, high
+        The range of that variable in which the curve was published. Where its source
+        gives none, it is the range in which the curve is drawn.
+    formula
+        The published formula.
+
+    Examples
+    --------
+    >>> soulsby = WATER[0]
+    >>> reynolds, theta = soulsby.points(3)
+    >>> print(theta.round(4))
+    [0.268  0.033  0.0552]
     """
 
     name: str
@@ -32,45 +49,159 @@ class Curve:
     formula: Formula
 
     def points(self, count: int = 200) -> tuple[FloatArray, FloatArray]:
-        """Re* and theta_c along the curve, arrays of shape (count,)."""
+        """Compute points of the curve for the Shields diagram.
+
+        Parameters
+        ----------
+        count
+            Number of points, evenly spaced in the logarithm of the variable.
+
+        Returns
+        -------
+        reynolds, theta
+            Re* and theta_c along the curve, arrays of shape (count,).
+        """
         x = np.geomspace(self.low, self.high, count)
         theta = self.formula(x)
-        return (x if self.variable == "Re*" else np.sqrt(theta) * x**1.5), theta
+        if self.variable == "Re*":
+            return x, theta
+        return np.sqrt(theta) * x**1.5, theta
 
 
 def soulsby_whitehouse(dstar: FloatArray) -> FloatArray:
-    """Soulsby and Whitehouse (1997), of D*."""
+    """Curve of Soulsby and Whitehouse (1997).
+
+    Parameters
+    ----------
+    dstar
+        Dimensionless diameter D*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(soulsby_whitehouse(np.array([1.0, 10.0, 1000.0])).round(4))
+    [0.1375 0.033  0.0552]
+    """
     return 0.30 / (1 + 1.2 * dstar) + 0.055 * (1 - np.exp(-0.02 * dstar))
 
 
 def paphitis(reynolds: FloatArray) -> FloatArray:
-    """Paphitis (2001), the mean curve, of Re*."""
+    """Mean curve of Paphitis (2001).
+
+    Parameters
+    ----------
+    reynolds
+        Friction Reynolds number Re*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(paphitis(np.array([1.0, 100.0])).round(4))
+    [0.1088 0.042 ]
+    """
     return 0.188 / (1 + reynolds) + 0.0475 * (1 - 0.699 * np.exp(-0.015 * reynolds))
 
 
 def brownlie(dstar: FloatArray) -> FloatArray:
-    """Brownlie (1981), of D*; his grain Reynolds number is D*^1.5."""
+    """Curve of Brownlie (1981), whose grain Reynolds number is D*^1.5.
+
+    Parameters
+    ----------
+    dstar
+        Dimensionless diameter D*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(brownlie(np.array([2.0, 100.0])).round(4))
+    [0.1179 0.0488]
+    """
     y = dstar**-0.9
     return 0.22 * y + 0.06 * 10 ** (-7.7 * y)
 
 
 def mantz(reynolds: FloatArray) -> FloatArray:
-    """Mantz (1977), of Re*."""
+    """Curve of Mantz (1977).
+
+    Parameters
+    ----------
+    reynolds
+        Friction Reynolds number Re*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(mantz(np.array([0.1, 1.0])).round(4))
+    [0.1995 0.1   ]
+    """
     return 0.1 * reynolds**-0.3
 
 
 def yalin_karahan(reynolds: FloatArray) -> FloatArray:
-    """Yalin and Karahan (1979), of Re*."""
+    """Curve of Yalin and Karahan (1979), that of Mantz up to Re* = 1.
+
+    Parameters
+    ----------
+    reynolds
+        Friction Reynolds number Re*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(yalin_karahan(np.array([0.5, 10.0, 100.0])).round(4))
+    [0.1231 0.0316 0.045 ]
+    """
     log = np.log(reynolds)
     middle = np.exp(-2.26 - 0.905 * log + 0.168 * log**2)
-    return np.where(reynolds <= 1, mantz(reynolds), np.where(reynolds <= 60, middle, 0.045))
+    return np.select([reynolds <= 1, reynolds <= 60], [mantz(reynolds), middle], 0.045)
 
 
 def van_rijn(dstar: FloatArray) -> FloatArray:
-    """Curve of van Rijn (1984), of D*."""
+    """Curve of van Rijn (1984).
+
+    Parameters
+    ----------
+    dstar
+        Dimensionless diameter D*, an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the same shape.
+
+    Examples
+    --------
+    >>> print(van_rijn(np.array([2.0, 8.0, 15.0, 100.0, 200.0])).round(4))
+    [0.12   0.037  0.0305 0.0494 0.055 ]
+    """
     return np.select(
         [dstar <= 4, dstar <= 10, dstar <= 20, dstar <= 150],
-        [0.24 / dstar, 0.14 * dstar**-0.64, 0.04 * dstar**-0.1, 0.013 * dstar**0.29],
+        [
+            0.24 / dstar,
+            0.14 * dstar**-0.64,
+            0.04 * dstar**-0.1,
+            0.013 * dstar**0.29,
+        ],
         0.055,
     )
 
@@ -88,43 +219,146 @@ WATER = (
 
 @dataclass(frozen=True)
 class Air:
-    """The grains and the gas that a curve for air is drawn for; SI units."""
+    """The grains and the gas that a curve for air is drawn for.
+
+    Attributes
+    ----------
+    density
+        Density of the grains, kg/m3.
+    fluid_density
+        Density of the gas, kg/m3.
+    viscosity
+        Kinematic viscosity of the gas, m2/s.
+    gravity
+        Acceleration of gravity, m/s2.
+    """
 
     density: float | FloatArray
     fluid_density: float | FloatArray
     viscosity: float | FloatArray
     gravity: float | FloatArray = GRAVITY
 
-    def shields_diagram(self, d: FloatArray, ustar: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Re* and theta_c of grains of a diameter (m) that move at a friction velocity (m/s)."""
+    def shields_diagram(
+        self,
+        d: FloatArray,
+        ustar: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Place thresholds in the Shields diagram.
+
+        Parameters
+        ----------
+        d
+            Diameters, m.
+        ustar
+            Threshold friction velocities, m/s, of the shape of the diameters.
+
+        Returns
+        -------
+        reynolds, theta
+            Re* and theta_c, of the same shape.
+
+        Examples
+        --------
+        >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+        >>> reynolds, theta = sand.shields_diagram(np.array(3e-4), np.array(0.3))
+        >>> print(f"{reynolds:.3g} {theta:.3g}")
+        6 0.0139
+        """
         excess = (self.density - self.fluid_density) * self.gravity * d
-        return ustar * d / self.viscosity, self.fluid_density * ustar**2 / excess
+        reynolds = ustar * d / self.viscosity
+        theta = self.fluid_density * ustar**2 / excess
+        return reynolds, theta
 
 
 def bagnold(diameter: FloatArray, air: Air) -> FloatArray:
-    """Bagnold's threshold friction velocity with A = 0.1, m/s."""
+    """Threshold friction velocity of Bagnold (1941), with A = 0.1.
+
+    Parameters
+    ----------
+    diameter
+        Diameters of the grains, m, an array of any shape.
+    air
+        The grains and the gas.
+
+    Returns
+    -------
+    FloatArray
+        Threshold friction velocity, m/s, of the same shape.
+
+    Examples
+    --------
+    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    >>> print(bagnold(np.array([3e-4]), sand).round(4))
+    [0.2549]
+    """
     excess = air.density / air.fluid_density - 1
     return 0.1 * np.sqrt(excess * air.gravity * diameter)
 
 
 def shao_lu(diameter: FloatArray, air: Air) -> FloatArray:
-    """Shao and Lu (2000), threshold friction velocity with cohesion 3e-4 N/m, m/s."""
+    """Threshold friction velocity of Shao and Lu (2000), with a cohesion of 3e-4 N/m.
+
+    Parameters
+    ----------
+    diameter
+        Diameters of the grains, m, an array of any shape.
+    air
+        The grains and the gas.
+
+    Returns
+    -------
+    FloatArray
+        Threshold friction velocity, m/s, of the same shape.
+
+    Examples
+    --------
+    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    >>> print(shao_lu(np.array([5e-5, 3e-4]), sand).round(4))
+    [0.2735 0.3003]
+    """
     ratio = air.density / air.fluid_density
     cohesion = 3e-4 / (air.fluid_density * diameter)
     return np.sqrt(0.0123 * (ratio * air.gravity * diameter + cohesion))
 
 
+ITERATIONS = 200
+"""Steps of the fixed-point iteration of `iversen_white`."""
+
+
 def iversen_white(diameter: FloatArray, air: Air) -> FloatArray:
-    """Iversen and White (1982), threshold friction velocity, m/s; it is implicit in Re*."""
+    """Threshold friction velocity of Iversen and White (1982), implicit in Re*.
+
+    The root is found by fixed-point iteration over Re* = u* d/nu.
+
+    Parameters
+    ----------
+    diameter
+        Diameters of the grains, m, an array of any shape.
+    air
+        The grains and the gas.
+
+    Returns
+    -------
+    FloatArray
+        Threshold friction velocity, m/s, of the same shape.
+
+    Examples
+    --------
+    >>> sand = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    >>> print(iversen_white(np.array([5e-5, 3e-4]), sand).round(4))
+    [0.2183 0.2941]
+    """
     ratio = air.density / air.fluid_density
     cohesion = 1 + 6e-7 / (air.density * air.gravity * diameter**2.5)
     scale = np.sqrt(ratio * air.gravity * diameter * cohesion)
     ustar = 0.12 * scale
-    for _ in range(200):
+    for _ in range(ITERATIONS):
         reynolds = np.maximum(ustar * diameter / air.viscosity, 0.03)
-        # the root is bounded below inside its own branch only: 1.928 Re^0.092 > 1 for Re > 0.001
-        slow = 0.129 * scale / np.sqrt(1.928 * np.minimum(reynolds, 10) ** 0.092 - 1)
-        fast = 0.12 * scale * (1 - 0.0858 * np.exp(-0.0617 * (np.maximum(reynolds, 10) - 10)))
+        # each branch is bounded to its own range: 1.928 Re^0.092 > 1 for Re > 0.001
+        slow_reynolds = np.minimum(reynolds, 10)
+        fast_reynolds = np.maximum(reynolds, 10)
+        slow = 0.129 * scale / np.sqrt(1.928 * slow_reynolds**0.092 - 1)
+        fast = 0.12 * scale * (1 - 0.0858 * np.exp(-0.0617 * (fast_reynolds - 10)))
         ustar = np.where(reynolds <= 10, slow, fast)
     return ustar
 
@@ -137,8 +371,31 @@ AIR: dict[str, Callable[[FloatArray, Air], FloatArray]] = {
 """Curves for grains in air, cohesion included where their authors do."""
 
 
-def slope_factor_on_ustar(slope_deg: FloatArray, friction_angle_deg: float) -> FloatArray:
-    """Factor on the threshold friction velocity in air for flow up a slope."""
+def slope_factor_on_ustar(
+    slope_deg: FloatArray,
+    friction_angle_deg: float,
+) -> FloatArray:
+    """Compute the factor on the threshold friction velocity in air on a slope.
+
+    It is ``sqrt(cos(alpha) + sin(alpha)/tan(phi))``.
+
+    Parameters
+    ----------
+    slope_deg
+        Slope alpha, degrees, positive where the flow goes up it.
+    friction_angle_deg
+        Friction angle phi of the grains, degrees.
+
+    Returns
+    -------
+    FloatArray
+        Factor on u*, of the shape of the slope.
+
+    Examples
+    --------
+    >>> print(slope_factor_on_ustar(np.array([0.0, 15.0]), 30.0).round(4))
+    [1.     1.1892]
+    """
     alpha = np.radians(slope_deg)
     factor = np.cos(alpha) + np.sin(alpha) / np.tan(np.radians(friction_angle_deg))
     return np.asarray(np.sqrt(factor))

@@ -14,9 +14,18 @@ from orchestrator.types import FloatArray
 
 @dataclass(frozen=True)
 class Bin:
-    """Measured threshold Shields numbers for low <= Re* < high: count, median and percentiles.
+    """Measured threshold Shields numbers in a range of Re*.
 
-    The percentiles are the order statistics of rank int(n/10) + 1 and int(9 n/10) + 1.
+    Attributes
+    ----------
+    low, high
+        The range, low <= Re* < high.
+    count
+        Number of measurements.
+    median
+        Their median Shields number.
+    tenth, ninetieth
+        Percentiles: the order statistics of rank int(n/10) + 1 and int(9 n/10) + 1.
     """
 
     low: float
@@ -33,9 +42,23 @@ class Bin:
 
 
 def _bins(rows: str) -> tuple[Bin, ...]:
-    text = Path(__file__).with_name("flumes.csv").read_text(encoding="utf-8")
-    read = [[float(x) for x in row[1:]] for row in csv.reader(text.split()) if row[0] == rows]
-    return tuple(Bin(low, high, int(count), *rest) for low, high, count, *rest in read)
+    """Read the bins of a group of rows of ``flumes.csv``."""
+    path = Path(__file__).with_name("flumes.csv")
+    with path.open(encoding="utf-8", newline="") as stream:
+        table = [row for row in csv.DictReader(stream) if row["rows"] == rows]
+    return tuple(_bin(row) for row in table)
+
+
+def _bin(row: dict[str, str]) -> Bin:
+    """Make a bin of a row of text."""
+    return Bin(
+        low=float(row["low"]),
+        high=float(row["high"]),
+        count=int(row["count"]),
+        median=float(row["median"]),
+        tenth=float(row["tenth"]),
+        ninetieth=float(row["ninetieth"]),
+    )
 
 
 BUFFINGTON_MONTGOMERY = _bins("all")
@@ -44,63 +67,130 @@ BUFFINGTON_MONTGOMERY = _bins("all")
 Compiled by J. M. Buffington and D. R. Montgomery, Water Resour. Res. 33, 1997,
 doi:10.1029/96WR03190; binned from its rows in the data of S. A. Feehan et al., 2023
 (github.com/scott-feehan/Quantifying-uncertainty-in-incipient-sediment-motion-thresholds,
-Shields_compilation_flume.csv), Re* from their Shields number, median diameter and density with
-nu = 1e-6 m2/s and g = 9.81 m/s2. Visual thresholds and those by a reference transport are together.
+Shields_compilation_flume.csv), Re* from their Shields number, median diameter and
+density with nu = 1e-6 m2/s and g = 9.81 m/s2. Visual thresholds and those by a
+reference transport are together.
 """
-
 VISUAL = _bins("visual")
 """Those of them by eye alone: the first motion, as a model has it."""
 MEASURED_SOURCE = "flumes, compiled by Buffington & Montgomery 1997"
-"""For legends."""
+"""Source of both, for legends."""
 
 
-def kirchner_pivot(percentile: ArrayLike, relative_diameter: ArrayLike = 1.0) -> FloatArray:
-    """Pivot angle of a natural bed at a percentile, deg: (30 + n/2)(D/D50)^-0.3.
+def kirchner_pivot(
+    percentile: ArrayLike,
+    relative_diameter: ArrayLike = 1.0,
+) -> FloatArray:
+    """Compute the pivot angle of a natural bed: (30 + n/2)(D/D50)^-0.3.
 
-    J. W. Kirchner, W. E. Dietrich, F. Iseya and H. Ikeda, Sedimentology 37, 1990, as in the code
-    of E. Yager et al., 2018 (taucrcalc); the article was not at hand. The entrainment angle is 90
-    deg less the pivot: beta 60 and 45 are the percentiles 0 and 30 of grains of the median size.
+    J. W. Kirchner, W. E. Dietrich, F. Iseya and H. Ikeda, Sedimentology 37, 1990, as in
+    the code of E. Yager et al., 2018 (taucrcalc); the article was not at hand. The
+    entrainment angle is 90 deg less the pivot: beta 60 and 45 are the percentiles 0 and
+    30 of grains of the median size.
+
+    Parameters
+    ----------
+    percentile
+        Percentile n of the pivots of the bed, 0 to 100.
+    relative_diameter
+        Diameter of the grain over the median of the bed, D/D50.
+
+    Returns
+    -------
+    FloatArray
+        Pivot angle, degrees, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(kirchner_pivot([0, 50, 100]))
+    [30. 55. 80.]
     """
-    n, size = np.asarray(percentile, float), np.asarray(relative_diameter, float)
+    n = np.asarray(percentile, float)
+    size = np.asarray(relative_diameter, float)
     return np.asarray((30 + 0.5 * n) * size**-0.3)
 
 
 def wilcock_crowe_hiding(relative_diameter: ArrayLike) -> FloatArray:
-    """Threshold stress of a size in a mixture over that of the mean size, of D_i/D_m.
+    """Compute the threshold stress of a size in a mixture over that of the mean size.
 
     P. R. Wilcock and J. C. Crowe, J. Hydraul. Eng. 129, 2003,
-    doi:10.1061/(ASCE)0733-9429(2003)129:2(120); the exponent agrees with several public codes.
-    It was fitted to a reference transport, not to the first motion.
+    doi:10.1061/(ASCE)0733-9429(2003)129:2(120); the exponent agrees with several public
+    codes. It was fitted to a reference transport, not to the first motion.
+
+    Parameters
+    ----------
+    relative_diameter
+        Diameter over the mean diameter of the mixture, D_i/D_m.
+
+    Returns
+    -------
+    FloatArray
+        Threshold stress over that of the mean size, of the same shape.
+
+    Examples
+    --------
+    >>> print(wilcock_crowe_hiding([0.5, 1.0, 2.0]).round(3))
+    [0.883 1.    1.335]
     """
     size = np.asarray(relative_diameter, float)
     return np.asarray(size ** (0.67 / (1 + np.exp(1.5 - size))))
 
 
 def egiazaroff_hiding(relative_diameter: ArrayLike) -> FloatArray:
-    """Threshold Shields number of a size in a mixture over that of the mean size, of D_i/D_m.
+    """Compute the threshold Shields number of a size over that of the mean size.
 
-    I. V. Egiazaroff, J. Hydraul. Div. 91 (HY4), 1965: (log 19/log(19 D_i/D_m))^2, as in public
-    codes. It rises without bound towards D_i/D_m = 1/19 (codes replace it below 0.4, after Ashida
-    and Michiue) and means nothing below, where it is NaN. The factor on the stress is it times
-    D_i/D_m.
+    I. V. Egiazaroff, J. Hydraul. Div. 91 (HY4), 1965: (log 19/log(19 D_i/D_m))^2, as in
+    public codes. It rises without bound towards D_i/D_m = 1/19 (codes replace it below
+    0.4, after Ashida and Michiue). The factor on the stress is it times D_i/D_m.
+
+    Parameters
+    ----------
+    relative_diameter
+        Diameter over the mean diameter of the mixture, D_i/D_m.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number over that of the mean size, of the same shape. It is
+        NaN up to D_i/D_m = 1/19, where the formula means nothing.
+
+    Examples
+    --------
+    >>> print(egiazaroff_hiding([0.01, 0.5, 1.0, 2.0]).round(3))
+    [  nan 1.711 1.    0.655]
     """
     size = 19 * np.asarray(relative_diameter, float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(size > 1, (np.log(19) / np.log(size)) ** 2, np.nan)
+        factor = (np.log(19) / np.log(size)) ** 2
+    return np.where(size > 1, factor, np.nan)
 
 
 NEAR = 0.02
-"""Share by which a hill, or ten times by which z0, may differ and still be the experiment's."""
+"""Relative difference of a hill's aspect up to which it is one of the experiment."""
+NEAR_ROUGHNESS = 10 * NEAR
+"""The same of the height over the roughness length."""
 HEIGHT_OVER_ROUGHNESS = 0.117 / 1.57e-4
-"""Height of the hills over z0: ERCOFTAC's data begin at 0.157 mm, the z0 of the wall."""
+"""Height of the hills over z0.
+
+ERCOFTAC's data begin at 0.157 mm, the z0 of the wall.
+"""
 
 
 @dataclass(frozen=True)
 class MeasuredHill:
-    """Where reversed flow ends behind the top of a hill, in heights; 0: there was none in the mean.
+    """Where the reversed flow behind a hill of the wind tunnel RUSHIL ends.
 
-    ``aspect`` is the half length over the height; ``verified`` says whether the number was read in
-    its source.
+    Attributes
+    ----------
+    aspect
+        Half length over height.
+    reattachment
+        Distance from the top to the end of the reversed flow, in heights; 0 if the
+        mean flow was not reversed.
+    source
+        Where the number is from.
+    verified
+        Whether the number was read in its source.
     """
 
     aspect: float
@@ -110,44 +200,116 @@ class MeasuredHill:
 
 
 _SUMMARY = "separated behind the steepest hill alone: EPA-600/S4-81-067"
+_UNVERIFIED = f"{_SUMMARY}; the length is unverified"
 RUSHIL = (
-    MeasuredHill(3.0, 6.5, f"{_SUMMARY}; the length is unverified", verified=False),
+    MeasuredHill(3.0, 6.5, _UNVERIFIED, verified=False),
     MeasuredHill(5.0, 0.0, _SUMMARY),
     MeasuredHill(8.0, 0.0, _SUMMARY),
 )
+"""The three hills of the experiment."""
+_PARAMETERS = 4001
+"""Values of the parameter t at which the form of a hill is computed."""
+_POINTS = 81
+"""Points of a hill's form, evenly spaced along x."""
 
 
 def rushil_form(aspect: float) -> tuple[FloatArray, FloatArray]:
-    """X from the top and z of a hill of RUSHIL over its height, by its half length over that.
+    """Compute the form of a hill of RUSHIL.
 
-    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in ERCOFTAC's
-    case 69: xi = a sin(t) runs from one foot to the other.
+    L. H. Khurshudyan, W. H. Snyder and I. V. Nekrasov, EPA-600/4-81-067, 1981, as in
+    ERCOFTAC's case 69: xi = a sin(t) runs from one foot to the other.
+
+    Parameters
+    ----------
+    aspect
+        Half length over height of the hill, a/H.
+
+    Returns
+    -------
+    x, z
+        Distance from the top and height over the foot, both over the height of the
+        hill, arrays of shape (81,).
+
+    Examples
+    --------
+    >>> x, z = rushil_form(3.0)
+    >>> print(x[[0, 40, 80]], z[[0, 40, 80]].round(6))
+    [-3.  0.  3.] [0. 1. 0.]
     """
-    t = np.linspace(-np.pi / 2, np.pi / 2, 4001)
+    t = np.linspace(-np.pi / 2, np.pi / 2, _PARAMETERS)
     m = 1 / aspect + np.sqrt(1 / aspect**2 + 1)
     q = np.sin(t) ** 2 + m**2 * np.cos(t) ** 2
-    xs, zs = aspect / 2 * np.sin(t) * (1 + 1 / q), m * aspect / 2 * np.cos(t) * (1 - 1 / q)
-    # equal steps of t would crowd at the feet, where x is level in it
-    x = np.linspace(-aspect, aspect, 81)
-    return x, np.interp(x, xs, zs)
+    form_x = aspect / 2 * np.sin(t) * (1 + 1 / q)
+    form_z = m * aspect / 2 * np.cos(t) * (1 - 1 / q)
+    # equal steps of t would crowd at the feet, where dx/dt is 0
+    x = np.linspace(-aspect, aspect, _POINTS)
+    return x, np.interp(x, form_x, form_z)
 
 
 @cache
 def rushil_aspect(slope_deg: float) -> float:
-    """Half length over height of the hill of RUSHIL whose steepest slope is given, degrees."""
+    """Find the hill of RUSHIL that has a steepest slope.
+
+    Parameters
+    ----------
+    slope_deg
+        Steepest slope of the hill, degrees.
+
+    Returns
+    -------
+    float
+        Half length over height of that hill.
+
+    Raises
+    ------
+    ValueError
+        If no hill with an aspect from 0.1 to 1000 has this slope.
+
+    Examples
+    --------
+    >>> round(rushil_aspect(26.175), 2)
+    3.0
+    """
     from scipy.optimize import brentq
+
+    tangent = math.tan(math.radians(slope_deg))
 
     def steeper(logarithm: float) -> float:
         x, z = rushil_form(math.exp(logarithm))
-        return float(np.max(np.diff(z) / np.diff(x))) - math.tan(math.radians(slope_deg))
+        return float(np.max(np.diff(z) / np.diff(x))) - tangent
 
-    # functions of numpy would differ in the last digit, and with it the digests of flows
+    # numpy's functions would differ in the last digit, and with it the digests of flows
     return math.exp(brentq(steeper, math.log(0.1), math.log(1e3)))
 
 
-def rushil_hill(slope_deg: float, height_over_roughness: float) -> MeasuredHill | None:
-    """The hill of the experiment that one of this steepest slope and roughness is, if any."""
-    if abs(height_over_roughness / HEIGHT_OVER_ROUGHNESS - 1) > 10 * NEAR:
+def rushil_hill(
+    slope_deg: float,
+    height_over_roughness: float,
+) -> MeasuredHill | None:
+    """Look up the hill of the experiment that a given hill is.
+
+    Parameters
+    ----------
+    slope_deg
+        Steepest slope of the given hill, degrees.
+    height_over_roughness
+        Its height over the roughness length of its wall.
+
+    Returns
+    -------
+    MeasuredHill or None
+        The hill of the experiment; None if the given one is none of them.
+
+    Examples
+    --------
+    >>> rushil_hill(26.175, 745.0).reattachment
+    6.5
+    >>> print(rushil_hill(26.175, 100.0))
+    None
+    """
+    roughness_ratio = height_over_roughness / HEIGHT_OVER_ROUGHNESS
+    if abs(roughness_ratio - 1) > NEAR_ROUGHNESS:
         return None
     aspect = rushil_aspect(slope_deg)
-    return next((hill for hill in RUSHIL if abs(aspect / hill.aspect - 1) < NEAR), None)
+    near = (hill for hill in RUSHIL if abs(aspect / hill.aspect - 1) < NEAR)
+    return next(near, None)

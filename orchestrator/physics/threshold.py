@@ -1,4 +1,4 @@
-"""The threshold of motion of one exposed grain that rolls over its downstream neighbour."""
+"""The threshold of motion of one exposed grain that rolls over its neighbour."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,28 +9,50 @@ from numpy.typing import ArrayLike, NDArray
 
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Exposure, ForceLaw, Validity, reasons
-from orchestrator.types import BoolArray, FloatArray
+from orchestrator.types import BoolArray, FloatArray, IntArray
 
 Regime = Literal["low", "high", "transition"]
-LAWS_OF: dict[Regime, tuple[str, ...]]
-LAWS_OF = {"low": ("low",), "high": ("high",), "transition": ("low", "high")}
+LAWS_OF: dict[Regime, tuple[str, ...]] = {
+    "low": ("low",),
+    "high": ("high",),
+    "transition": ("low", "high"),
+}
 """Names of the laws that the paper's rule picks in each regime."""
 PAPER = "paper"
-"""The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, both in the transition."""
+"""The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, else both."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
-"""Friction Reynolds numbers between which the first root is looked for. A sum that is above its
-target for less than half a decade is missed; the sum of a pivot rises throughout."""
+"""Friction Reynolds numbers between which the first root is looked for.
+
+A sum that is above its target for less than half a decade is missed; the sum of a pivot
+rises throughout.
+"""
 LIFT_OFF = 1 + 1e-9
-"""Lift over the weight normal to the bed from which a grain leaves without rolling: on level bed
-without drag the pivot itself is at 1."""
+"""Lift over the weight normal to the bed from which a grain leaves without rolling.
+
+On a level bed without drag the pivot itself is at 1.
+"""
+MOST_STEPS = 100
+"""Steps after which `root` ends at the latest."""
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """The threshold of motion of one grain; all arrays have the broadcast shape of the inputs.
+    """The threshold of motion of one grain, or of each of many.
 
-    u* (m/s), Re* = u* d/nu, tau_c/((rho_sol - rho_f) g d), the forces there (N), and whether the
-    law holds there: its range of Re*, that of its drag, and no lift-off.
+    The arrays have the broadcast shape of the inputs.
+
+    Attributes
+    ----------
+    friction_velocity
+        u*, m/s.
+    reynolds
+        Re* = u* d/nu.
+    shields
+        tau_c/((rho_sol - rho_f) g d).
+    drag, lift
+        The forces there, N.
+    valid
+        Whether the law holds there: its range of Re*, that of its drag, no lift-off.
     """
 
     friction_velocity: FloatArray
@@ -40,6 +62,28 @@ class Threshold:
     lift: FloatArray
     valid: BoolArray
 
+    def grain(self, index: int) -> "Threshold":
+        """Pick one grain of a list.
+
+        Parameters
+        ----------
+        index
+            Its place in the list: the arrays are of shape (n,).
+
+        Returns
+        -------
+        Threshold
+            Its threshold, with arrays of shape ().
+        """
+        return Threshold(
+            friction_velocity=self.friction_velocity[index],
+            reynolds=self.reynolds[index],
+            shields=self.shields[index],
+            drag=self.drag[index],
+            lift=self.lift[index],
+            valid=self.valid[index],
+        )
+
 
 def weight(
     *,
@@ -48,27 +92,153 @@ def weight(
     fluid_density: ArrayLike,
     gravity: ArrayLike = GRAVITY,
 ) -> FloatArray:
-    """Submerged weight W of a grain, N."""
+    """Compute the submerged weight W of a grain.
+
+    Parameters
+    ----------
+    diameter
+        Diameter of the grain, m.
+    density, fluid_density
+        Densities of the grain and of the fluid, kg/m3.
+    gravity
+        Acceleration of gravity, m/s2.
+
+    Returns
+    -------
+    FloatArray
+        Submerged weight, N, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(f"{weight(diameter=1e-3, density=2650.0, fluid_density=1000.0):.3e}")
+    8.475e-06
+    """
     excess = np.asarray(density, float) - np.asarray(fluid_density, float)
     volume = np.pi / 6 * np.asarray(diameter, float) ** 3
     return np.asarray(volume * excess * np.asarray(gravity, float))
 
 
-def pivot_resistance(slope_deg: ArrayLike, entrainment_angle_deg: ArrayLike) -> FloatArray:
-    """Moment over W that the flow needs about the pivot: cos(alpha - beta) (Eq. 1)."""
-    lean = np.radians(np.asarray(slope_deg, float) - np.asarray(entrainment_angle_deg, float))
+def pivot_resistance(
+    slope_deg: ArrayLike,
+    entrainment_angle_deg: ArrayLike,
+) -> FloatArray:
+    """Compute the moment of the weight about the pivot: cos(alpha - beta) (Eq. 1).
+
+    Parameters
+    ----------
+    slope_deg
+        Slope alpha of the bed, degrees, positive where the flow goes up it.
+    entrainment_angle_deg
+        Entrainment angle beta, degrees.
+
+    Returns
+    -------
+    FloatArray
+        Moment over W d/2 that the flow needs, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(pivot_resistance([0.0, 15.0], 60.0).round(4))
+    [0.5    0.7071]
+    """
+    slope = np.asarray(slope_deg, float)
+    lean = np.radians(slope - np.asarray(entrainment_angle_deg, float))
     return np.asarray(np.cos(lean))
 
 
-def standing_out(relative_size: ArrayLike, entrainment_angle_deg: ArrayLike) -> FloatArray:
-    """Part of a single grain's height that lies above the tops of its two neighbours.
+def standing_out(
+    relative_size: ArrayLike,
+    entrainment_angle_deg: ArrayLike,
+) -> FloatArray:
+    """Compute the part of a grain's height that lies above its two neighbours' tops.
 
-    Its diameter is D/d times that of the neighbours, whose centres are 2 d cos(beta) apart.
+    Parameters
+    ----------
+    relative_size
+        Diameter of the grain over that of its neighbours, D/d.
+    entrainment_angle_deg
+        Entrainment angle beta, degrees: the centres of the neighbours are 2 d cos(beta)
+        apart.
+
+    Returns
+    -------
+    FloatArray
+        That part, of the broadcast shape; negative for a grain that lies deeper.
+
+    Examples
+    --------
+    >>> print(standing_out([0.5, 1.0], 60.0).round(4))
+    [0.618 0.866]
     """
     size = np.asarray(relative_size, float)
-    half = np.cos(np.radians(np.asarray(entrainment_angle_deg, float)))
-    centre = np.sqrt(np.maximum(((1 + size) / 2) ** 2 - half**2, 0.0))
+    half_gap = np.cos(np.radians(np.asarray(entrainment_angle_deg, float)))
+    squared_height = ((1 + size) / 2) ** 2 - half_gap**2
+    centre = np.sqrt(np.maximum(squared_height, 0.0))
     return np.asarray((centre + size / 2 - 0.5) / size)
+
+
+@dataclass(frozen=True)
+class _Balances:
+    """Sums of forces and the targets that they reach, arrays of shape (n,)."""
+
+    law: ForceLaw
+    exposure: Exposure
+    along: FloatArray
+    outward: FloatArray
+    turning: FloatArray
+    target: FloatArray
+
+    def excess(self, ustar: FloatArray) -> FloatArray:
+        """The sum of the forces at local friction velocities (m/s), less its target."""
+        drag = self.law.drag(ustar, self.exposure) * self.along
+        lift = self.law.lift(ustar, self.exposure) * self.outward
+        torque = self.law.torque(ustar, self.exposure) * self.turning
+        return np.asarray(drag + lift + torque - self.target)
+
+    def at(self, places: IntArray) -> "_Balances":
+        """The balances at some places of the arrays."""
+        return _Balances(
+            law=self.law,
+            exposure=Exposure(*[field[places] for field in self.exposure.fields]),
+            along=self.along[places],
+            outward=self.outward[places],
+            turning=self.turning[places],
+            target=self.target[places],
+        )
+
+    def first_rungs(self) -> tuple[FloatArray, FloatArray]:
+        """Friction velocities of `RUNGS` between which each first root lies, m/s.
+
+        The upper one is NaN where no rung reaches the target, or none is needed. Rungs
+        are climbed from below, since the sum need not rise everywhere if a weight is
+        negative.
+        """
+        low = np.zeros_like(self.target)
+        high = np.full_like(self.target, np.nan)
+        unit = self.exposure.viscosity / self.exposure.diameter
+        left = np.flatnonzero(self.target > 0)
+        for rung in RUNGS:
+            ustar = rung * unit[left]
+            is_reached = self.at(left).excess(ustar) >= 0
+            high[left[is_reached]] = ustar[is_reached]
+            left = left[~is_reached]
+            low[left] = ustar[~is_reached]
+            if not len(left):
+                break
+        return low, high
+
+    def roots(self) -> FloatArray:
+        """The least local friction velocities that reach the targets, m/s.
+
+        NaN where none is needed, and infinite where none does.
+        """
+        found = np.where(self.target > 0, np.inf, np.nan)
+        low, high = self.first_rungs()
+        solved = np.flatnonzero(np.isfinite(high))
+        if len(solved):
+            excess = self.at(solved).excess
+            found[solved] = root(excess, low[solved], high[solved])
+        return found
 
 
 def friction_velocity_at(
@@ -81,72 +251,139 @@ def friction_velocity_at(
     turning: ArrayLike = 0.0,
     speed_up: ArrayLike = 1.0,
 ) -> FloatArray:
-    """The least undisturbed friction velocity at which a sum of the forces reaches a target.
+    """Find the least undisturbed friction velocity at which forces reach a target.
 
-    The sum is ``along drag + outward lift + turning torque`` at the local friction velocity, which
-    is `speed_up` times the undisturbed one. Where the flow runs backwards (`speed_up` < 0) drag
-    and torque change their sign. About a contact, `along` and `outward` are the arms of drag and
-    lift over a length, `turning` is one over it (1/m), and the target (N) is the moment of the
-    weight alike. Returned are m/s in the broadcast shape: NaN where the target is not positive,
-    since such a grain needs no flow, and infinite where no flow reaches it.
+    The sum ``along drag + outward lift + turning torque`` is that at the local friction
+    velocity, which is `speed_up` times the undisturbed one. Where the flow runs
+    backwards (`speed_up` < 0) drag and torque change their sign. About a contact,
+    `along` and `outward` are the arms of drag and lift over a length, `turning` is one
+    over it, and the target is the moment of the weight over the same length.
+
+    Parameters
+    ----------
+    law
+        The force law.
+    exposure
+        The grain and the fluid.
+    target
+        The target, N.
+    along, outward
+        Weights of drag and lift in the sum.
+    turning
+        Weight of the torque, 1/m.
+    speed_up
+        Local over undisturbed friction velocity.
+
+    Returns
+    -------
+    FloatArray
+        Undisturbed friction velocity, m/s, of the broadcast shape: NaN where the target
+        is not positive, since such a grain needs no flow, and infinite where no flow
+        reaches it.
+
+    Examples
+    --------
+    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> print(friction_velocity_at(LAWS["bridged"], sand, [1e-6, 0.0]).round(5))
+    [0.01028     nan]
     """
     local = np.asarray(speed_up, float)
-    weights = (np.sign(local) * along, np.asarray(outward), np.sign(local) * turning)
-    given = (*exposure.fields, *weights, np.asarray(target, float), np.abs(local))
-    arrays = np.broadcast_arrays(*given)
-    shape = arrays[0].shape
-    *args, ratio = (np.ravel(array).astype(float) for array in arrays)
-
-    def excess(ustar: FloatArray, *grain: FloatArray) -> FloatArray:
-        here, (a, b, c, goal) = Exposure(*grain[:6]), grain[6:]
-        sum_ = law.drag(ustar, here) * a + law.lift(ustar, here) * b + law.torque(ustar, here) * c
-        return np.asarray(sum_ - goal)
-
-    found = np.where(args[-1] > 0, np.inf, np.nan)
-    low, high = np.zeros_like(ratio), np.full_like(ratio, np.nan)
-    left = np.flatnonzero(args[-1] > 0)
-    unit = args[3] / args[0]
-    # rungs from below, since the sum need not rise everywhere if a weight is negative
-    for rung in RUNGS:
-        at = rung * unit[left]
-        reached = excess(at, *(arg[left] for arg in args)) >= 0
-        high[left[reached]] = at[reached]
-        left, at = left[~reached], at[~reached]
-        low[left] = at
-        if not len(left):
-            break
-    solved = np.flatnonzero(np.isfinite(high))
-    if len(solved):
-        grains = [arg[solved] for arg in args]
-        found[solved] = root(lambda ustar: excess(ustar, *grains), low[solved], high[solved])
+    direction = np.sign(local)
+    given = np.broadcast_arrays(
+        *exposure.fields,
+        direction * along,
+        np.asarray(outward),
+        direction * turning,
+        np.asarray(target, float),
+        np.abs(local),
+    )
+    flat = [np.ravel(array).astype(float) for array in given]
+    *fields, along, outward, turning, target, ratio = flat
+    balances = _Balances(law, Exposure(*fields), along, outward, turning, target)
+    found = balances.roots()
     with np.errstate(divide="ignore"):
-        return np.asarray((found / ratio).reshape(shape))
+        undisturbed = found / ratio
+    return np.asarray(undisturbed.reshape(given[0].shape))
 
 
-def root(function: Callable[[FloatArray], FloatArray], a: FloatArray, b: FloatArray) -> FloatArray:
-    """The roots between bounds of different signs (Chandrupatla, Adv. Eng. Softw. 28, 1997).
+class _Points(NamedTuple):
+    """Arguments of a function and its values there, arrays of one shape."""
 
-    scipy's `find_root` does the same, after an import of 0.4 s.
+    x: FloatArray
+    y: FloatArray
+
+
+def _where(condition: BoolArray, one: _Points, other: _Points) -> _Points:
+    """Take one where a condition holds, else the other."""
+    x = np.where(condition, one.x, other.x)
+    return _Points(x, np.where(condition, one.y, other.y))
+
+
+def root(
+    function: Callable[[FloatArray], FloatArray],
+    low: FloatArray,
+    high: FloatArray,
+) -> FloatArray:
+    """Find the roots between bounds of different signs, all at once.
+
+    The method is that of T. R. Chandrupatla, Adv. Eng. Softw. 28, 1997. scipy's
+    `find_root` does the same, after an import of 0.35 s.
+
+    Parameters
+    ----------
+    function
+        A function of an array whose values are of the same shape.
+    low, high
+        The bounds, arrays of that shape; the function has different signs there.
+
+    Returns
+    -------
+    FloatArray
+        The roots, of the same shape, right to the last digits.
+
+    Examples
+    --------
+    >>> print(root(lambda x: x**2 - [2.0, 3.0], np.zeros(2), np.full(2, 4.0)).round(6))
+    [1.414214 1.732051]
     """
-    fa, fb, t = function(a), function(b), np.full_like(a, 0.5)
+    newest = _Points(low, function(low))
+    opposite = _Points(high, function(high))
+    part = np.full_like(low, 0.5)
     with np.errstate(divide="ignore", invalid="ignore"):
-        for _ in range(100):
-            x = a + t * (b - a)
-            fx = function(x)
-            same = np.sign(fx) == np.sign(fa)
-            c, fc = np.where(same, a, b), np.where(same, fa, fb)
-            b, fb = np.where(same, b, a), np.where(same, fb, fa)
-            a, fa = x, fx
-            best = np.where(np.abs(fa) < np.abs(fb), a, b)
-            least = 2 * np.finfo(float).eps * np.abs(best) / np.abs(b - a)
-            if np.all((least > 0.5) | (fa == 0) | (fb == 0)):
+        for _ in range(MOST_STEPS):
+            x = newest.x + part * (opposite.x - newest.x)
+            tried = _Points(x, function(x))
+            has_same_sign = np.sign(tried.y) == np.sign(newest.y)
+            outside = _where(has_same_sign, newest, opposite)
+            opposite = _where(has_same_sign, opposite, newest)
+            newest = tried
+            is_newest_best = np.abs(newest.y) < np.abs(opposite.y)
+            best = _where(is_newest_best, newest, opposite).x
+            width = np.abs(opposite.x - newest.x)
+            least_part = 2 * np.finfo(float).eps * np.abs(best) / width
+            is_found = (least_part > 0.5) | (newest.y == 0) | (opposite.y == 0)
+            if np.all(is_found):
                 break
-            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-            inverse = fa / (fb - fa) * fc / (fb - fc)
-            inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-            is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
-            t = np.clip(np.where(is_safe, inverse, 0.5), least, 1 - least)
+            part = _next_part(newest, opposite, outside)
+            part = np.clip(part, least_part, 1 - least_part)
     return best
+
+
+def _next_part(newest: _Points, opposite: _Points, outside: _Points) -> FloatArray:
+    """Part of the way between two bounds at which the root is looked for next.
+
+    It is found by inverse quadratic interpolation through the bounds and the point
+    outside of them, where that is safe, else by bisection.
+    """
+    a, fa = newest
+    b, fb = opposite
+    c, fc = outside
+    xi = (a - b) / (c - b)
+    phi = (fa - fb) / (fc - fb)
+    is_safe = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
+    inverse = fa / (fb - fa) * fc / (fb - fc)
+    inverse += (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+    return np.where(is_safe, inverse, 0.5)
 
 
 def threshold(
@@ -159,34 +396,73 @@ def threshold(
     gravity: ArrayLike = GRAVITY,
     cohesion: ArrayLike = 0.0,
 ) -> Threshold:
-    """Threshold of one grain on its two neighbours under a force law.
+    """Find the threshold of one grain on its two neighbours under a force law.
 
-    Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta) + F_a sin(2 beta)``, the
-    third of Eqs. 1 with the torque T of the flow about the grain's centre and the pull
-    F_a = cohesion x d (N/m) of the contact that opens, for the least u*.
+    Solves ``f_d sin(beta) + f_l cos(beta) + T/(d/2) = W cos(alpha - beta) +
+    F_a sin(2 beta)``, the third of Eqs. 1 with the torque T of the flow about the
+    grain's centre and the pull F_a = cohesion x d of the contact that opens, for the
+    least u*. Inputs are not validated here.
 
-    The slope alpha is positive where the flow goes up it. Inputs are not validated here; a
-    resistance that is not positive gives NaN, and a grain that no flow moves an infinite friction
-    velocity.
+    Parameters
+    ----------
+    law
+        The force law.
+    exposure
+        The grain and the fluid.
+    density
+        Density of the grain, kg/m3.
+    slope_deg
+        Slope alpha of the bed, degrees, positive where the flow goes up it.
+    entrainment_angle_deg
+        Entrainment angle beta, degrees.
+    gravity
+        Acceleration of gravity, m/s2.
+    cohesion
+        Pull of a contact over the diameter, N/m.
+
+    Returns
+    -------
+    Threshold
+        The threshold, of the broadcast shape. A resistance that is not positive gives
+        NaN, and a grain that no flow moves an infinite friction velocity.
+
+    Examples
+    --------
+    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> angles = {"slope_deg": [0.0, 15.0], "entrainment_angle_deg": 60.0}
+    >>> found = threshold(LAWS["bridged"], sand, density=2650.0, **angles)
+    >>> print(found.shields.round(4))
+    [0.0242 0.0346]
     """
-    e, beta = exposure, np.radians(np.asarray(entrainment_angle_deg, float))
-    grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
-    submerged = weight(diameter=e.diameter, **grain)
-    moment = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
-    moment = moment + np.asarray(cohesion, float) * e.diameter * np.sin(2 * beta)
-    arms = {"along": np.sin(beta), "outward": np.cos(beta), "turning": 2 / e.diameter}
-    ustar = friction_velocity_at(law, e, moment, **arms)
-    # where no flow moves the grain the forces are those of an infinite one: not a number
+    beta = np.radians(np.asarray(entrainment_angle_deg, float))
+    submerged = weight(
+        diameter=exposure.diameter,
+        density=density,
+        fluid_density=exposure.fluid_density,
+        gravity=gravity,
+    )
+    of_weight = submerged * pivot_resistance(slope_deg, entrainment_angle_deg)
+    pull = np.asarray(cohesion, float) * exposure.diameter
+    ustar = friction_velocity_at(
+        law,
+        exposure,
+        of_weight + pull * np.sin(2 * beta),
+        along=np.sin(beta),
+        outward=np.cos(beta),
+        turning=2 / exposure.diameter,
+    )
+    # where no flow moves the grain the forces are those of an infinite one: NaN
     with np.errstate(invalid="ignore"):
-        lift = law.lift(ustar, e)
+        lift = law.lift(ustar, exposure)
         rolls = _lift_range(lift, submerged, slope_deg).holds
+        stress_area = exposure.fluid_density * (ustar * exposure.diameter) ** 2
         return Threshold(
             friction_velocity=ustar,
-            reynolds=e.reynolds(ustar),
-            shields=np.asarray(e.fluid_density * (ustar * e.diameter) ** 2 * np.pi / 6 / submerged),
-            drag=law.drag(ustar, e),
+            reynolds=exposure.reynolds(ustar),
+            shields=np.asarray(stress_area * np.pi / 6 / submerged),
+            drag=law.drag(ustar, exposure),
             lift=lift,
-            valid=law.valid(ustar, e) & rolls,
+            valid=law.valid(ustar, exposure) & rolls,
         )
 
 
@@ -199,26 +475,59 @@ def why_not(
     slope_deg: ArrayLike = 0.0,
     gravity: ArrayLike = GRAVITY,
 ) -> list[str]:
-    """Reasons against the thresholds u* (m/s) of some grains under a law, in words; empty if none.
+    """Say why thresholds of some grains do not hold under a law.
 
-    Parameters are those of `threshold`; without a density the weight, and with it a lift-off, is
-    left out.
+    Parameters
+    ----------
+    law
+        The force law.
+    ustar
+        Threshold friction velocities, m/s, of shape (n,) or ().
+    exposure
+        The grains and the fluid.
+    density
+        Density of the grains, kg/m3. Without it the weight, and with it a lift-off, is
+        left out.
+    slope_deg
+        Slope of the bed, degrees, positive where the flow goes up it.
+    gravity
+        Acceleration of gravity, m/s2.
+
+    Returns
+    -------
+    list of str
+        For each grain the reasons in words; empty where there are none.
+
+    Examples
+    --------
+    >>> sand = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6)
+    >>> why_not(LAWS["low"], np.array([0.002, 0.02]), sand)
+    ['', 'Re* 20 is not below 3']
     """
-    ranges = [*law.ranges(ustar, exposure)]
+    ranges = list(law.ranges(ustar, exposure))
     if density is not None:
-        e = exposure
-        grain = {"density": density, "fluid_density": e.fluid_density, "gravity": gravity}
-        submerged = weight(diameter=e.diameter, **grain)
-        ranges.append(_lift_range(law.lift(ustar, e), submerged, slope_deg))
+        submerged = weight(
+            diameter=exposure.diameter,
+            density=density,
+            fluid_density=exposure.fluid_density,
+            gravity=gravity,
+        )
+        lift = law.lift(ustar, exposure)
+        ranges.append(_lift_range(lift, submerged, slope_deg))
     return reasons(ranges, np.size(ustar))
 
 
-def _lift_range(lift: FloatArray, submerged: FloatArray, slope_deg: ArrayLike) -> Validity:
+def _lift_range(
+    lift: FloatArray,
+    submerged: FloatArray,
+    slope_deg: ArrayLike,
+) -> Validity:
     """Range of the pivot: a greater lift carries the grain off before it can roll."""
     normal = submerged * np.cos(np.radians(np.asarray(slope_deg, float)))
     with np.errstate(divide="ignore", invalid="ignore"):
         over = np.asarray(lift / normal)
-    return Validity("lift over the weight normal to the bed", over, -np.inf, LIFT_OFF)
+    quantity = "lift over the weight normal to the bed"
+    return Validity(quantity, over, -np.inf, LIFT_OFF)
 
 
 def shields_at(
@@ -230,32 +539,103 @@ def shields_at(
     slope_deg: ArrayLike = 0.0,
     lift_coefficient: ArrayLike = LIFT_COEFFICIENT,
 ) -> FloatArray:
-    """Threshold Shields number at a friction Reynolds number: a law's curve in the Shields diagram.
+    """Compute a law's curve in the Shields diagram.
 
-    No fluid and no grain is needed, since in units of d, nu and rho_f the moment of the forces
-    depends on Re*, z0/d and the angles alone.
+    No fluid and no grain is needed, since in units of d, nu and rho_f the moment of the
+    forces depends on Re*, z0/d and the angles alone.
+
+    Parameters
+    ----------
+    law
+        The force law.
+    reynolds
+        Friction Reynolds number Re* at the threshold.
+    roughness_ratio
+        Roughness length over diameter, z0/d.
+    entrainment_angle_deg
+        Entrainment angle beta, degrees.
+    slope_deg
+        Slope of the bed, degrees, positive where the flow goes up it.
+    lift_coefficient
+        Coefficient alpha_s of Eqs. 2 and 4.
+
+    Returns
+    -------
+    FloatArray
+        Threshold Shields number, of the broadcast shape.
+
+    Examples
+    --------
+    >>> pocket = {"roughness_ratio": 1 / 30, "entrainment_angle_deg": 60}
+    >>> print(shields_at(LAWS["bridged"], [1.0, 10.0, 100.0], **pocket).round(4))
+    [0.0507 0.0253 0.0334]
     """
-    unit = Exposure(1.0, roughness_ratio, 1.0, 1.0, lift_coefficient)
+    unit = Exposure(
+        diameter=1.0,
+        roughness=roughness_ratio,
+        fluid_density=1.0,
+        viscosity=1.0,
+        lift_coefficient=lift_coefficient,
+    )
     ustar = np.asarray(reynolds, float)
     beta = np.radians(np.asarray(entrainment_angle_deg, float))
-    moment = law.drag(ustar, unit) * np.sin(beta) + law.lift(ustar, unit) * np.cos(beta)
-    moment = moment + 2 * law.torque(ustar, unit)
+    of_drag = law.drag(ustar, unit) * np.sin(beta)
+    of_lift = law.lift(ustar, unit) * np.cos(beta)
+    moment = of_drag + of_lift + 2 * law.torque(ustar, unit)
     resistance = np.pi / 6 * pivot_resistance(slope_deg, entrainment_angle_deg)
     return np.asarray(resistance * ustar**2 / moment)
 
 
 def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:
-    """Which of Eqs. 2 and 4 holds at its own threshold: ``low``, ``high`` or ``transition``.
+    """Say which of Eqs. 2 and 4 holds at its own threshold.
 
-    The ranges of Re* decide, Re* < 3 and Re* >= 30, and not the end of the drag of Eq. 4: gravel is
-    in the high regime, if beyond its drag law.
+    The ranges of Re* decide, Re* < 3 and Re* >= 30, and not the end of the drag of Eq.
+    4: gravel is in the high regime, if beyond its drag law.
+
+    Parameters
+    ----------
+    low, high
+        Thresholds of the same grains by Eq. 2 and by Eq. 4.
+
+    Returns
+    -------
+    NDArray[np.str_]
+        ``low``, ``high`` or ``transition``, of the shape of the thresholds.
+
+    Examples
+    --------
+    >>> sand = Exposure([5e-5, 1e-3], [5e-6, 1e-4], 1000.0, 1e-6)
+    >>> pocket = {"density": 2650.0, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
+    >>> print(regime(*(threshold(LAWS[n], sand, **pocket) for n in ("low", "high"))))
+    ['low' 'transition']
     """
-    slow, fast = low.reynolds < LAWS["low"].reynolds[1], high.reynolds >= LAWS["high"].reynolds[0]
-    return np.where(slow, "low", np.where(fast, "high", "transition"))
+    _, low_end = LAWS["low"].reynolds
+    high_start, _ = LAWS["high"].reynolds
+    is_low = low.reynolds < low_end
+    is_high = high.reynolds >= high_start
+    return np.select([is_low, is_high], ["low", "high"], "transition")
 
 
 class SingleGrain(NamedTuple):
-    """All quantities that the closed form depends on, SI units and degrees."""
+    """All quantities that the closed form depends on.
+
+    Attributes
+    ----------
+    diameter, roughness
+        Diameter of the grain and roughness length of the bed, m.
+    fluid_density, viscosity
+        Density, kg/m3, and kinematic viscosity, m2/s, of the fluid.
+    lift_coefficient
+        Coefficient alpha_s of Eqs. 2 and 4.
+    density
+        Density of the grain, kg/m3.
+    slope_deg, entrainment_angle_deg
+        Slope of the bed and entrainment angle, degrees.
+    gravity
+        Acceleration of gravity, m/s2.
+    cohesion
+        Pull of a contact over the diameter, N/m.
+    """
 
     diameter: float
     roughness: float
@@ -269,16 +649,62 @@ class SingleGrain(NamedTuple):
     cohesion: float = 0.0
 
 
-_CACHE: dict[tuple[str, tuple[float, ...]], Threshold] = {}
+_ANSWERS: dict[tuple[str, tuple[float, ...]], Threshold] = {}
+"""Thresholds that were found, by the name of the law and the grain."""
 
 
 def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Threshold]:
-    """The thresholds of grains (as `SingleGrain`) under a force law, each of shape ()."""
+    """Find the thresholds of grains under a force law, each once.
+
+    Many grains at once take a hundredth of the time that they take one by one.
+
+    Parameters
+    ----------
+    name
+        Name of the force law.
+    grains
+        The grains, with the quantities of `SingleGrain` in their order.
+
+    Returns
+    -------
+    list of Threshold
+        Their thresholds, each of shape ().
+
+    Examples
+    --------
+    >>> water = {"fluid_density": 1000.0, "viscosity": 1e-6}
+    >>> bed = {"roughness": 1e-4, "slope_deg": 0.0, "entrainment_angle_deg": 60.0}
+    >>> sand = {"diameter": 1e-3, "density": 2650.0, "lift_coefficient": 1.615}
+    >>> grain = SingleGrain(**sand, **bed, **water, gravity=9.81)
+    >>> print(thresholds_of("bridged", [grain])[0].shields.round(4))
+    0.0418
+    """
     keys = [(name, tuple(grain)) for grain in grains]
-    if new := [key for key in dict.fromkeys(keys) if key not in _CACHE]:
-        columns = np.array([grain for _, grain in new]).T
-        rest = dict(zip(SingleGrain._fields[5:], columns[5:], strict=True))
-        columnwise = threshold(LAWS[name], Exposure(*columns[:5]), **rest)
-        rows = zip(*vars(columnwise).values(), strict=True)
-        _CACHE.update(zip(new, (Threshold(*row) for row in rows), strict=True))
-    return [_CACHE[key] for key in keys]
+    new = [key for key in dict.fromkeys(keys) if key not in _ANSWERS]
+    if new:
+        table = np.array([grain for _, grain in new])
+        found = _threshold_of_table(name, table)
+        for place, key in enumerate(new):
+            _ANSWERS[key] = found.grain(place)
+    return [_ANSWERS[key] for key in keys]
+
+
+def _threshold_of_table(name: str, table: FloatArray) -> Threshold:
+    """The thresholds of a table with a row for each grain, of shape (rows,)."""
+    column = dict(zip(SingleGrain._fields, table.T, strict=True))
+    exposure = Exposure(
+        diameter=column["diameter"],
+        roughness=column["roughness"],
+        fluid_density=column["fluid_density"],
+        viscosity=column["viscosity"],
+        lift_coefficient=column["lift_coefficient"],
+    )
+    return threshold(
+        LAWS[name],
+        exposure,
+        density=column["density"],
+        slope_deg=column["slope_deg"],
+        entrainment_angle_deg=column["entrainment_angle_deg"],
+        gravity=column["gravity"],
+        cohesion=column["cohesion"],
+    )

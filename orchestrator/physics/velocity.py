@@ -1,182 +1,505 @@
-"""Mean velocity over a bed: the log law, speed and shear around a grain, van Driest's profile.
+"""Mean velocity over a bed: log law, speed and shear at a grain, van Driest's profile.
 
-Fig. 3 of the paper has two profiles at the scale of a grain: linear in a viscous flow, logarithmic
-over a rough wall. Between them viscosity and turbulence carry the stress together (`bridge`).
+Fig. 3 of the paper has two profiles at the scale of a grain: linear in a viscous flow,
+logarithmic over a rough wall. Between them viscosity and turbulence carry the stress
+together (`bridge`).
 
-Van Driest's profile goes from the sublayer to the logarithm. In wall units (y = z ustar/nu):
-``U' + l^2 U'^2 = 1``, ``l = 0.41 y (1 - exp(-y/26))``. Roughness shifts y by D of Rotta (1962) in
-the correlation of Cebeci and Chang (1978). The shear depends on z + D alone, so that two integrals,
-tabulated once, serve every grain. The form and the constants 0.9 and 6 agree with code_saturne
-(cs_wall_functions), which cites these authors; 26 is the value commonly quoted of van Driest.
+Van Driest's profile goes from the sublayer to the logarithm. In wall units
+(y = z ustar/nu): ``U' + l^2 U'^2 = 1``, ``l = 0.41 y (1 - exp(-y/26))``. Roughness
+shifts y by D of Rotta (1962) in the correlation of Cebeci and Chang (1978). The shear
+depends on z + D alone, so that two integrals, tabulated once, serve every grain. The
+form and the constants 0.9 and 6 agree with code_saturne (cs_wall_functions), which
+cites these authors; 26 is the value commonly quoted of van Driest.
 """
 
+from dataclasses import dataclass
 from functools import cache
+from typing import Self
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from orchestrator.physics.constants import GAS_BELOW, INVERSE_KARMAN, KARMAN
 from orchestrator.types import FloatArray
 
 SMOOTH_WALL = 1 / 9
-"""Roughness length of a smooth wall over nu/u* (Nikuradse 1932: u/u* = 2.5 ln(u* z/nu) + 5.5)."""
+"""Roughness length of a smooth wall over nu/u*.
+
+Nikuradse 1932: u/u* = 2.5 ln(u* z/nu) + 5.5.
+"""
 ROUGH_FROM = 70 / 30
-"""u* z0/nu from which a bed is hydraulically rough: u* k_s/nu = 70, k_s = 30 z0 (Nikuradse)."""
+"""u* z0/nu from which a bed is hydraulically rough.
+
+u* k_s/nu = 70 with k_s = 30 z0 (Nikuradse).
+"""
 LAMINAR_BELOW = 2000.0
 """U D/nu below which open water may be laminar, and has no logarithmic profile."""
-HIDDEN = 1e-9  # least exposed part of a grain: none below the flow divides by zero
-DAMPING = 26.0  # van Driest's A+
-ROUGHEST = 2000.0  # ks ustar/nu up to which the correlation of the shift is in use
-SMOOTHEST, TALLEST = 1e-3, 1e9
-"""Wall units between which the integrals are tabulated. Below, the speed is y to 16 digits; above,
-the shear is that of the log law to 9."""
-STEP = 0.03  # of the table in ln y: interpolation errs by less than 1e-12, relative
+HIDDEN = 1e-9
+"""Least part of a grain's height that is exposed.
+
+No force divides by zero for a grain below the flow.
+"""
+DAMPING = 26.0
+"""van Driest's A+, wall units."""
+ROUGHEST = 2000.0
+"""ks ustar/nu up to which the correlation of the shift is in use."""
+SMOOTHEST = 1e-3
+"""Distance from which the integrals are tabulated, wall units.
+
+Below, the speed is y to 16 digits.
+"""
+TALLEST = 1e9
+"""Distance up to which the integrals are tabulated, wall units.
+
+Above, the shear is that of the log law to 9 digits.
+"""
+STEP = 0.03
+"""Step of the tables in ln y: interpolation errs by less than 1e-12, relative."""
+GAUSS_POINTS = 12
+"""Points of the quadrature within an interval of the tables."""
 
 
 def log_law_ustar(
-    speed: ArrayLike, height: ArrayLike, roughness: ArrayLike, *, printed: bool = False
+    speed: ArrayLike,
+    height: ArrayLike,
+    roughness: ArrayLike,
+    *,
+    printed: bool = False,
 ) -> FloatArray:
-    """Eq. 10: friction velocity (m/s) from the tangential speed at a height above the bed.
+    """Compute the friction velocity from a speed above the bed by the log law (Eq. 10).
 
-    The rough wall's own profile is ``ln((z + z0)/z0)``; the paper prints ``ln(z/z0)``, which
-    changes its sign below z0.
+    The rough wall's own profile is ``ln((z + z0)/z0)``; the paper prints ``ln(z/z0)``,
+    which changes its sign below z0.
+
+    Parameters
+    ----------
+    speed
+        Speed along the bed, m/s.
+    height
+        Height z above the bed, m.
+    roughness
+        Roughness length z0 of the bed, m.
+    printed
+        Whether the profile is that which the paper prints.
+
+    Returns
+    -------
+    FloatArray
+        Friction velocity, m/s, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(log_law_ustar(10.0, 1.0, [1e-4, 1e-3]).round(4))
+    [0.4451 0.5934]
     """
     over = np.asarray(height, float) / np.asarray(roughness, float)
     profile = np.log(over) if printed else np.log1p(over)
     return np.asarray(KARMAN * np.asarray(speed, float) / profile)
 
 
-def log_law_speed(ustar: ArrayLike, height: ArrayLike, roughness: ArrayLike) -> FloatArray:
-    """Mean speed (m/s) at a height over a bed of roughness length z0 (m), the inverse of Eq. 10."""
+def log_law_speed(
+    ustar: ArrayLike,
+    height: ArrayLike,
+    roughness: ArrayLike,
+) -> FloatArray:
+    """Compute the mean speed over a bed by the log law, the inverse of Eq. 10.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    height
+        Height z above the bed, m.
+    roughness
+        Roughness length z0 of the bed, m.
+
+    Returns
+    -------
+    FloatArray
+        Mean speed, m/s, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(log_law_speed(0.5, [1.0, 10.0], 1e-4).round(2))
+    [11.23 14.04]
+    """
     over = np.asarray(height, float) / np.asarray(roughness, float)
     return np.asarray(np.asarray(ustar, float) / KARMAN * np.log1p(over))
 
 
 def depth_mean_speed(
-    ustar: ArrayLike, depth: ArrayLike, roughness: ArrayLike, *, closed: ArrayLike = False
+    ustar: ArrayLike,
+    depth: ArrayLike,
+    roughness: ArrayLike,
+    *,
+    closed: ArrayLike = False,
 ) -> FloatArray:
-    """Depth-averaged speed (m/s) of wide open water of a depth (m) with that profile up to its top.
+    """Compute the depth-averaged speed of wide water with the log profile.
 
-    The mean of ``ln((z + z0)/z0)`` from 0 to h is ``(1 + z0/h) ln(1 + h/z0) - 1``. For a river
-    u* = sqrt(g h S) belongs to it, S the slope of its surface. A closed channel has the profile of
-    half its depth on each wall.
+    The mean of ``ln((z + z0)/z0)`` from 0 to h is ``(1 + z0/h) ln(1 + h/z0) - 1``. For
+    a river u* = sqrt(g h S) belongs to it, S the slope of its surface. A closed channel
+    has the profile of half its depth on each wall.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    depth
+        Depth h, m.
+    roughness
+        Roughness length z0 of the bed, m.
+    closed
+        Whether the water is a closed channel; else its top is open.
+
+    Returns
+    -------
+    FloatArray
+        Depth-averaged speed, m/s, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(depth_mean_speed(0.05, 1.0, 1e-4, closed=[False, True]).round(4))
+    [1.0014 0.917 ]
     """
-    part = np.asarray(roughness, float) / (np.asarray(depth, float) / np.where(closed, 2, 1))
+    profiles = np.where(closed, 2, 1)
+    part = np.asarray(roughness, float) / (np.asarray(depth, float) / profiles)
     mean = (1 + part) * np.log1p(1 / part) - 1
     return np.asarray(np.asarray(ustar, float) / KARMAN * mean)
 
 
 def measurable_speeds(
     ustar: ArrayLike,
-    roughness: ArrayLike,
-    viscosity: ArrayLike,
-    density: ArrayLike,
-    depth: ArrayLike,
     *,
+    roughness: ArrayLike,
+    density: ArrayLike,
+    viscosity: ArrayLike,
+    depth: ArrayLike,
     closed: bool = False,
 ) -> dict[str, FloatArray]:
-    """Speeds of an undisturbed flow that are measured, by the column of a table, m/s.
+    """Compute the speeds of an undisturbed flow that are measured.
 
-    NaN is what it has not: wind of a liquid, current of a gas, a height above its `depth` (m; NaN:
-    none), a mean velocity without a depth or where it may be laminar.
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    roughness
+        Roughness length z0 of the bed, m.
+    density
+        Density of the fluid, kg/m3.
+    viscosity
+        Kinematic viscosity of the fluid, m2/s.
+    depth
+        Depth of the flow, m; NaN where it has none.
+    closed
+        Whether the flow is a closed channel.
+
+    Returns
+    -------
+    dict
+        Speeds, m/s, of the broadcast shape, by the column of a table: of a wind at 1
+        and at 10 m, of a current at 1 m, and the depth-averaged one. NaN is what the
+        flow has not: the wind of a liquid, the current of a gas, a height above its
+        depth, a mean velocity without a depth or where the flow may be laminar.
+
+    Examples
+    --------
+    >>> water = {"roughness": 1e-4, "density": 1000.0, "viscosity": 1e-6}
+    >>> speeds = measurable_speeds(0.05, **water, depth=0.5)
+    >>> print(speeds["current_1m_m_s"], speeds["mean_velocity_m_s"].round(3))
+    nan 0.917
     """
-    nu, deep, rho = (np.asarray(x, float) for x in (viscosity, depth, density))
-    is_gas = rho < GAS_BELOW
-    with np.errstate(divide="ignore", invalid="ignore"):  # without a flow, and without a depth
+    nu = np.asarray(viscosity, float)
+    deep = np.asarray(depth, float)
+    is_gas = np.asarray(density, float) < GAS_BELOW
+    # without a flow, and without a depth, numbers are divided by zero or not numbers
+    with np.errstate(divide="ignore", invalid="ignore"):
         z0 = outer_roughness(roughness, ustar, nu)
-        at_1, at_10 = (np.where(deep < z, np.nan, log_law_speed(ustar, z, z0)) for z in (1, 10))
+        at_1 = np.where(deep < 1, np.nan, log_law_speed(ustar, 1, z0))
+        at_10 = np.where(deep < 10, np.nan, log_law_speed(ustar, 10, z0))
         mean = depth_mean_speed(ustar, deep, z0, closed=closed)
-        return {
-            "wind_1m_m_s": np.where(is_gas, at_1, np.nan),
-            "wind_10m_m_s": np.where(is_gas, at_10, np.nan),
-            "current_1m_m_s": np.where(is_gas, np.nan, at_1),
-            "mean_velocity_m_s": np.where(mean * deep / nu >= LAMINAR_BELOW, mean, np.nan),
-        }
+        is_turbulent = mean * deep / nu >= LAMINAR_BELOW
+    return {
+        "wind_1m_m_s": np.where(is_gas, at_1, np.nan),
+        "wind_10m_m_s": np.where(is_gas, at_10, np.nan),
+        "current_1m_m_s": np.where(is_gas, np.nan, at_1),
+        "mean_velocity_m_s": np.where(is_turbulent, mean, np.nan),
+    }
 
 
 def smooth_wall_roughness(ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
-    """Roughness length (m) of a smooth wall, nu/(9 u*)."""
-    return np.asarray(SMOOTH_WALL * np.asarray(viscosity, float) / np.asarray(ustar, float))
+    """Compute the roughness length of a smooth wall, nu/(9 u*).
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    viscosity
+        Kinematic viscosity, m2/s.
+
+    Returns
+    -------
+    FloatArray
+        Roughness length, m, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(f"{smooth_wall_roughness(0.01, 1e-6):.3e}")
+    1.111e-05
+    """
+    nu = np.asarray(viscosity, float)
+    return np.asarray(SMOOTH_WALL * nu / np.asarray(ustar, float))
 
 
-def outer_roughness(roughness: ArrayLike, ustar: ArrayLike, viscosity: ArrayLike) -> FloatArray:
-    """Roughness length (m) that the flow high above a bed has: z0 + nu/(9 u*), if not rough.
+def outer_roughness(
+    roughness: ArrayLike,
+    ustar: ArrayLike,
+    viscosity: ArrayLike,
+) -> FloatArray:
+    """Compute the roughness length of the flow high above a bed.
 
-    Colebrook's sum of the rough and the smooth wall (J. Inst. Civ. Eng. 11, 1939); Nikuradse's sand
-    lies a little below it. It is z0 on a rough bed, and without a friction velocity.
+    It is z0 + nu/(9 u*) where the bed is not hydraulically rough: Colebrook's sum of
+    the rough and the smooth wall (J. Inst. Civ. Eng. 11, 1939); Nikuradse's sand lies a
+    little below it.
+
+    Parameters
+    ----------
+    roughness
+        Roughness length z0 of the bed, m.
+    ustar
+        Friction velocity, m/s.
+    viscosity
+        Kinematic viscosity, m2/s.
+
+    Returns
+    -------
+    FloatArray
+        Roughness length, m, of the broadcast shape. It is z0 on a rough bed, and
+        without a friction velocity.
+
+    Examples
+    --------
+    >>> print(outer_roughness([1e-6, 3e-4], 0.01, 1e-6).round(9))
+    [1.2111e-05 3.0000e-04]
     """
     z0 = np.asarray(roughness, float)
     with np.errstate(divide="ignore", invalid="ignore"):
         number = np.asarray(ustar) * z0 / np.asarray(viscosity)
         is_smoothed = (number > 0) & (number < ROUGH_FROM)
-        return np.where(is_smoothed, z0 + smooth_wall_roughness(ustar, viscosity), z0)
+        smoothed = z0 + smooth_wall_roughness(ustar, viscosity)
+    return np.where(is_smoothed, smoothed, z0)
 
 
 def viscous_length(diameter: FloatArray, gap: FloatArray) -> FloatArray:
-    """Mean of the height above the bed over the height of a grain, m.
+    """Compute the mean of the height above the bed over the height of a grain.
 
-    The mean speed of the linear profile of Eq. 2 is ustar^2/nu times it: d/2 + z0 for a grain whose
-    lowest point lies a gap z0 above the bed. Parts of a grain below the bed feel nothing.
+    The mean speed of the linear profile of Eq. 2 is ustar^2/nu times it: d/2 + z0 for a
+    grain whose lowest point lies a gap z0 above the bed. Parts of a grain below the bed
+    feel nothing.
+
+    Parameters
+    ----------
+    diameter
+        Diameter of the grain, m.
+    gap
+        Height of its lowest point above the bed, m; negative below it.
+
+    Returns
+    -------
+    FloatArray
+        The mean height, m, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(viscous_length(np.array(1e-3), np.array([1e-4, 0.0, -5e-4])))
+    [0.0006   0.0005   0.000125]
     """
     bottom = np.maximum(gap, 0.0)
     part = np.maximum(1 - (bottom - gap) / diameter, HIDDEN)
     return np.asarray(part * (part * diameter / 2 + bottom))
 
 
-def rough_speed(diameter: FloatArray, roughness: FloatArray, gap: FloatArray) -> FloatArray:
-    """V_f/ustar of Eq. 4: ``2.5 ln(z/z0)`` averaged over the height of a grain above z0.
+def rough_speed(
+    diameter: FloatArray,
+    roughness: FloatArray,
+    gap: FloatArray,
+) -> FloatArray:
+    """Compute V_f/ustar of Eq. 4: ``2.5 ln(z/z0)`` averaged over a grain's height.
 
-    For a gap of z0 it is ``2.5 ((1 + z0/d) ln(1 + d/z0) - 1)``.
+    The speed is 0 below z0. For a gap of z0 the mean is
+    ``2.5 ((1 + z0/d) ln(1 + d/z0) - 1)``.
+
+    Parameters
+    ----------
+    diameter
+        Diameter of the grain, m.
+    roughness
+        Roughness length z0 of the bed, m.
+    gap
+        Height of the grain's lowest point above the bed, m.
+
+    Returns
+    -------
+    FloatArray
+        Mean speed over ustar, of the broadcast shape.
+
+    Examples
+    --------
+    >>> z0 = np.array(1e-3 / 30)
+    >>> print(rough_speed(np.array(1e-3), z0, z0).round(4))
+    6.3711
     """
     bottom = np.maximum(gap, roughness)
     part = np.maximum(1 - (bottom - gap) / diameter, HIDDEN)
-    ratio, low = roughness / diameter, bottom / roughness
+    ratio = roughness / diameter
+    low = bottom / roughness
     high = low + part / ratio
     mean = ratio * (high * np.log(high) - low * np.log(low)) - part
     return np.asarray(np.maximum(INVERSE_KARMAN * mean, HIDDEN))
 
 
-def rough_gradient(diameter: FloatArray, roughness: FloatArray, gap: FloatArray) -> FloatArray:
-    """(du/dz)/ustar of Eq. 4, averaged alike, 1/m."""
+def rough_gradient(
+    diameter: FloatArray,
+    roughness: FloatArray,
+    gap: FloatArray,
+) -> FloatArray:
+    """Compute (du/dz)/ustar of Eq. 4, averaged over a grain's height.
+
+    Parameters
+    ----------
+    diameter
+        Diameter of the grain, m.
+    roughness
+        Roughness length z0 of the bed, m.
+    gap
+        Height of the grain's lowest point above the bed, m.
+
+    Returns
+    -------
+    FloatArray
+        Mean shear over ustar, 1/m, of the broadcast shape.
+
+    Examples
+    --------
+    >>> z0 = np.array(1e-3 / 30)
+    >>> print(rough_gradient(np.array(1e-3), z0, z0).round(1))
+    8585.0
+    """
     bottom = np.maximum(gap, roughness)
     part = np.maximum(1 - (bottom - gap) / diameter, HIDDEN)
     return np.asarray(INVERSE_KARMAN * np.log1p(part * diameter / bottom) / diameter)
 
 
 def bridge(ustar: FloatArray, viscous: FloatArray, rough: FloatArray) -> FloatArray:
-    """The positive root x of ``ustar^2 = viscous x + (x/rough)^2``.
+    """Compute the positive root x of ``ustar^2 = viscous x + (x/rough)^2``.
 
-    `viscous` is nu over a length (m/s) for a speed x, nu (m2/s) for a gradient; `rough` is x/ustar
-    where turbulence carries the whole stress. Without the difference of two near numbers the root
-    is right to the last digits where either term is negligible.
+    Without the difference of two near numbers the root is right to the last digits
+    where either term is negligible.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity, m/s.
+    viscous
+        nu over a length, m/s, for a speed x; nu, m2/s, for a gradient.
+    rough
+        x/ustar where turbulence carries the whole stress.
+
+    Returns
+    -------
+    FloatArray
+        The speed, m/s, or the gradient, 1/s, of the broadcast shape.
+
+    Examples
+    --------
+    >>> print(bridge(np.array(1.0), np.array([0.0, 1.0, 1e9]), np.array(5.0)))
+    [5.00000000e+00 9.62912018e-01 1.00000000e-09]
     """
-    return np.asarray(2 * ustar**2 / (viscous + np.hypot(viscous, 2 * ustar / rough)))
+    root = np.hypot(viscous, 2 * ustar / rough)
+    return np.asarray(2 * ustar**2 / (viscous + root))
 
 
 def shift(roughness: FloatArray) -> FloatArray:
-    """Shift D of the wall in wall units, of ks ustar/nu; none below 4.535, where it is smooth."""
-    k = roughness
-    rotta = 0.9 * (np.sqrt(k) - k * np.exp(-k / 6))
+    """Compute the shift D of the wall by its roughness, in wall units.
+
+    ``D = 0.9 (sqrt(k) - k exp(-k/6))`` (Rotta 1962; Cebeci and Chang 1978).
+
+    Parameters
+    ----------
+    roughness
+        Equivalent sand-grain roughness k = ks ustar/nu.
+
+    Returns
+    -------
+    FloatArray
+        Shift, of the same shape; 0 below k = 4.535, where the wall is smooth.
+
+    Examples
+    --------
+    >>> print(shift(np.array([1.0, 10.0, 100.0])).round(4))
+    [0.     1.1462 9.    ]
+    """
+    rotta = 0.9 * (np.sqrt(roughness) - roughness * np.exp(-roughness / 6))
     # the correlation is positive again below 1.9, outside of its range
-    return np.where(k > 4, np.maximum(rotta, 0), 0)
+    return np.where(roughness > 4, np.maximum(rotta, 0), 0)
 
 
-def layer(base: FloatArray, top: FloatArray, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean speed U/ustar and mean shear nu U'/ustar^2 of van Driest's profile over a layer.
+def layer(
+    base: FloatArray,
+    top: FloatArray,
+    moved: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Average van Driest's profile over a layer.
 
-    Its ends above the bed and the shift of the wall are in wall units.
+    Parameters
+    ----------
+    base, top
+        Heights of the layer's ends above the bed, wall units.
+    moved
+        Shift of the wall, wall units.
+
+    Returns
+    -------
+    speed, shear
+        Mean speed U/ustar and mean shear nu U'/ustar^2, of the broadcast shape.
+
+    Examples
+    --------
+    >>> speed, shear = layer(np.array(0.0), np.array([1.0, 100.0]), np.array(0.0))
+    >>> print(speed.round(3), shear.round(3))
+    [ 0.5   13.434] [1.    0.165]
     """
     depth = top - base
-    speed = (_speed_integral(top + moved) - _speed_integral(base + moved)) / depth - _speed(moved)
-    return speed, (_speed(top + moved) - _speed(base + moved)) / depth
+    rise = _speed_integral(top + moved) - _speed_integral(base + moved)
+    speed = rise / depth - _speed(moved)
+    shear = (_speed(top + moved) - _speed(base + moved)) / depth
+    return speed, shear
 
 
 def shear(y: FloatArray) -> FloatArray:
-    """Shear nu U'/ustar^2 at a distance from the shifted wall (wall units)."""
+    """Compute the shear nu U'/ustar^2 of van Driest's profile.
+
+    Parameters
+    ----------
+    y
+        Distance from the shifted wall, wall units.
+
+    Returns
+    -------
+    FloatArray
+        Shear, of the same shape.
+
+    Examples
+    --------
+    >>> print(shear(np.array([0.0, 5.0, 100.0])).round(4))
+    [1.     0.8966 0.0246]
+    """
     return 2 / (1 + np.sqrt(1 + 4 * _mixing_length(y) ** 2))
 
 
 def _mixing_length(y: FloatArray) -> FloatArray:
+    """Mixing length of van Driest, l = 0.41 y (1 - exp(-y/26)), wall units."""
     return -KARMAN * y * np.expm1(-y / DAMPING)
 
 
@@ -187,50 +510,92 @@ def _log_above(y: FloatArray) -> FloatArray:
 
 def _speed(y: FloatArray) -> FloatArray:
     """Integral of the shear from the shifted wall."""
-    return np.where(y < SMOOTHEST, y, _read(0, y) + _log_above(y))
+    table, _ = _tables()
+    return np.where(y < SMOOTHEST, y, table.read(y) + _log_above(y))
 
 
 def _speed_integral(y: FloatArray) -> FloatArray:
     """Integral of the speed from the shifted wall."""
-    above = np.maximum(y - TALLEST, 0) * (_read(0, np.asarray(TALLEST)) - 1 / KARMAN)
-    return np.where(y < SMOOTHEST, y**2 / 2, _read(1, y) + above + y * _log_above(y))
+    speed_table, table = _tables()
+    speed_at_end = speed_table.read(np.asarray(TALLEST))
+    above = np.maximum(y - TALLEST, 0) * (speed_at_end - 1 / KARMAN)
+    whole = table.read(y) + above + y * _log_above(y)
+    return np.where(y < SMOOTHEST, y**2 / 2, whole)
 
 
-def _read(which: int, y: FloatArray) -> FloatArray:
-    """The value of a table at y, between its ends."""
-    place = np.log(np.clip(y, SMOOTHEST, TALLEST) / SMOOTHEST) / STEP
-    node = np.floor(place).astype(int)
-    *rest, value = (coefficient[node] for coefficient in _tables()[which])
-    for coefficient in reversed(rest):
-        value = value * (place - node) + coefficient
-    return np.asarray(value)
+@dataclass(frozen=True)
+class _Table:
+    """A function of y as polynomials between nodes at equal steps of ln y.
+
+    `coefficients`, of shape (6, intervals), are those of 1, x, ... x^5, with x from 0
+    to 1 in each interval.
+    """
+
+    coefficients: FloatArray
+
+    @classmethod
+    def through(cls, value: FloatArray, slope: FloatArray, bend: FloatArray) -> Self:
+        """Interpolate by the quintic Hermite polynomials.
+
+        They have the given value, first and second derivative by ln y at both nodes of
+        an interval; all three are arrays of shape (nodes,). scipy's `BPoly` does the
+        same, after an import of 0.3 s.
+        """
+        c0 = value
+        c1 = slope * STEP
+        c2 = bend * STEP**2 / 2
+        # what the first three terms leave of each derivative at the next node
+        value_left = c0[1:] - (c0 + c1 + c2)[:-1]
+        slope_left = c1[1:] - (c1 + 2 * c2)[:-1]
+        bend_left = (c2[1:] - c2[:-1]) * 2
+        c3 = 10 * value_left - 4 * slope_left + bend_left / 2
+        c4 = -15 * value_left + 7 * slope_left - bend_left
+        c5 = 6 * value_left - 3 * slope_left + bend_left / 2
+        return cls(np.array([c0[:-1], c1[:-1], c2[:-1], c3, c4, c5]))
+
+    def read(self, y: FloatArray) -> FloatArray:
+        """The function at y, which is moved to the nearest end of the table.
+
+        It is NaN where y is.
+        """
+        place = np.log(np.clip(y, SMOOTHEST, TALLEST) / SMOOTHEST) / STEP
+        # NaN is no index: any interval does, since the place inside it stays NaN
+        interval = np.nan_to_num(np.floor(place)).astype(int)
+        inside = place - interval
+        return np.asarray(polyval(inside, self.coefficients[:, interval], tensor=False))
 
 
 @cache
-def _tables() -> tuple[FloatArray, FloatArray]:
-    """Speed and its integral: at equal steps of ln y the six coefficients of a polynomial.
+def _tables() -> tuple[_Table, _Table]:
+    """Tables of the speed and of its integral over the distance y from the wall."""
+    ln_y = np.arange(np.log(SMOOTHEST), np.log(TALLEST) + 2 * STEP, STEP)
+    y = np.exp(ln_y)
+    speed, integral = _integrals(y)
+    # derivatives by ln y: y d/dy, and y d/dy of that
+    shear_y = y * shear(y)
+    of_speed = _Table.through(speed, shear_y, shear_y + y**2 * _shear_gradient(y))
+    speed_y = y * speed
+    of_integral = _Table.through(integral, speed_y, speed_y + y**2 * shear(y))
+    return of_speed, of_integral
 
-    It has the exact value and two exact derivatives at either node.
-    """
-    x = np.arange(np.log(SMOOTHEST), np.log(TALLEST) + 2 * STEP, STEP)
-    y, g = np.exp(x), shear(np.exp(x))
-    root, weight = np.polynomial.legendre.leggauss(12)
+
+def _integrals(y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Speed and its integral at nodes, by Gauss's quadrature of the shear between."""
+    root, weight = leggauss(GAUSS_POINTS)
     width = np.diff(y)[:, None]
     inside = y[:-1, None] + width * (root + 1) / 2
     area = weight * width / 2 * shear(inside)
     speed = SMOOTHEST + np.concatenate([[0], np.cumsum(area.sum(axis=1))])
-    # integration by parts: the shear within an interval adds to the integral of the speed
-    rise = speed[:-1] * width[:, 0] + (area * (y[1:, None] - inside)).sum(axis=1)
+    # by parts: the shear within an interval adds to the integral of the speed
+    from_inside = (area * (y[1:, None] - inside)).sum(axis=1)
+    rise = speed[:-1] * width[:, 0] + from_inside
     integral = SMOOTHEST**2 / 2 + np.concatenate([[0], np.cumsum(rise)])
+    return speed, integral
+
+
+def _shear_gradient(y: FloatArray) -> FloatArray:
+    """Derivative of the shear by y."""
     length = _mixing_length(y)
-    slope = -KARMAN * np.expm1(-y / DAMPING) + KARMAN * y / DAMPING * np.exp(-y / DAMPING)
-    bend = -2 * length * slope * g**2 / np.sqrt(1 + 4 * length**2)
-    tables = []
-    for nodes in ((speed, y * g, y * g + y**2 * bend), (integral, y * speed, y * speed + y**2 * g)):
-        c0, c1, c2 = (node * STEP**n / max(n, 1) for n, node in enumerate(nodes))
-        # what is left of value and derivatives at the next node
-        d = (c0[1:] - (c0 + c1 + c2)[:-1], c1[1:] - (c1 + 2 * c2)[:-1], (c2[1:] - c2[:-1]) * 2)
-        third = (10 * d[0] - 4 * d[1] + d[2] / 2, -15 * d[0] + 7 * d[1] - d[2])
-        fifth = 6 * d[0] - 3 * d[1] + d[2] / 2
-        tables.append(np.array([c0[:-1], c1[:-1], c2[:-1], *third, fifth]))
-    return tables[0], tables[1]
+    less_damped = KARMAN * y / DAMPING * np.exp(-y / DAMPING)
+    slope = -KARMAN * np.expm1(-y / DAMPING) + less_damped
+    return -2 * length * slope * shear(y) ** 2 / np.sqrt(1 + 4 * length**2)

@@ -120,9 +120,15 @@ def _measured(row: pd.Series) -> str:
 
 def flow_at(row: pd.Series, ustar: float) -> str:
     """A friction velocity with speeds that are measured: of the wind, or of a channel."""
-    depth, closed = float(row["depth_m"] or np.nan), row["flow_top"] == "closed channel"
-    of_flow = row["z0_m"], row["nu_m2_s"], row["rho_f_kg_m3"], depth
-    speeds = measurable_speeds(ustar, *of_flow, closed=closed)
+    depth = float(row["depth_m"] or np.nan)
+    speeds = measurable_speeds(
+        ustar,
+        roughness=row["z0_m"],
+        density=row["rho_f_kg_m3"],
+        viscosity=row["nu_m2_s"],
+        depth=depth,
+        closed=row["flow_top"] == "closed channel",
+    )
     told = [f"{label} {speeds[c]:#.3g} m/s" for c, label in SPEEDS.items() if speeds[c] > 0]
     told += [f"depth {depth:g} m"] * (depth > 0)
     return f"u*₀ = {ustar:#.3g} m/s" + f" ({', '.join(told)})" * bool(told)

@@ -222,7 +222,7 @@ class Protocol(Part):
     )
     """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
     another), DEM, or the closed form along the bed line, without grains and for any length; it is
-    the default of a lattice of more than 5000 grains, with pivots around the first motion
+    the default of more than 5000 grains in rows along the bed, with pivots around the first motion
     - dem: DEM
     - peeling: peeling
     - pivot: pivot

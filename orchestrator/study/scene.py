@@ -42,6 +42,7 @@ a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
 CLOSED = ("pivot", "local")  # methods without contacts: nothing that moves changes the bed
+ALONG_ROWS = "local is of rows along the bed, these are level", 'choose the method "peeling"'
 OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
@@ -76,7 +77,9 @@ class Scene(parts.Part):
         turns = law in LAWS and LAWS[law].turns and method not in CLOSED
         yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
         packs = self.is_poured or is_balanced
+        is_level = isinstance(bed, PileBed) and bed.packing == "horizontal"
         yield method == "local" and packs, "protocol.method", "local packs no grains", "pivot does"
+        yield method == "local" and is_level, "protocol.method", *ALONG_ROWS
         is_raised = self.forces.exposure == "protrusion"
         blind = law in LAWS and not LAWS[law].protrudes
         for name, is_asked in {"exposure": is_raised, "sheltering": is_balanced}.items():

@@ -105,8 +105,14 @@ def single_grain(plan: Plan, cells: Iterable[SingleGrainCase], cases: Path) -> I
 def _speeds(scene: Scene, ustar: float) -> Row:
     """Columns of the speeds of an undisturbed flow that has a friction velocity (m/s)."""
     flow, fluid = scene.flow, scene.fluid
-    of_flow = (scene.bed.roughness, fluid.viscosity, fluid.density, flow.depth or np.nan)
-    speeds = measurable_speeds(ustar, *of_flow, closed=flow.top == "closed channel")
+    speeds = measurable_speeds(
+        ustar,
+        roughness=scene.bed.roughness,
+        density=fluid.density,
+        viscosity=fluid.viscosity,
+        depth=flow.depth or np.nan,
+        closed=flow.top == "closed channel",
+    )
     row = {column: float(speed) for column, speed in speeds.items() if np.isfinite(speed)}
     if mean := row.get("mean_velocity_m_s"):
         row["discharge_m2_s"] = mean * (flow.depth or 0.0)

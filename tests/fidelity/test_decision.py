@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.fidelity import decision, levels
 from orchestrator.fidelity.decision import NO_BOUND, Bound, Decision
 from orchestrator.fidelity.levels import (
@@ -161,6 +162,24 @@ def test_the_default_errs_less_than_the_model_is_worth(packing: str, diameter: f
     again = decide(scene, None, Bound(*chosen.levels, "a run failed"))
     assert again.known.cost_core_s > chosen.known.cost_core_s
     assert "a run failed" in again.why
+
+
+@pytest.mark.parametrize("packing", ["aligned", "horizontal", "disordered"])
+def test_more_grains_are_answered_without_them_in_rows_along_the_bed_alone(packing: str) -> None:
+    few, many = (
+        decide(_asked(f', packing = "{packing}", height = {height}'), None) for height in (0.6, 0.7)
+    )
+    assert few.levels
+    assert many.levels
+    if packing == "horizontal":
+        assert many.levels == few.levels
+    else:
+        assert many.scene.protocol.method == "local"
+
+
+def test_the_closed_form_along_the_bed_is_refused_for_level_rows() -> None:
+    with pytest.raises(InputError, match="local is of rows along the bed"):
+        _asked(', packing = "horizontal"', 'method = "local"')
 
 
 @pytest.mark.parametrize(

@@ -129,6 +129,17 @@ def test_without_resistance_there_is_no_threshold() -> None:
     )
     np.testing.assert_array_equal(np.isnan(found.shields), [True, True, False, True])
     np.testing.assert_array_equal(found.valid, [False, False, True, False])
+
+
+@every_law
+def test_a_grain_without_resistance_has_no_threshold_under_any_law(name: str) -> None:
+    found = of_air(name, 1e-3, 0.1, -60.0, 45.0, 1e-5)
+    assert np.isnan(float(found.friction_velocity))
+    assert np.isnan(float(found.drag))
+    assert not bool(found.valid)
+
+
+def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
     # a law without lift, in a pocket that is bottomless for a drag
     found = water(1e-3, beta=0, law="claudin-andreotti")
     assert float(found.friction_velocity) == float(found.shields) == np.inf
