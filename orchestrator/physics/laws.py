@@ -315,9 +315,6 @@ class ForceLaw(ABC):
         Name in legends.
     reference
         Source, with a DOI where one could be verified.
-    unverified
-        What its source did not confirm. Such a law takes part in no score, and no
-        answer by it is usable.
     reynolds
         Range of the friction Reynolds number, low <= Re* < high.
     drag_law
@@ -339,7 +336,6 @@ class ForceLaw(ABC):
     name: ClassVar[str]
     label: ClassVar[str]
     reference: ClassVar[str]
-    unverified: ClassVar[str] = ""
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
@@ -683,43 +679,6 @@ class Profile(DragAndSaffman):
         return (*super().ranges(ustar, at), rough)
 
 
-class ClaudinAndreotti(ForceLaw):
-    """Drag (pi/8) rho d^2 (sqrt(C) U + s sqrt(nu U/d))^2 at the speed U of the centre.
-
-    ``ustar^2 = 2 nu U/d + (0.4/ln(1 + d/(2 z0)))^2 U^2``: the bridge of `bridged`, on
-    the speed at d/2. C = 1 is the drag coefficient of natural grains in a rough flow (a
-    sphere's is 0.44), and s = 5 near Stokes' sqrt(24). They take z0 = d/30; the
-    roughness is the scene's here. There is no lift. No stored copy of the article or of
-    a code with these equations was found.
-    """
-
-    name = "claudin-andreotti"
-    label = "Claudin & Andreotti 2006 (unverified)"
-    _journal: ClassVar[str] = "Earth Planet. Sci. Lett. 252, 2006"
-    reference = f"P. Claudin and B. Andreotti, {_journal}, arXiv:cond-mat/0603656"
-    unverified = "its equations are quoted from memory"
-    drag_coefficients: ClassVar[tuple[float, float]] = (1.0, 5.0)
-    karman: ClassVar[float] = 0.4
-
-    def speed(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Speed at the height d/2, m/s."""
-        viscous = np.asarray(2 * at.viscosity / at.diameter)
-        rough = np.asarray(np.log1p(0.5 / at.ratio) / self.karman)
-        return velocity.bridge(np.asarray(ustar, float), viscous, rough)
-
-    def drag(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """Drag, N."""
-        rough, viscous = self.drag_coefficients
-        speed = self.speed(ustar, at)
-        of_viscosity = viscous * np.sqrt(at.viscosity * speed / at.diameter)
-        root = np.sqrt(rough) * speed + of_viscosity
-        return np.asarray(np.pi / 8 * at.fluid_density * at.diameter**2 * root**2)
-
-    def lift(self, ustar: ArrayLike, at: Exposure) -> FloatArray:
-        """No lift, N."""
-        return at.zeros(ustar)
-
-
 _ZENG_ET_AL = "L. Zeng, F. Najjar, S. Balachandar and P. Fischer"
 
 
@@ -802,7 +761,6 @@ _EVERY: tuple[ForceLaw, ...] = (
     Bridged(),
     BridgedGravel(),
     Profile(),
-    ClaudinAndreotti(),
     Zeng(),
     ZengTorque(),
 )

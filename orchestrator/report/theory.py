@@ -29,8 +29,8 @@ Dash = Any
 _BROKEN = (0, (4, 1.5))
 LOOKS: tuple[tuple[str, Dash], ...] = (
     *(("#5a5a5a", "--"), ("#5a5a5a", "-"), ("#c8102e", "-"), ("#c8102e", _BROKEN)),
-    *(("#009e73", "-"), ("#7b3294", "-"), ("#e69f00", "-"), ("#e69f00", _BROKEN)),
-    *(("#e377c2", "-"), ("#009e73", _BROKEN), ("#7b3294", _BROKEN)),
+    *(("#009e73", "-"), ("#e69f00", "-"), ("#e69f00", _BROKEN)),
+    *(("#7b3294", "-"), ("#e377c2", "-"), ("#009e73", _BROKEN), ("#7b3294", _BROKEN)),
 )
 """Colour and dash where colours mean laws, in the order of `LAWS`: variants share a colour."""
 DASHES: tuple[Dash, ...] = (
@@ -224,11 +224,11 @@ def _ustar(name: str, air: Air, first: float, last: float) -> FloatArray:
 def ranked(results: Results) -> list[Line]:
     """The lines of a study's single grains on a flat bed: the widest within measurements first.
 
-    Equally wide ones go by their factor from the medians. Unverified force laws take no part.
+    Equally wide ones go by their factor from the medians.
     """
     grains = results.beds("grain")
     every = lines(grains[grains["alpha_deg"] == 0])
-    listed = [line for line in every if line.last and not LAWS[line.law].unverified]
+    listed = [line for line in every if line.last]
     return sorted(listed, key=lambda line: (-round(line.decades, 2), line.median_factor))
 
 

@@ -86,9 +86,7 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
     grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
     # a pile has the share of grains that lift carried off
     weights = {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
-    texts = why_not(law, np.asarray(ustar, float), exposure, **weights)
-    head = f"unverified force law: {law.unverified}; " * bool(law.unverified)
-    return [f"{head}{text}".removesuffix("; ") for text in texts]
+    return why_not(law, np.asarray(ustar, float), exposure, **weights)
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:

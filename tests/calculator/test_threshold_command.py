@@ -124,7 +124,7 @@ def test_csv_and_json_say_the_same(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "question"),
     [
-        (["--diameter", "0.2"], "0.2 m: did you mean 0.2 mm, --diameter 0.0002?"),
+        (["--diameter", "0.05"], "0.05 m: did you mean 0.05 mm, --diameter 5e-05?"),
         ([*D, "--fluid-density", "1000"], "1e-05 m2/s, or 0.01 Pa s, is unusual"),
         ([*QUARTZ_IN_WATER, "--viscosity", "1e-3"], "is it right? --fluid names water"),
         ([*D, "--density", "2.65"], "2.65 g/cm3, --density 2650?"),
@@ -162,6 +162,7 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
         ([*D, "--depth", "1"], ["--depth", "gas", "--fluid water"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
+        (["--diameter", "0.2"], ["no force law holds", "0.2 mm, --diameter 0.0002?"]),
         (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
         ([*D, "--fluid", "air", "--viscosity", "1"], ["--viscosity: air has its own"]),
         (["--diam", "1e-3"], ["there is no option --diam: did you mean --diameter?"]),

@@ -166,15 +166,6 @@ def test_the_torque_acts_as_a_drag_above_the_centre() -> None:
     assert float(plain.torque(2.0, unit())) == 0
 
 
-def test_claudin_and_andreotti_in_both_limits() -> None:
-    # creeping: 25/24 of Stokes' drag at the speed of the linear profile at d/2
-    slow = LAWS["claudin-andreotti"].drag(1e-5, unit())
-    assert float(slow) == pytest.approx(25 / 24 * 3 * np.pi * 1e-10 / 2, rel=1e-4)
-    # rough: C_D = 1 at the speed of the logarithm at d/2
-    fast = LAWS["claudin-andreotti"].drag(1e5, unit())
-    assert float(fast) == pytest.approx(np.pi / 8 * (1e5 * np.log(16) / 0.4) ** 2, rel=0.02)
-
-
 PAGE = Path(__file__).parents[2] / "docs" / "model.md"
 
 

@@ -140,8 +140,10 @@ def test_a_grain_without_resistance_has_no_threshold_under_any_law(name: str) ->
 
 
 def test_a_grain_that_no_flow_moves_has_an_infinite_threshold() -> None:
-    # a law without lift, in a pocket that is bottomless for a drag
-    found = water(1e-3, beta=0, law="claudin-andreotti")
+    # a grain without lift, in a pocket that is bottomless for a drag
+    where = Exposure(1e-3, 1e-3 / 30, 1000.0, 1e-6, lift_coefficient=0.0)
+    angles = {"slope_deg": 0, "entrainment_angle_deg": 0}
+    found = threshold(LAWS["bridged"], where, density=2650.0, **angles)
     assert float(found.friction_velocity) == float(found.shields) == np.inf
     assert not bool(found.valid)
 

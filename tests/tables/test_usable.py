@@ -82,7 +82,6 @@ def grain(bed: str, forces: str = "") -> str:
         (grain(STEEP, "lift_coefficient = 30.0"), "lift over", True),
         (grain(STEEP), "", False),
         (grain("roughness = 1e-12").replace("2e-4", "1e-3"), "smooth wall", True),
-        (grain('roughness = "d/30"', 'law = "claudin-andreotti"'), "unverified force law", True),
     ],
 )
 def test_thresholds_beyond_the_model(tmp_path: Path, text: str, reason: str, applies: bool) -> None:
