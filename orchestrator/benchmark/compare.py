@@ -1,12 +1,14 @@
 """Run a solver on the scenes of a pack, or take answers that are there; write tables and page."""
 
 import contextlib
+import os
 import re
 import shlex
 import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -63,32 +65,48 @@ class Outcome(NamedTuple):
 def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome:
     """Run a solver on scenes of a pack, ours in turn, judge the answers, and write the page.
 
-    No shell runs the `command`, which has ``{case}`` and ``{out}``. `out` is the directory of the
-    results, by default ``results/benchmark-NAME`` of the pack. Raises InputError if the pack, the
-    command or the directory cannot be used.
+    Parameters
+    ----------
+    root
+        The directory of the pack.
+    command
+        The solver's command, with ``{case}`` and ``{out}``; no shell runs it.
+    out
+        The directory of the results, by default ``results/benchmark-NAME`` of the pack.
+    options
+        The scenes that are chosen, the solver's limits and its name.
+
+    Raises
+    ------
+    InputError
+        If the pack, the command or the directory cannot be used.
     """
-    chosen, words = pack.read(root.absolute()), split(command)
+    chosen = pack.read(root.absolute())
+    words = split(command)
     scripts = [word for word in words[1:] if Path(word).is_file()]
-    if (solver := options.name or Path([*scripts, words[0]][0]).stem) == OURS:
+    solver = options.name or Path([*scripts, words[0]][0]).stem
+    if solver == OURS:
         raise InputError("two solvers have the name ours", "--name", "choose another")
     names = chosen.chosen(options.levels, options.patterns)
-    digest, out = chosen.manifest.sha256[pack.EXPECTED], _place(out, chosen)
+    out = _place(out, chosen)
     ours = Ours(chosen, names, out / OURS / "cases")
     with workspace.claimed(out, workspace.RESULTS, command) as folder:
+        _check_pack(out, chosen)
         about = workspace.read_marker(out, workspace.RESULTS)
-        if about.get("pack", digest) != digest:
-            what = "it holds answers to another pack, or to an earlier export of this one"
-            raise InputError(what, where=str(out), remedy="choose another with --out, or remove it")
-        folder.note(workspace.RESULTS.marker, text_of({**about, "pack": digest, "solver": solver}))
+        noted = {**about, "pack": chosen.questions, "solver": solver}
+        folder.note(workspace.RESULTS.marker, text_of(noted))
         # runs of an earlier time were not in turn with the solver
         shutil.rmtree(folder.path(f"{OURS}/cases"), ignore_errors=True)
         ours.root.mkdir(parents=True)
-        for number, name in enumerate(names, 1):
-            print(f"{number}/{len(names)} {name}", file=sys.stderr, flush=True)
-            _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
-            answer, times = ours.answer(name)
-            folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
-            folder.note(f"{OURS}/{name}/{USED}", text_of(times))
+        for level, listed in groupby(names, lambda name: chosen.scenes[name]["level"]):
+            of_level = list(listed)
+            scenes = "scene" if len(of_level) == 1 else "scenes"
+            print(f"level {level}: {len(of_level)} {scenes}", file=sys.stderr, flush=True)
+            for name in of_level:
+                _solve(words, chosen.root / pack.SCENES / name, options, folder, name)
+                answer, times = ours.answer(name)
+                folder.note(f"{OURS}/{name}/{ANSWER}", pack.csv(answer))
+                folder.note(f"{OURS}/{name}/{USED}", text_of(times))
         pack.verify(chosen.root, chosen.manifest)
         return _written(chosen, judge.judge(chosen, names, [out]), folder)
 
@@ -96,9 +114,23 @@ def run(root: Path, command: str, out: Path | None, options: Options) -> Outcome
 def compare(root: Path, results: Sequence[Path], out: Path | None, options: Options) -> Outcome:
     """Judge answers that are there, and write one page of all solvers.
 
-    Each of the `results` is the directory of a solver, named by `run` or else by it. `out` is that
-    of the page, by default the only results, if `run` wrote them, or ``results/benchmark-NAME`` of
-    the pack. Raises InputError if the pack or a directory cannot be used, or two have one name.
+    Parameters
+    ----------
+    root
+        The directory of the pack.
+    results
+        The directory of each solver, which is named by `run`, or else by the directory.
+    out
+        The directory of the page, by default the only one of the results, if `run` wrote
+        them, or else ``results/benchmark-NAME`` of the pack.
+    options
+        The scenes that are chosen.
+
+    Raises
+    ------
+    InputError
+        If the pack or a directory cannot be used, if `run` noted another pack for the
+        answers, or if two solvers have one name.
     """
     chosen = pack.read(root.absolute())
     names = chosen.chosen(options.levels, options.patterns)
@@ -109,20 +141,48 @@ def compare(root: Path, results: Sequence[Path], out: Path | None, options: Opti
         if solvers.count(solver) > 1:
             remedy = "run one with another --name, or rename its directory"
             raise InputError(f"two solvers have the name {solver}", "RESULTS", remedy)
+        _check_pack(place, chosen)
     about = workspace.read_marker(results[0], workspace.RESULTS)
     is_of_run = len(results) == 1 and about.get("kind") == workspace.RESULTS.word
-    out = _place(out or (results[0] if is_of_run else None), chosen)
-    kind, name = workspace.COMPARISON, chosen.root.name
+    if out is None and is_of_run:
+        out = results[0]
+    out = _place(out, chosen)
+    kind = workspace.COMPARISON
+    name = chosen.root.name
     if is_of_run and out == results[0].absolute():
-        kind, name = workspace.RESULTS, about["name"]
+        kind = workspace.RESULTS
+        name = about["name"]
     judged = judge.judge(chosen, names, results)
     with workspace.claimed(out, kind, name) as folder:
+        if kind == workspace.COMPARISON:
+            _note_pack(folder, chosen)
         return _written(chosen, judged, folder)
+
+
+def _check_pack(place: Path, chosen: Pack) -> None:
+    """Refuse results of `run` whose answers are to the questions of another pack."""
+    answered = workspace.read_marker(place, workspace.RESULTS).get("pack", chosen.questions)
+    if answered != chosen.questions:
+        what = "it holds answers to another pack, or to an earlier export of this one"
+        remedy = "compare them with the pack that they answer, or run the solver on this one"
+        raise InputError(f"{what}: {chosen.root}", where=str(place), remedy=f"{remedy} with --out")
+
+
+def _note_pack(folder: Folder, chosen: Pack) -> None:
+    """Note of which pack a comparison is; refuse to replace that of another pack of its name."""
+    about = workspace.read_marker(folder.root, workspace.COMPARISON)
+    at = os.path.relpath(chosen.root, folder.root)
+    other = str(about.get("at", at))
+    if other != at and (folder.root / other / pack.MANIFEST).is_file():
+        what = f"the directory holds the comparison with another pack, {other}"
+        raise InputError(what, where=str(folder.root), remedy="choose another with --out")
+    folder.note(workspace.COMPARISON.marker, text_of({**about, "at": at}))
 
 
 def _place(out: Path | None, chosen: Pack) -> Path:
     """The directory of the results, which is not in the pack."""
-    out = out or Path("results") / f"benchmark-{chosen.root.name}"
+    if out is None:
+        out = Path("results") / f"benchmark-{chosen.root.name}"
     if out.resolve().is_relative_to(chosen.root.resolve()):
         raise InputError("the results may not lie in the pack", str(out), "use --out")
     return out.absolute()
@@ -194,9 +254,9 @@ def _written(chosen: Pack, judged: tuple[pd.DataFrame, pd.DataFrame], folder: Fo
             columns = ["solver", *table.columns.drop("solver")]
             folder.put(name, text_of_table(table[columns], digits))
         page.write(chosen, numbers, verdicts, folder)
-    lines = [
-        f"{row.solver}: {row.scenes}: {row.why}" for row in judge.failures(theirs).itertuples()
-    ]
+    lines = []
+    for row in judge.failures(theirs).itertuples():
+        lines.append(f"{row.solver}: {row.scenes}: {row.why}")
     if len(lines) > LISTED:
         lines[LISTED:] = [f"and {len(lines) - LISTED} more: see {VERDICTS}"]
     table = judge.summary(theirs).dropna(axis=1, how="all")

@@ -1,42 +1,101 @@
 """Judge the answers of solvers to the scenes of a pack: errors, verdicts, and what failed."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from orchestrator.benchmark.pack import COUNTS, Pack
+from orchestrator.benchmark.pack import COUNTS, Pack, number_of
 from orchestrator.errors import one_line, printable
 from orchestrator.runs import workspace
 from orchestrator.runs.files import opened, read_json
 
 ANSWER, USED, OURS = "answer.csv", "used.json", "ours"
-"""Files of a scene in the results: the answer and the times. The answers of our solvers lie in a
-directory beside those of the solver; they are those of the solver `OURS`."""
+"""Files of a scene in the results: the answer and the times. The answers of our solvers
+lie in a directory beside those of the solver; they are those of the solver `OURS`."""
 STEPS = "steps"
 """Quantity that a solver may add to any answer: its number of time steps."""
-TIMES = ["seconds", "cpu_s", "peak_mib"]
+TIMES = ("seconds", "cpu_s", "peak_mib")
 MIB = 2**20
 ANSWER_BYTES = 4 * MIB  # of the largest answer
 ROUND = 1e-8  # relative rounding of a pack's tables
-DECLINED = "it ended with 2(:|$)"  # message of a solver that does not know a kind of scene
+LARGEST_ERROR = 1e300
+"""Relative errors beyond it are cut to it: the error of 1e308 against 1e-9 is no double,
+and neither are the percentage and the mean of two such errors."""
+DECLINED = "it ended with 2(:|$)"
+"""Message of a solver that does not know a kind of scene."""
+
+Key = tuple[str, str, str]
+"""Scene, quantity and `place_of` of a question."""
 
 
 def name_of(place: Path) -> str:
-    """The name of the solver of a directory of results: what `run` noted, or the directory's."""
+    """The name of the solver of a directory of results.
+
+    It is what `run` noted there, or else the name of the directory.
+    """
     noted = workspace.read_marker(place, workspace.RESULTS).get("solver")
     return printable(str(noted or place.absolute().name))
 
 
 def place_of(at: str) -> str:
-    """The number ``at`` to seven digits; empty for a quantity that is one number."""
-    return f"{float(at):.7g}" if at.strip() else ""
+    """The number ``at`` to seven digits; empty for a quantity that is one number.
+
+    Raises ValueError if the text is no number.
+    """
+    if not at.strip():
+        return ""
+    return f"{number_of(at):.7g}"
 
 
-def _answers(path: Path) -> dict[tuple[str, str], float]:
-    """The answers of a file, by quantity and `place_of`; OSError or ValueError for a fault."""
+@dataclass(frozen=True)
+class Answers:
+    """The answers of a solver to some scenes, and what each scene took.
+
+    `numbers` has each answer by scene, quantity and `place_of`. `used` has a row for each
+    scene, by its name: ``message``, the reason why its answer does not count, or empty;
+    `TIMES` in s, s and MiB, and `STEPS`; NaN where one is not known.
+    """
+
+    numbers: Mapping[Key, float]
+    used: pd.DataFrame
+
+    @classmethod
+    def read(cls, place: Path, names: Sequence[str]) -> "Answers":
+        """Read what a solver left in a directory of results for some scenes."""
+        numbers: dict[Key, float] = {}
+        rows = []
+        for name in names:
+            about = read_json(place / name / USED)
+            message = str(about.get("error") or "")
+            given: dict[tuple[str, str], float] = {}
+            if not message:
+                try:
+                    given = _answer(place / name / ANSWER)
+                except FileNotFoundError:
+                    message = f"it wrote no {ANSWER}"
+                except (OSError, ValueError) as fault:
+                    message = f"{ANSWER}: {fault}"
+            for (quantity, at), number in given.items():
+                numbers[name, quantity, at] = number
+            # the message repeats the output of a program
+            row: dict[str, Any] = {"message": one_line(message)}
+            for column in TIMES:
+                row[column] = _measured(about.get(column))
+            row[STEPS] = _measured(given.get((STEPS, "")))
+            rows.append(row)
+        return cls(numbers, pd.DataFrame(rows, index=list(names)))
+
+
+def _answer(path: Path) -> dict[tuple[str, str], float]:
+    """The answers of a file, by quantity and `place_of`.
+
+    Raises OSError or ValueError with the reason why the file does not count.
+    """
     with opened(path) as stream:
         content = stream.read(ANSWER_BYTES + 1)
     if len(content) > ANSWER_BYTES:
@@ -50,40 +109,33 @@ def _answers(path: Path) -> dict[tuple[str, str], float]:
         raise ValueError("it is cut short: its last line has no end")
     answers: dict[tuple[str, str], float] = {}
     for number, row in enumerate(rows, 2):
+        if row == [""]:
+            continue
+        line = f"line {number}, {','.join(row)[:80]!r},"
         try:
-            quantity, at, value = row if row != [""] else ("", "", "0")
-            key, answer = (quantity, place_of(at)), float(value)
+            quantity, at, value = row
+            key = (quantity, place_of(at))
+            answer = number_of(value)
         except ValueError:
-            answer = np.nan
-        if not np.isfinite(answer) or (quantity and key in answers):
-            what = "is answered twice, or is not a quantity, its at and a finite number"
-            raise ValueError(f"line {number}, {','.join(row)[:80]!r}, {what}")
+            what = "is not a quantity, its at and a finite number"
+            raise ValueError(f"{line} {what}") from None
+        if key in answers:
+            raise ValueError(f"{line} is answered twice")
         answers[key] = answer
     return answers
 
 
-def _read(place: Path, names: Sequence[str]) -> tuple[dict[tuple[str, ...], float], pd.DataFrame]:
-    """What a solver left: answers by scene, quantity and place; per scene message, times, memory.
-
-    The message is the reason why the answer to a scene does not count, or empty.
-    """
-    answers: dict[tuple[str, ...], float] = {}
-    used = []
-    for name in names:
-        about = read_json(place / name / USED)
-        error, given = str(about.get("error") or ""), {}
-        try:
-            given = {} if error else _answers(place / name / ANSWER)
-        except FileNotFoundError:
-            error = f"it wrote no {ANSWER}"
-        except (OSError, ValueError) as fault:
-            error = f"{ANSWER}: {fault}"
-        answers |= {(name, *key): answer for key, answer in given.items()}
-        # the message repeats the output of a program
-        used.append([one_line(error), *map(about.get, TIMES), given.get((STEPS, ""))])
-    table = pd.DataFrame(used, index=list(names), columns=["message", *TIMES, STEPS])
-    numbers = table[[*TIMES, STEPS]].apply(pd.to_numeric, errors="coerce")
-    return answers, table[["message"]].join(numbers.where(numbers > 0))
+def _measured(value: object) -> float:
+    """A time, a memory or a count as it was noted; NaN if it is no positive number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        number = float(value)
+    except OverflowError:
+        return math.nan
+    if not 0 < number < math.inf:
+        return math.nan
+    return number
 
 
 def judge(
@@ -91,117 +143,209 @@ def judge(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Compare the answers of solvers with the expected ones.
 
-    For each solver `results` has the directory with its ``SCENE/answer.csv``, and with
-    ``ours/SCENE/answer.csv`` if ours ran in turn with it. The first table has a row for each
-    solver, `OURS` the last, and each expectation: ``answer``, ``error`` (relative), ``within``; the
-    second one for each solver and scene: ``passed``, ``failed`` or, by a solver that answers
-    another, ``declined``; ``message``, errors and times.
+    Parameters
+    ----------
+    chosen
+        The pack.
+    names
+        The scenes of the pack that are judged.
+    results
+        For each solver the directory with its ``SCENE/answer.csv``, and with
+        ``ours/SCENE/answer.csv`` if ours ran in turn with it.
+
+    Returns
+    -------
+    numbers
+        A row for each solver, `OURS` the last, and each expectation: the columns of the
+        expectation, ``solver``, ``answer``, ``error`` (relative, at most `LARGEST_ERROR`;
+        of a value of zero the answer) and ``within``.
+    verdicts
+        A row for each solver and scene: ``passed``, ``failed`` or, by a solver that answers
+        another scene, ``declined``; ``message``, errors and times.
     """
     expected = chosen.expected[chosen.expected["scene"].isin(names)]
-    parts = (expected["scene"], expected["quantity"], expected["at"].map(place_of))
-    keys, value = list(zip(*parts, strict=True)), expected["value"]
-    margin = (expected["tolerance"] + ROUND) * value.abs()
-    numbers, verdicts = [], []
-    for place in (*results, results[0] / OURS):
-        solver = name_of(place) if place in results else OURS
-        answers, used = _read(place, names)
-        again, ours = (answers, used) if solver == OURS else _read(place / OURS, names)
-        table = expected.assign(solver=solver)
-        table["ours"] = [again.get(key, x) for key, x in zip(keys, table["ours"], strict=True)]
-        table["answer"] = [answers.get(key, np.nan) for key in keys]
-        if solver == OURS:
-            table["answer"], used["message"] = table["ours"], ""
-        # the error of a value of zero is the answer
-        table["error"] = (table["answer"] - value) / value.where(value != 0, 1.0)
-        ends = expected["low"] - margin, expected["high"] + margin
-        table["within"] = table["answer"].between(*ends)
-        judged = table[table["tolerance"].notna()]
-        faults = {
-            name: used["message"][name] or _incomplete(rows, chosen.scenes[name].get("count"))
-            for name, rows in ((str(name), rows) for name, rows in table.groupby("scene"))
-        }
-        off = {name: _off(rows) for name, rows in judged[~judged["within"]].groupby("scene")}
-        heads = {"solver": solver, "scene": list(names)}
-        heads |= {key: [chosen.scenes[name][key] for name in names] for key in ("level", "kind")}
-        heads["message"] = [faults[name] or off.get(name, "") for name in names]
-        verdict = pd.DataFrame(heads, index=list(names))
-        verdict = verdict.join(used.drop(columns="message"))
-        verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
-        answered = pd.Series({name: not faults[name] for name in names})
-        counts = judged["quantity"].isin(COUNTS)
-        errors = judged["error"].where(judged["scene"].map(answered))[~counts]
-        sizes, signed = (part.groupby(judged["scene"]) for part in (errors.abs(), errors))
-        verdict["answered"], verdict["passed"] = answered, verdict["message"] == ""
-        verdict["declined"] = verdict["message"].str.match(DECLINED) & bool(answered.any())
-        verdict["failed"] = ~(verdict["passed"] | verdict["declined"])
-        verdict["error"], verdict["worst"] = sizes.median(), sizes.max()
-        verdict["bias"] = signed.median()
-        for ratio, time in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
-            verdict[ratio] = (verdict[time] / verdict[f"ours_{time}"]).where(answered)
+    numbers = []
+    verdicts = []
+    for place in results:
+        theirs = Answers.read(place, names)
+        ours = Answers.read(place / OURS, names)
+        table = _compared(expected, name_of(place), theirs, ours)
         numbers.append(table)
-        verdicts.append(verdict)
+        verdicts.append(_verdicts(chosen, names, table, theirs.used, ours.used))
+    again = Answers.read(results[0] / OURS, names)
+    table = _compared(expected, OURS, None, again)
+    numbers.append(table)
+    used = again.used.assign(message="")
+    verdicts.append(_verdicts(chosen, names, table, used, again.used))
     return pd.concat(numbers, ignore_index=True), pd.concat(verdicts, ignore_index=True)
 
 
+def _compared(
+    expected: pd.DataFrame, solver: str, theirs: Answers | None, ours: Answers
+) -> pd.DataFrame:
+    """The expectations with the answers of a solver; without one those of our own runs."""
+    places = expected["at"].map(place_of)
+    keys = list(zip(expected["scene"], expected["quantity"], places, strict=True))
+    table = expected.assign(solver=solver)
+    stated = zip(keys, expected["ours"], strict=True)
+    table["ours"] = [ours.numbers.get(key, number) for key, number in stated]
+    if theirs is None:
+        table["answer"] = table["ours"]
+    else:
+        table["answer"] = [theirs.numbers.get(key, math.nan) for key in keys]
+    value = table["value"]
+    # the error of a value of zero is the answer
+    unit = value.where(value != 0, 1.0)
+    with np.errstate(over="ignore"):
+        error = (table["answer"] - value) / unit
+        margin = (table["tolerance"] + ROUND) * value.abs()
+        low = table["low"] - margin
+        high = table["high"] + margin
+    table["error"] = error.clip(-LARGEST_ERROR, LARGEST_ERROR)
+    table["within"] = table["answer"].between(low, high)
+    return table
+
+
+def _verdicts(
+    chosen: Pack,
+    names: Sequence[str],
+    table: pd.DataFrame,
+    used: pd.DataFrame,
+    ours: pd.DataFrame,
+) -> pd.DataFrame:
+    """The verdict of each scene from the `_compared` table of a solver and the times."""
+    judged = table[table["tolerance"].notna()]
+    of_scene = dict(iter(table.groupby("scene")))
+    off_in = dict(iter(judged[~judged["within"]].groupby("scene")))
+    messages = []
+    answered = []
+    for name in names:
+        message = used["message"][name]
+        if not message:
+            message = _incomplete(of_scene[name], chosen.scenes[name].get("count"))
+        answered.append(not message)
+        if not message and name in off_in:
+            message = _off(off_in[name])
+        messages.append(message)
+    verdict = pd.DataFrame(index=list(names))
+    verdict["solver"] = table["solver"].iloc[0]
+    verdict["scene"] = list(names)
+    for key in ("level", "kind"):
+        verdict[key] = [chosen.scenes[name][key] for name in names]
+    verdict["message"] = messages
+    verdict = verdict.join(used.drop(columns="message"))
+    verdict = verdict.join(ours[["seconds", "cpu_s", STEPS]].add_prefix("ours_"))
+    verdict["answered"] = answered
+    verdict["passed"] = verdict["message"] == ""
+    is_of_another_kind = verdict["message"].str.match(DECLINED)
+    verdict["declined"] = is_of_another_kind & any(answered)
+    verdict["failed"] = ~(verdict["passed"] | verdict["declined"])
+
+    is_answered = judged["scene"].map(verdict["answered"])
+    is_count = judged["quantity"].isin(COUNTS)
+    errors = judged["error"].where(is_answered)[~is_count]
+    scene_of = judged["scene"]
+    sizes = errors.abs().groupby(scene_of)
+    verdict["error"] = sizes.median()
+    verdict["worst"] = sizes.max()
+    verdict["bias"] = errors.groupby(scene_of).median()
+    for ratio, time in (("ratio", "seconds"), ("cpu_ratio", "cpu_s")):
+        over = verdict[time] / verdict[f"ours_{time}"]
+        # of times that were noted by another program the ratio may be no double
+        over = over.where(verdict["answered"] & np.isfinite(over))
+        verdict[ratio] = over
+    return verdict
+
+
 def _incomplete(rows: pd.DataFrame, count: float | None) -> str:
-    """The answer that a scene lacks, or counts that do not make `count`, N of the scene."""
+    """What makes the answer to a scene incomplete; empty if nothing does.
+
+    It is an answer that is lacking, or counts that do not make `count`, N of the scene.
+    """
     lacking = rows[rows["answer"].isna()].to_dict("records")
     if lacking:
-        more = f" and {len(lacking) - 1} more" * (len(lacking) > 1)
-        return f"{ANSWER} lacks {_question(lacking[0])}{more}"
+        what = f"{ANSWER} lacks {_question(lacking[0])}"
+        if len(lacking) > 1:
+            what += f" and {len(lacking) - 1} more"
+        return what
     last: Any = rows.groupby("quantity")["answer"].last()
-    moved, rest, total = last.get("moved"), last.get("not_moved"), last.get("count", count)
-    if None not in (moved, rest, total) and moved + rest != total:
-        return f"the counts do not make N: {moved:g} moved and {rest:g} not, of {total:g}"
+    moved = last.get("moved")
+    rest = last.get("not_moved")
+    total = last.get("count", count)
+    if moved is None or rest is None or total is None:
+        return ""
+    if moved + rest != total:
+        counted = f"{moved:g} moved and {rest:g} not, of {total:g}"
+        return f"the counts do not make N: {counted}"
     return ""
 
 
 def _off(rows: pd.DataFrame) -> str:
-    """The worst of the answers that are off; a count is named only if nothing else is off."""
-    records = rows.to_dict("records")
-    row = max(records, key=lambda row: abs(row["error"]) * (row["quantity"] not in COUNTS))
+    """The worst of the answers of a scene that are off, all of which are there.
+
+    A count is named only if nothing else is off.
+    """
+    is_count = rows["quantity"].isin(COUNTS)
+    named = rows if is_count.all() else rows[~is_count]
+    worst = int(named["error"].abs().argmax())
+    row = named.iloc[worst].to_dict()
     message = f"{_question(row)} is {row['answer']:.6g}, not {row['value']:.6g}"
     if row["low"] < row["high"]:
         message += f" ({row['low']:.6g} ... {row['high']:.6g})"
-    return message + f", and {len(rows) - 1} more are off" * (len(rows) > 1)
+    if len(rows) > 1:
+        message += f", and {len(rows) - 1} more are off"
+    return message
 
 
 def _question(row: Mapping[Any, Any]) -> str:
+    """A question in words, from its row of the table."""
     return f"{row['quantity']} at {row['at']}" if row["at"] else str(row["quantity"])
 
 
 def failures(verdicts: pd.DataFrame) -> pd.DataFrame:
-    """The failures of solvers, one for each cause: ``solver``, ``scenes``, ``kind``, ``why``."""
+    """The failures of solvers, one for each cause.
+
+    Columns ``solver``, ``scenes``, ``kind``, ``why``.
+    """
     failed = verdicts[verdicts["failed"]]
     # messages of one cause differ in their numbers
     cause = failed["message"].str.replace(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", regex=True)
     rows = []
     for (solver, kind, _), group in failed.groupby(["solver", "kind", cause], sort=False):
-        more = f" and {len(group) - 1} more of kind {kind}" if len(group) > 1 else ""
         first = group.iloc[0]
-        rows.append((solver, first["scene"] + more, kind, first["message"]))
+        scenes = first["scene"]
+        if len(group) > 1:
+            scenes += f" and {len(group) - 1} more of kind {kind}"
+        rows.append((solver, scenes, kind, first["message"]))
     return pd.DataFrame(rows, columns=["solver", "scenes", "kind", "why"])
 
 
 def summary(verdicts: pd.DataFrame) -> pd.DataFrame:
     """One row for each level and kind that was asked, and each solver; errors in per cent."""
-    columns = {
-        **{"scenes": ("scene", "size"), "passed": ("passed", "sum")},
-        **{"failed": ("failed", "sum"), "declined": ("declined", "sum")},
-        **{"error, %": ("error", "median"), "bias, %": ("bias", "median")},
-        **{"largest, %": ("worst", "max"), "time over ours": ("ratio", "median")},
-        **{"CPU over ours": ("cpu_ratio", "median"), "peak, MiB": ("peak_mib", "max")},
-    }
-    table = verdicts.groupby(["level", "kind", "solver"], sort=False).agg(**columns).reset_index()
-    percent = [name for name in columns if name.endswith("%")]
-    return table.assign(**(100 * table[percent]))
+    groups = verdicts.groupby(["level", "kind", "solver"], sort=False)
+    table = pd.DataFrame(
+        {
+            "scenes": groups["scene"].size(),
+            "passed": groups["passed"].sum(),
+            "failed": groups["failed"].sum(),
+            "declined": groups["declined"].sum(),
+            "error, %": 100 * groups["error"].median(),
+            "bias, %": 100 * groups["bias"].median(),
+            "largest, %": 100 * groups["worst"].max(),
+            "time over ours": groups["ratio"].median(),
+            "CPU over ours": groups["cpu_ratio"].median(),
+            "peak, MiB": groups["peak_mib"].max(),
+        }
+    )
+    return table.reset_index()
 
 
 def in_words(verdicts: pd.DataFrame) -> list[str]:
     """A line for each solver: PASSED or FAILED, its name, and the numbers of its scenes."""
     lines = []
-    for solver, of in verdicts.groupby("solver", sort=False):
-        counts = [f"{of[kind].sum()} {kind}" for kind in ("passed", "failed", "declined")]
-        word = "FAILED" if of["failed"].any() else "PASSED"
-        lines.append(f"{word} {solver}: of {len(of)} scenes {', '.join(counts)}")
+    for solver, scenes in verdicts.groupby("solver", sort=False):
+        passed, failed, declined = scenes[["passed", "failed", "declined"]].sum()
+        word = "FAILED" if failed else "PASSED"
+        counts = f"{passed} passed, {failed} failed, {declined} declined"
+        lines.append(f"{word} {solver}: of {len(scenes)} scenes {counts}")
     return lines

@@ -5,6 +5,7 @@ its manifest, or whose names or links lead out of it: a pack may come from anywh
 """
 
 import json
+import math
 import os
 import platform
 import re
@@ -20,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
 from orchestrator.runs import workspace
-from orchestrator.runs.files import digest_files, text_of
+from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
 from orchestrator.types import Row
 
 SCHEMA = 2
@@ -33,12 +34,15 @@ COLUMNS = ["quantity", "at", "value", "low", "high", "tolerance", "ours"]
 """Columns of the expected answers beside the scene's name."""
 COUNTS = ("moved", "not_moved", "carried_off")
 """Quantities that count grains."""
+LARGEST_TOLERANCE = 1.0  # relative, of an expected answer
 NUMBER = "%.9g"  # format of the numbers in all tables
 KINDS = {
     **{"closed-form": 1, "collision": 2, "incline": 2, "sliding": 2, "passing": 2, "pivot": 2},
     **{"flow": 3, "pile": 4, "line": 5},
 }
 """Kinds of scenes, and the level of each."""
+_DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+"""A number as programs print it; Python would also take 1_000 and digits of other scripts."""
 _IN_SCENES = re.compile(r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)")
 
 
@@ -119,6 +123,16 @@ def expectation(
     return dict(zip(COLUMNS, values, strict=True))
 
 
+def number_of(text: str) -> float:
+    """A finite number from its text; ValueError for any other text."""
+    if not _DECIMAL.fullmatch(text.strip()):
+        raise ValueError(f"{text!r} is not a number")
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text!r} is beyond the largest double")
+    return number
+
+
 @dataclass(frozen=True)
 class Pack:
     """A pack that was read: its directory, its scenes' entries by name, its expected answers."""
@@ -128,21 +142,41 @@ class Pack:
     scenes: dict[str, Row]
     expected: pd.DataFrame
 
+    @property
+    def questions(self) -> str:
+        """Digest of all that a solver is given: answers belong to these questions alone.
+
+        A pack that was exported again has the same one, unless a scene has changed.
+        """
+        asked = self.manifest.sha256.items()
+        given = {name: digest for name, digest in asked if name.startswith(f"{SCENES}/")}
+        return digest_text(canonical_json(given))
+
     def chosen(self, levels: Collection[int] = (), patterns: Collection[str] = ()) -> list[str]:
-        """Names of the scenes of levels and patterns, empty for all; InputError if none is left."""
-        names = [n for n, given in self.scenes.items() if not levels or given["level"] in levels]
-        names = [name for name in names if any(fnmatchcase(name, p) for p in patterns or ["*"])]
+        """Names of the scenes of some levels and patterns, empty for all, by rising level.
+
+        Raises InputError if none is left.
+        """
+        names = []
+        for name, given in self.scenes.items():
+            is_of_level = not levels or given["level"] in levels
+            if is_of_level and any(fnmatchcase(name, pattern) for pattern in patterns or ["*"]):
+                names.append(name)
         if not names:
             remedy = "see its scenes.csv, and --level and --scene"
             raise InputError("no scene of the pack is chosen", str(self.root), remedy)
-        return names
+        return sorted(names, key=lambda name: self.scenes[name]["level"])
 
 
 def read(root: Path) -> Pack:
     """Read a pack; raises InputError if there is none, or it is of another schema or changed."""
     if not os.path.lexists(root / MANIFEST):
         what = f"there is no pack here: {MANIFEST} is missing"
-        raise InputError(what, str(root), "write one with: python -m orchestrator benchmark export")
+        remedy = "write one with: python -m orchestrator benchmark export"
+        if (root / EXPECTED).is_file() and not (root / SCENES).exists():
+            what = f"this is a table of expected answers, and no pack: it has no {SCENES}"
+            remedy = "its README.md says how the pack is written"
+        raise InputError(what, str(root), remedy)
     path = root / MANIFEST
     try:
         manifest = Manifest.model_validate_json(path.read_bytes())
@@ -186,16 +220,24 @@ def _refuse(what: str, where: Path) -> NoReturn:
 
 
 def _expected(path: Path, scenes: Mapping[str, Row]) -> pd.DataFrame:
-    texts, numbers = ["scene", *COLUMNS[:2]], COLUMNS[2:]
+    """Read the expected answers of some scenes; raises InputError if they mean nothing."""
+    texts = ["scene", *COLUMNS[:2]]
+    numbers = COLUMNS[2:]
     kinds = {**dict.fromkeys(texts, object), **dict.fromkeys(numbers, float)}
     absent: Any = {"keep_default_na": False, "na_values": {key: [""] for key in numbers}}
     try:
         table: pd.DataFrame = pd.read_csv(path, dtype=kinds, **absent)
         if [*table] != [*texts, *numbers] or {*table["scene"]} != {*scenes}:
             raise ValueError("its columns or its scenes are others")
-        at = table["at"].replace("", "0").astype(float)
-        if not np.isfinite(table[["value", "low", "high"]].assign(at=at)).all(axis=None):
+        for at in table["at"].unique():
+            number_of(at or "0")
+        if not np.isfinite(table[["value", "low", "high"]]).all(axis=None):
             raise ValueError("a number is missing or infinite")
+        tolerance = table["tolerance"].fillna(0.0)
+        if not tolerance.between(0.0, LARGEST_TOLERANCE).all():
+            raise ValueError(f"a tolerance is not between 0 and {LARGEST_TOLERANCE:g}")
+        if (table["low"] > table["high"]).any():
+            raise ValueError("an interval ends below its beginning")
     except ValueError as error:
         _refuse(f"it cannot be read: {error}", path)
     return table

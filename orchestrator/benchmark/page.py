@@ -20,8 +20,15 @@ from orchestrator.report.style import DIAMETERS, PANELS, WATER, Figure, Look
 from orchestrator.runs.files import Folder
 
 PAGE = "comparison.html"
-FLOOR, EXPECTED = 1e-6, "0.25"
-"""Least error of a logarithmic axis; colour of the expected answer, and of ours."""
+FLOOR, CEILING = 1e-6, 1e3
+"""Least and largest relative error on a logarithmic axis."""
+CPU_S = (1e-6, 1e8)
+"""Least and largest time on a logarithmic axis, s: others may have noted any number."""
+EXPECTED = "0.25"
+"""Colour of the expected answer, and of ours."""
+ROOM = 1.0
+"""Room above and below the expected answers of a panel in which answers are drawn, over
+their range."""
 MARKERS = {1: "o", 2: "s", 3: "D", 4: "^", 5: "v"}  # of the levels
 LIMITS = (
     "Levels 1 and 2 are compared with exact answers, levels 3 to 5 with our own runs.",
@@ -117,26 +124,42 @@ def _panels(
     numbers: pd.DataFrame, scenes: Sequence[str], quantity: str, name: str, title: str
 ) -> Figure:
     """A quantity along the bed, or over the load steps, of some scenes, spread over the pack."""
-    drawn = [scenes[i] for i in np.unique(np.linspace(0, len(scenes) - 1, PANELS).astype(int))]
+    places = np.unique(np.linspace(0, len(scenes) - 1, PANELS).astype(int))
+    drawn = [scenes[place] for place in places]
     looks = _looks(numbers)
     del looks[OURS]
     x_label, y_label, limits = AXES[quantity]
     canvas, axes = style.grid(drawn, 1.7, x_label, y_label, columns=3)
+    outside = 0
     for ax, scene in zip(axes, drawn, strict=True):
         rows = numbers[numbers["scene"] == scene]
         last = rows[rows["solver"] == OURS].groupby("quantity")["value"].last()
         count = last.get("moved", 1.0) + last.get("not_moved", 0.0)
-        for solver, of in rows[rows["quantity"] == quantity].groupby("solver"):
+        asked = rows[rows["quantity"] == quantity]
+        low = float(asked["low"].min() / count)
+        high = float(asked["high"].max() / count)
+        room = ROOM * (high - low)
+        for solver, of in asked.groupby("solver"):
             x = of["at"].astype(float)
             if solver == OURS:
                 ax.fill_between(x, of["low"] / count, of["high"] / count, color="0.85", lw=0)
                 ax.plot(x, of["value"] / count, color=EXPECTED)
-            else:
-                ax.plot(x, of["answer"] / count, "o", **looks[str(solver)])
+                continue
+            answer = of["answer"] / count
+            is_near = answer.between(low - room, high + room)
+            outside += int((answer.notna() & ~is_near).sum())
+            ax.plot(x[is_near], answer[is_near], "o", **looks[str(solver)])
         ax.set(**limits)
     _legends(canvas, looks, (), style.entry("expected, interval", EXPECTED))
     caption = f"{len(drawn)} of {len(scenes)} scenes: expected answers, and rings of the solvers."
-    return Figure(name, title, caption, (), canvas)
+    return Figure(name, title, caption + _left_out(outside), (), canvas)
+
+
+def _left_out(count: int) -> str:
+    """A sentence about answers that are not drawn; empty if all are."""
+    if count == 0:
+        return ""
+    return f" {count} answers are too far off to be drawn."
 
 
 def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
@@ -148,43 +171,56 @@ def _shields(chosen: Pack, numbers: pd.DataFrame) -> list[Figure]:
     # of theta = rho_f u*^2/((rho_sol - rho_f) g d) and Re* = u* d/nu
     excess = (given["rho_sol_kg_m3"] / given["rho_f_kg_m3"] - 1) * given["g_m_s2"] * given["d_m"]
     unit = np.sqrt(excess) * given["d_m"] / given["nu_m2_s"]
-    answer = asked["answer"].where(asked["answer"] > 0)
-    table = asked.assign(level=given["level"], reynolds=unit * np.sqrt(answer), answer=answer)
-    looks, canvas = _looks(numbers), style.canvas(3.8)
+    looks = _looks(numbers)
+    canvas = style.canvas(3.8)
     ax = canvas.subplots()
     for curve in curves.WATER:
         ax.plot(*curve.points(), color=WATER, lw=0.8)
-    here = table[table["solver"] == OURS]
-    theta, x = here["value"], unit[here.index] * np.sqrt(here["value"])
+    here = asked[asked["solver"] == OURS]
+    theta = here["value"]
+    x = unit[here.index] * np.sqrt(theta)
     spread = [theta - here["low"], here["high"] - theta]
     ax.errorbar(x, theta, spread, fmt="none", ecolor=looks.pop(OURS)["color"], elinewidth=0.7)
-    groups: Any = table[table["solver"] != OURS].groupby(["solver", "level"])
+    x_ends = (float(x.min()) / 3, float(x.max()) * 3)
+    y_ends = (max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
+
+    table = asked[asked["solver"] != OURS]
+    # the root of a negative answer is none
+    answer = table["answer"].where(table["answer"] > 0)
+    reynolds = unit[table.index] * np.sqrt(answer)
+    table = table.assign(level=given["level"], reynolds=reynolds)
+    is_near = reynolds.between(*x_ends) & answer.between(*y_ends)
+    outside = int((table["answer"].notna() & ~is_near).sum())
+    groups: Any = table[is_near].groupby(["solver", "level"])
     for (solver, level), rows in groups:
         ax.plot(rows["reynolds"], rows["answer"], MARKERS[level], **looks[solver])
     ax.set(xscale="log", yscale="log", ylabel="Shields number")
     ax.set_xlabel(r"$Re^\star = u^\star d/\nu$")
-    ax.set_xlim(x.min() / 3, x.max() * 3)
-    ax.set_ylim(max(min(theta.min(), 0.02) / 2, 1e-6), max(theta.max(), 0.2) * 2)
+    ax.set_xlim(*x_ends)
+    ax.set_ylim(*y_ends)
     samples = {"curves for water": WATER, "expected, interval": EXPECTED}
     _legends(canvas, looks, table["level"].unique(), *map(style.entry, samples, samples.values()))
     caption = "Thresholds in the Shields diagram: bars are the intervals of the expected answers."
-    return [Figure("shields", "Thresholds", caption, (), canvas)]
+    return [Figure("shields", "Thresholds", caption + _left_out(outside), (), canvas)]
 
 
 def _speed(verdicts: pd.DataFrame) -> list[Figure]:
     """Error against CPU time, each solver's and ours, where times are known."""
-    timed = verdicts[(verdicts["cpu_s"] * verdicts["worst"]).notna()]
+    timed = verdicts[verdicts["cpu_s"].notna() & verdicts["worst"].notna()]
     if timed.empty:
         return []
-    looks, canvas = _looks(verdicts), style.canvas(3.8)
+    looks = _looks(verdicts)
+    canvas = style.canvas(3.8)
     ax = canvas.subplots()
     groups: Any = timed.groupby(["solver", "level"])
     for (solver, level), rows in groups:
-        ax.plot(rows["cpu_s"], rows["worst"].clip(lower=FLOOR), MARKERS[level], **looks[solver])
+        error = rows["worst"].clip(FLOOR, CEILING)
+        ax.plot(rows["cpu_s"].clip(*CPU_S), error, MARKERS[level], **looks[solver])
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a scene, s", ylabel="largest error")
     _legends(canvas, looks, timed["level"].unique())
     caption = (
         "Each point is a scene: CPU time, and largest error of its judged numbers; ours is filled. "
-        f"Errors below {FLOOR:g} are drawn there: at levels 3 to 5 our own run is expected."
+        f"Errors below {FLOOR:g} and above {CEILING:g} are drawn there: at levels 3 to 5 our own "
+        "run is expected."
     )
     return [Figure("speed-accuracy", "Speed and accuracy", caption, (), canvas)]

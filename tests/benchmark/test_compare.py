@@ -13,7 +13,7 @@ from orchestrator.benchmark import compare, pack
 from orchestrator.benchmark.compare import Options, split
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.runs import workspace
-from tests.benchmark.conftest import AFTER, RIGHT, SCENE, TAIL, program, run, verdicts_in
+from tests.benchmark.conftest import AFTER, RIGHT, SCENE, TAIL, program, run, seal, verdicts_in
 from tests.conftest import Command
 from tests.report.test_page import Page
 
@@ -225,6 +225,57 @@ def test_results_of_another_solver_or_pack_stay(
     shutil.rmtree(results)
     with pytest.raises(InputError, match=r"expected\.csv is not what was exported"):
         run(root, tmp_path, body)
+
+
+def test_answers_to_another_pack_are_not_compared(
+    formulas: Path, all_levels: Path, tmp_path: Path
+) -> None:
+    """Scenes of two packs have equal names; a pack that is exported again has equal questions."""
+    run(all_levels, tmp_path, TAIL)
+    results = tmp_path / "results"
+    before = sorted(results.rglob("*"))
+    with pytest.raises(InputError, match=r"answers to another pack.*formulas.*with the pack that"):
+        compare.compare(formulas, [results], tmp_path / "page", SCENE)
+    assert not (tmp_path / "page").exists()
+    assert sorted(results.rglob("*")) == before
+
+    again = tmp_path / "again"
+    shutil.copytree(all_levels, again)
+    (again / "expected.csv").write_text(
+        (again / "expected.csv").read_text().replace(",0.01,", ",0.02,")
+    )
+    seal(again)
+    assert not compare.compare(again, [results], tmp_path / "page", SCENE).failures
+
+
+def test_a_comparison_stays_where_another_pack_has_the_same_name(
+    formulas: Path, all_levels: Path, tmp_path: Path
+) -> None:
+    packs = []
+    for source in (formulas, all_levels):
+        packs.append(tmp_path / source.parent.name / "pack")
+        shutil.copytree(source, packs[-1])
+    answers = tmp_path / "by hand" / "2-incline-5"
+    answers.mkdir(parents=True)
+    (answers / "answer.csv").write_text(INCLINE)
+    page = compare.compare(packs[0], [answers.parent], tmp_path / "page", SCENE).page
+    text = page.read_text()
+    with pytest.raises(InputError, match=r"comparison with another pack, .*formulas"):
+        compare.compare(packs[1], [answers.parent], tmp_path / "page", SCENE)
+    assert page.read_text() == text
+    # a pack that was moved is the one that it was
+    packs[0].rename(tmp_path / "pack")
+    compare.compare(tmp_path / "pack", [answers.parent], tmp_path / "page", SCENE)
+
+
+def test_a_run_says_one_line_for_each_level(
+    formulas: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    choice = Options(patterns=("2-incline-*", "1-*-d0.2mm-z0.1d-*", "2-sliding-5"))
+    run(formulas, tmp_path, TAIL, choice)
+    levels = [name[0] for name in pack.read(formulas).chosen((), choice.patterns)]
+    lines = [f"level 1: {levels.count('1')} scenes", "level 2: 7 scenes"]
+    assert capsys.readouterr().err.splitlines() == lines
 
 
 @pytest.mark.parametrize(

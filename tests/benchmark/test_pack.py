@@ -18,11 +18,10 @@ from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import export
 from orchestrator.errors import InputError
 from orchestrator.grains import cells
-from orchestrator.runs.files import digest_files
 from orchestrator.runs.workspace import STUDY, Workspace, claimed
 from orchestrator.study import study
 from orchestrator.study.scene import Scene
-from tests.benchmark.conftest import ROOT
+from tests.benchmark.conftest import ROOT, seal
 
 
 def _documented() -> set[tuple[str, str]]:
@@ -204,13 +203,6 @@ def test_what_cannot_be_exported(fields: str, named: str, tmp_path: Path) -> Non
         export(tmp_path, None, ())
 
 
-def _seal(root: Path) -> None:
-    """Make the digests those of the files, as whoever means harm does."""
-    files = [*(root / name for name in pack.FILES), *root.glob("scenes/**/*")]
-    digests = digest_files([path for path in files if path.is_file()], root=root)
-    _edit(root / pack.MANIFEST, sha256=digests)
-
-
 def _edit(path: Path, **changed: Any) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | changed))
 
@@ -276,7 +268,7 @@ def test_a_hostile_pack_is_refused_by_one_line(
     monkeypatch.chdir(tmp_path)
     HARMS[name](copy)
     if name not in TOUCHED:
-        _seal(copy)
+        seal(copy)
     before = {path for path in tmp_path.rglob("*") if "results" not in path.parts}
     code = cli.main(["benchmark", "run", "pack", "--scene", "2-*", "--solver", "true {case} {out}"])
     printed = capsys.readouterr().err
