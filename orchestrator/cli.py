@@ -191,10 +191,14 @@ def _other(options: Namespace) -> int:
 
 
 def _end(finished: "Finished") -> int:
-    """Print the answer, the failures, and last the page."""
+    """Print the answer, the failures, and last the page; the exit code."""
     if finished.answer:
         print(finished.answer)
     for name, error in finished.failures.items():
         _say(f"{name} failed: {error}")
+    if finished.undrawn:
+        _say("the page lacks a figure; the same command draws it again")
     print(finished.page)
-    return 3 if finished.failures else 0
+    if finished.failures:
+        return 3
+    return 1 if finished.undrawn else 0

@@ -1,7 +1,7 @@
 """A study from its file to its page: plan, run what is missing, tables, figures."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,12 +24,27 @@ States = Mapping[str, Any]
 
 
 class Finished(NamedTuple):
-    """Outcome of a command: page, number of cases that were run, failures by case, answer."""
+    """Outcome of a command.
+
+    Attributes
+    ----------
+    page
+        Where the page is.
+    started
+        Number of cases that were run.
+    failures
+        The cases that failed, with why.
+    answer
+        The answer in words and a short table.
+    undrawn
+        A line for each figure that could not be drawn.
+    """
 
     page: Path
     started: int
     failures: Failures
     answer: str = ""
+    undrawn: Sequence[str] = ()
 
 
 def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) -> Finished:
@@ -58,14 +73,15 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
         if not started:
             print("every case was done already; no solver was started", file=sys.stderr)
         answer = space.answer(planned.ids)
+        undrawn: Sequence[str] = ()
         if started or answer is None:
-            failures = {name: error for name, error in failures.items() if name in planned.cases}
+            failures = {n: error for n, error in failures.items() if n in planned.cases}
             print("drawing tables, figures and page", file=sys.stderr)
-            answer = _draw(study, planned, space, states, failures, False)
+            answer, undrawn = _draw(study, planned, space, states, failures, False)
         if changed and (left := space.left(planned.cases)):
             what = f"the study file has changed: {len(left)} cases are not asked for any more"
             print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
-        return Finished(space.page, started, failures, answer)
+        return Finished(space.page, started, failures, answer, undrawn)
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -127,8 +143,8 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
         failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
-        answer = _draw(study, planned, space, states, failures, every)
-        return Finished(space.page, 0, failures, answer)
+        answer, undrawn = _draw(study, planned, space, states, failures, every)
+        return Finished(space.page, 0, failures, answer, undrawn)
 
 
 def prune(directory: Path) -> str:
@@ -144,24 +160,30 @@ def prune(directory: Path) -> str:
 
 def _draw(
     study: Study, planned: Plan, space: Workspace, done: States, failures: Failures, every: bool
-) -> str:
-    """Write tables, figures and page, and last the marker of what they are made of; the answer."""
+) -> tuple[str, Sequence[str]]:
+    """Write tables, figures and page, and last the marker of what they are made of.
+
+    Returned are the answer, and a line for each figure that could not be drawn. Where a case
+    failed or a figure is missing there is no marker: the same command draws all again.
+    """
     space.drop(STATE)
     states = {name: done[name] for name in planned.cases if name in done}
     made = tables.make(study, planned, space.cases, states)
     results = Results(study, planned, made, space.cases)
     times = tables.timings(planned, states)
-    causes, guests = {n: str(error) for n, error in failures.items()}, paper.cards(study, made)
+    causes = {name: str(error) for name, error in failures.items()}
+    guests = paper.cards(study, made)
     with space.renewed():
         tables.write(made, space, "tables")
         tables.write({"timings": times}, space, "timings")
         answer = report.said(results, guests)
         try:
-            report.write(results, causes, space, guests, every)
+            undrawn = report.write(results, causes, space, guests, every)
         except BaseException:  # no memory for a picture, or an interrupt: the answer is found
             print(answer, file=sys.stderr)
             raise
     terminal.check()
-    if not failures:
-        space.note(STATE, text_of({**space.drawn_of(planned.ids), "answer": answer}))
-    return answer
+    if not failures and not undrawn:
+        state = {**space.drawn_of(planned.ids), "answer": answer}
+        space.note(STATE, text_of(state))
+    return answer, undrawn

@@ -9,6 +9,7 @@ from orchestrator.flow import theory
 from orchestrator.flow.case import SPEED_HEIGHT, WALL_STRESS, FlowCase
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_speed
+from orchestrator.runs.files import state_of
 from orchestrator.study.parts import Flow, PileBed
 from orchestrator.study.profile import Profile
 from orchestrator.study.scene import Scene
@@ -59,12 +60,11 @@ class FlowModel:
             return theory.waves(self.line, self.scene.solve_roughness)
         (run,) = self.cases
         path = cases / run.name / WALL_STRESS
-        file = path.stat()
-        return _read(path, file.st_size, file.st_mtime_ns)
+        return _read(path, state_of(path))
 
 
 @lru_cache(maxsize=256)
-def _read(path: Path, size: int, changed_ns: int) -> WallStress:
+def _read(path: Path, state: tuple[int, ...]) -> WallStress:
     """The stress in a file as it is now: hundreds of piles share a flow."""
     return WallStress.from_csv(path)
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,7 @@ from orchestrator.grains.peeling import FEWER, PLACES, RANGE, Force, ForceTable,
 from orchestrator.grains.sheltering import Shelter
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
+from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
 from orchestrator.study.parts import PileBed, Range
 from orchestrator.study.scene import Scene
@@ -35,7 +37,13 @@ MARGIN = 20.0
 DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
-_covered, _poured = cache(packing.cover), cache(poured.read)
+_covered = cache(packing.cover)
+
+
+@cache
+def _poured(state: tuple[int, ...], directory: Path, *shown: Any) -> Packing:
+    """The packing of a poured bed by `poured.read`, from its file in the state that it has."""
+    return poured.read(directory, *shown)
 
 
 def has_rows_along(scene: Scene) -> bool:
@@ -205,8 +213,16 @@ class Geometry:
             return packing.along(self.line, self.counts)
         for run in self.pouring:
             assert self.cases is not None, "the grains of a poured bed lie in its run"
-            directory, layers = self.cases / run.name, bed.mobile_layers
-            return _poured(directory, self.line, self.counts, self.surface, layers, bed.width)
+            directory = self.cases / run.name
+            return _poured(
+                state_of(directory / poured.BED),
+                directory,
+                self.line,
+                self.counts,
+                self.surface,
+                bed.mobile_layers,
+                bed.width,
+            )
         lattice = Lattice(
             bed.entrainment_angle_deg,
             gap=bed.roughness / d,

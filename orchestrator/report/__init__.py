@@ -1,7 +1,7 @@
 """Figures and page of a study."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator.runs import terminal
@@ -22,38 +22,79 @@ def write(
     folder: "Folder",
     guests: Sequence["Guest"] = (),
     every: bool = False,
-) -> None:
+) -> list[str]:
     """Draw the figures of a study and write its page into its directory.
 
-    `failures` are the cases that failed, with why. A figure that fails, such as for memory, costs a
-    line of the page. Those that the page folds away are drawn only if `every` one is asked for.
-    """
-    from orchestrator.report import along, bed, flows, page, piles, shields, style, words
+    Parameters
+    ----------
+    results
+        The study with its tables.
+    failures
+        The cases that failed, with why.
+    folder
+        The directory of the study.
+    guests
+        Sections that others add to the page, with their files.
+    every
+        Whether the figures that the page folds away are drawn too.
 
+    Returns
+    -------
+    A line for each figure that could not be drawn, such as for want of memory. The page has
+    the line in its place.
+    """
+    from orchestrator.report import (
+        along,
+        bed,
+        flows,
+        page,
+        piles,
+        shields,
+        style,
+        words,
+    )
+
+    drawing: list[Callable[[Results], Iterator[style.Figure]]] = [
+        flows.hills,
+        along.draw,
+        bed.draw,
+        shields.draw,
+        shields.singles,
+        shields.piles,
+        piles.fractions,
+        piles.wear,
+        shields.accuracy,
+        piles.poured,
+        flows.stress,
+        flows.flow,
+        flows.mesh,
+    ]
     figures: list[style.Figure] = []
     faults: list[str] = []
     with style.settings():
-        for draw in (
-            *(flows.hills, along.draw, bed.draw, shields.draw, shields.singles, shields.piles),
-            *(piles.fractions, piles.wear, shields.accuracy, piles.poured),
-            *(flows.stress, flows.flow, flows.mesh),
-        ):
+        for draw in drawing:
             try:
                 for figure in draw(results):
-                    now = every or not (figure.fold and figure.drawing)
-                    figures.append(style.saved(figure, folder) if now else figure)
+                    is_folded = bool(figure.fold and figure.drawing)
+                    if every or not is_folded:
+                        figure = style.saved(figure, folder)
+                    figures.append(figure)
             except Exception as error:
-                faults.append(f"{draw.__module__}.{draw.__name__}: {type(error).__name__}: {error}")
+                name = f"{draw.__module__}.{draw.__name__}"
+                faults.append(f"{name}: {type(error).__name__}: {error}")
                 print(f"a figure could not be drawn: {faults[-1]}", file=sys.stderr)
             terminal.check()
     figures.sort(key=lambda figure: not figure.leads)
+    for guest in guests:
+        for name, text in guest.files.items():
+            folder.put(name, text)
     names = [figure.name for figure in figures]
-    for name, text in (item for guest in guests for item in guest.files.items()):
-        folder.put(name, text)
-    parts = {**words.contents(results, failures), "faults": faults, "figures": figures}
-    sections = [guest.section(names) for guest in guests]
+    parts = words.contents(results, failures)
+    parts |= {"faults": faults, "figures": figures, "guests": guests}
+    parts["sections"] = [guest.section(names) for guest in guests]
     terminal.check()
-    folder.put(PAGE, page.fill("page.html.j2", **parts, guests=guests, sections=sections))
+    folder.put(PAGE, page.fill("page.html.j2", **parts))
+    return faults
 
 
 def drawn_from(results: "Results") -> "list[Case]":

@@ -82,6 +82,16 @@ def write_durably(path: Path, content: str | bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def state_of(path: Path) -> tuple[int, int, int]:
+    """Number, size (bytes) and time of change (ns) of a file: others once it is written again.
+
+    With it a cache by the path of a file sees a case that was run again. Raises OSError if
+    there is no such file.
+    """
+    state = path.stat()
+    return state.st_ino, state.st_size, state.st_mtime_ns
+
+
 def size_of(path: Path) -> int:
     """Size of a file, or of all files below a directory, bytes; a file that vanishes counts 0."""
     paths = (Path(folder, name) for folder, _, names in os.walk(path) for name in names)

@@ -13,8 +13,10 @@ from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import Places
 from orchestrator.bed.poured import BED, DUMP, PouredBed
 from orchestrator.errors import InputError, SolverError
+from orchestrator.grains.loads import Geometry
 from orchestrator.runs import engine
 from orchestrator.runs.case import templates
+from orchestrator.study import study
 from orchestrator.study.parts import LogNormal, Sizes
 from orchestrator.types import FloatArray, IntArray
 
@@ -142,3 +144,17 @@ def test_a_bed_of_too_many_or_too_few_grains_is_refused() -> None:
         _strip(length=1000.0, width=20.0).check_size()
     with pytest.raises(InputError, match=r"bed\.length: a poured bed of .* grains"):
         _strip(length=1.0).check_size()
+
+
+def test_a_bed_that_was_poured_again_is_read_again(tmp_path: Path) -> None:
+    text = 'kind = "flat", length = 0.014, packing = "poured", poured_depth = 3.0'
+    text = f"bed = {{ {text} }}\ngrain = {{ diameter = 1e-3, sizes = {{ sigma_g = 1.3 }} }}"
+    (scene,) = study.parse(text, name="bed", where="bed").scenes
+    before = Geometry(scene, tmp_path)
+    file = _run(before.pouring[0], tmp_path) / BED
+    rows = pd.read_csv(file)
+    assert len(before.packing.sizes) <= len(rows)
+    rows["size"] *= 0.9
+    rows.to_csv(file, index=False)
+    after = Geometry(scene, tmp_path)
+    assert after.packing.sizes.max() == pytest.approx(0.9 * before.packing.sizes.max())

@@ -6,7 +6,7 @@ import re
 import shutil
 import subprocess
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,9 @@ import pytest
 import orchestrator as face
 from orchestrator import cli, plan
 from orchestrator.errors import InputError
+from orchestrator.report import shields
+from orchestrator.report.results import Results
+from orchestrator.report.style import Figure
 from orchestrator.runs import case
 from orchestrator.study import study
 from tests.conftest import Command, Mount
@@ -235,6 +238,36 @@ def test_tolerance_and_place_are_parts_of_the_question(edited: Path, tmp_path: P
     (copy / "other").mkdir()
     shutil.move(copy / "edited.toml", copy / "other" / "edited.toml")
     assert not _is_finished(copy / "other" / "edited.toml", copy / "out")
+
+
+def test_a_figure_that_failed_is_drawn_the_next_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The page without it once counted as finished."""
+    file, out = tmp_path / "t.toml", tmp_path / "out"
+    file.write_text("grain.diameter = 1e-3\nprotocol.method = 'pivot'\n")
+
+    def fail(results: Results) -> Iterator[Figure]:
+        raise MemoryError("for this test")
+
+    words = ["study", str(file), "--out", str(out)]
+    draw = shields.draw
+    monkeypatch.setattr(shields, "draw", fail)
+    for _ in range(2):
+        assert cli.main(words) == 1
+        printed = capsys.readouterr()
+        assert "fail: MemoryError: for this test" in printed.err
+        assert "the same command draws it again" in printed.err
+        assert "One grain of 1 mm" in printed.out
+        assert "MemoryError: for this test" in (out / "report.html").read_text()
+        assert not (out / "figures" / "shields.svg").exists()
+        assert not _is_finished(file, out)
+    monkeypatch.setattr(shields, "draw", draw)
+    assert cli.main(words) == 0
+    assert "no solver was started" in capsys.readouterr().err
+    assert "MemoryError" not in (out / "report.html").read_text()
+    assert (out / "figures" / "shields.svg").is_file()
+    assert _is_finished(file, out)
 
 
 def test_the_command_and_python_answer_an_edited_study_alike(

@@ -1,6 +1,8 @@
 """Pictures of flow, mesh, bed and hills, from their study file to what is drawn."""
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -108,6 +110,27 @@ def test_field_is_that_of_the_flow(results: Results, pile: Pile) -> None:
     window = (-60.0, -59.0, 10.0, 10.1)
     far = np.linalg.norm(flows.over_u_e(pile, results.cases, window, pile.bed.height), axis=-1)
     assert np.nanmean(far) == pytest.approx(1, abs=0.02)
+
+
+def test_a_flow_that_was_run_again_is_read_again(
+    results: Results, pile: Pile, tmp_path: Path
+) -> None:
+    window = (-0.02, 0.1, 0.0, 0.03)
+    here, fresh = tmp_path / "here", tmp_path / "fresh"
+    shutil.copytree(results.cases / pile.flow.name, here / pile.flow.name)
+    before = flows.over_u_e(pile, here, window, 1.0, 60)
+    # another mesh: higher cells from the bed upwards
+    points = here / pile.flow.name / "constant" / "polyMesh" / "points"
+    head, rows = points.read_text().split("\n(\n")
+    rows, end = rows.split("\n)", 1)
+    corners = np.array([row.strip("()").split() for row in rows.splitlines()], float)
+    corners[:, 2] += 0.5 * np.maximum(corners[:, 2], 0)
+    rows = "\n".join("({} {} {})".format(*corner) for corner in corners.tolist())
+    points.write_text(f"{head}\n(\n{rows}\n){end}")
+    shutil.copytree(here, fresh)
+    after = flows.over_u_e(pile, here, window, 1.0, 60)
+    np.testing.assert_array_equal(after, flows.over_u_e(pile, fresh, window, 1.0, 60))
+    assert not np.array_equal(after, before, equal_nan=True)
 
 
 def test_mesh_is_that_of_the_flow(
