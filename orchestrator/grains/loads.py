@@ -1,9 +1,10 @@
 """The bed of a scene in grains, and the flow's forces on them: what each needs to move."""
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +24,7 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.runs.files import state_of
 from orchestrator.study.closed_form import closed_form, single_grain
-from orchestrator.study.parts import PileBed, Range
+from orchestrator.study.parts import PileBed, Range, UnfitError
 from orchestrator.study.scene import Scene
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -34,6 +35,9 @@ LONG = 5000.0
 is packed where no method is asked for."""
 MARGIN = 20.0
 """Fixed bed before and behind the grains of such a range, d: twice the way of a grain that goes."""
+LOOSE = 1e-4
+"""Threshold over that of the scene's grain, below which a grain lies loose: at the limiting slope
+round-off leaves it 1e-8. Tables of forces begin there."""
 DIGITS = 9
 """Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
@@ -93,14 +97,15 @@ def forces(
 def on_slopes(scene: Scene, slopes_deg: FloatArray) -> FloatArray:
     """Friction velocity at which the grain of a scene would leave on other slopes, m/s.
 
-    It is 0 on slopes down which a grain rolls by itself.
+    It is 0 on slopes down which a grain rolls by itself, the limiting slope among them.
     """
     slopes, place = np.unique(np.round(slopes_deg, 9), return_inverse=True)
     grain = single_grain(scene)
     grains = [grain._replace(slope_deg=slope) for slope in slopes.tolist()]
     each = [answer.friction_velocity for answer in thresholds_of(scene.forces.law, grains)]
     speeds = np.nan_to_num(np.array(each, float), nan=0.0, posinf=np.inf) / np.sqrt(scene.gust)
-    return np.asarray(speeds[place])
+    is_loose = speeds < LOOSE * float(closed_form(scene).friction_velocity)
+    return np.where(is_loose, 0.0, speeds)[place]
 
 
 @dataclass(frozen=True)
@@ -108,10 +113,12 @@ class Geometry:
     """The bed of a scene with a pile: its line, its n grains, and what no flow changes.
 
     `cases` is the directory of the finished runs; only the grains of a poured bed are read there.
+    Grains are packed on the whole bed, or on a `part` of it, a range of x in diameters.
     """
 
     scene: Scene
     cases: Path | None = field(default=None, compare=False)
+    part: Range | None = None
 
     @property
     def bed(self) -> PileBed:
@@ -143,10 +150,13 @@ class Geometry:
     @cached_property
     def packed_line(self) -> BedLine:
         """The part of the bed line with grains, d: all but of a long bed with a counted range."""
-        line, counts = self.line, self.counts
-        if isinstance(counts, str) or self.scene.is_poured or line.x[-2] - line.x[1] <= LONG:
+        line, part = self.line, self.part
+        is_long = line.x[-2] - line.x[1] > LONG
+        if part is None and is_long and not self.scene.is_poured:
+            part = None if isinstance(self.counts, str) else self.counts
+        if part is None:
             return line
-        return line.part(counts[0] - MARGIN, counts[1] + MARGIN, APRON)
+        return line.part(part[0] - MARGIN, part[1] + MARGIN, APRON)
 
     @property
     def is_part(self) -> bool:
@@ -232,12 +242,12 @@ class Geometry:
             seed=bed.seed,
         )
         ground = of_bed(bed.model_copy(update={"obstacles": ()})).scaled(1 / d)
-        if not bed.is_wedge:
-            if self.is_part:
-                x = self.packed_line.x
-                ground = replace(ground, x=x, z=tuple(ground.height(np.array(x)).tolist()))
-            return _covered(self.line, ground, self.counts, lattice)
-        return _packed(ground, lattice, self.line)
+        if bed.is_wedge and not self.is_part:
+            return _packed(ground, lattice, self.line)
+        if self.is_part:
+            x = self.packed_line.x
+            ground = replace(ground, x=x, z=tuple(ground.height(np.array(x)).tolist()))
+        return _covered(self.line, ground, self.counts, lattice)
 
     @cached_property
     def tangents(self) -> FloatArray:
@@ -361,6 +371,41 @@ class Geometry:
         tau = stress.mean_over(s * d, length, how.stress)
         return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
 
+    def around(self, x: float) -> Self:
+        """The same bed by pivots, with grains on a part of it alone, of `LONG` around x in m."""
+        line, counts = self.line, self.counts
+        start, end = line.x[1], line.x[-2]
+        if not isinstance(counts, str):
+            start, end = max(start, counts[0]), min(end, counts[1])
+        if end - start > LONG:
+            place = x / self.scene.grain.diameter
+            start, end = max(start, place - LONG / 2), min(end, place + LONG / 2)
+        parts = {name: getattr(self.scene, name) for name in Scene.model_fields}
+        parts["protocol"] = self.scene.protocol.model_copy(update={"method": "pivot"})
+        return type(self)(Scene(**parts), self.cases, (start, end))
+
+    def row_hold(self, cases: Path) -> float:
+        """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
+
+        The flow (u*_0) at which the first counted grain leaves by peeling, over the least at which
+        one of them moves by itself. It is 1 on a poured bed and on a pile of two faces, whose rows
+        end at the crest. Where no method has packed the bed, grains are packed around the place
+        where motion starts; NaN if none can lie there.
+        """
+        if self.scene.is_poured or self.bed.is_wedge:
+            return 1.0
+        loads = self.loads(cases)
+        if self.scene.protocol.method != "local":
+            return loads.row_hold()
+        alone = loads.alone()
+        place = int(np.argmin(np.where(alone > 0, alone, np.inf)))
+        x = float(self.packing.centres[self.packing.windward, 0][place])
+        try:
+            part = self.around(x * self.scene.grain.diameter)
+            return part.loads(cases).row_hold()
+        except (InputError, UnfitError):
+            return math.nan
+
     def loads(self, cases: Path) -> "Loads":
         """The grains under the flow of the whole bed, from the directory of the finished runs."""
         return self.under(self.model.stress(cases))
@@ -435,16 +480,31 @@ class Loads:
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
             flows = peeling.pivots(places, sizes, loading, self.tables, bed.scene.bond)
             return np.asarray(flows[counted])
-        slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
-        slopes = np.where(speed < 0, -slopes, slopes)
-        threshold = self._sheltered(slopes) if bed.is_balanced else on_slopes(bed.scene, slopes)
-        return np.where(speed != 0, threshold / np.where(speed != 0, np.abs(speed), 1), np.inf)
+        if bed.is_balanced:
+            return self._undisturbed(self._by_tables())
+        return self._undisturbed(on_slopes(bed.scene, self._slopes_deg))
 
-    def _sheltered(self, slopes_deg: FloatArray) -> FloatArray:
-        """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope."""
+    @property
+    def _slopes_deg(self) -> FloatArray:
+        """Slope that the flow goes up at each counted grain, degrees, shape (N,)."""
+        bed, counted = self.geometry, self.geometry.packing.windward
+        slopes = np.degrees(np.arctan2(bed.tangents[counted, 1], bed.tangents[counted, 0]))
+        return np.asarray(np.where(self.ratio[counted] < 0, -slopes, slopes))
+
+    def _undisturbed(self, local: FloatArray) -> FloatArray:
+        """The undisturbed friction velocity to local ones of the counted grains, m/s, (N,)."""
+        ratio = np.abs(self.ratio[self.geometry.packing.windward])
+        flows = np.full(len(ratio), np.inf)
+        return np.asarray(np.divide(local, ratio, out=flows, where=ratio > 0))
+
+    def _by_tables(self) -> FloatArray:
+        """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope.
+
+        By drag and lift of the tables of forces, as in peeling, without a torque of the law.
+        """
         bed, scene = self.geometry, self.geometry.scene
         beta, tables = np.radians(scene.pocket_angle_deg), self.tables
-        goals = np.cos(np.radians(slopes_deg) - beta) + scene.bond * np.sin(2 * beta)
+        goals = np.cos(np.radians(self._slopes_deg) - beta) + scene.bond * np.sin(2 * beta)
         arms = float(np.sin(beta)), float(np.cos(beta))
         numbers = np.flatnonzero(bed.packing.windward)
         each = zip(numbers.tolist(), goals.tolist(), strict=True)
@@ -492,15 +552,18 @@ class Loads:
             return np.where(lifted, local / ratio, np.inf)[counted]
 
     def row_hold(self) -> float:
-        """By how much the grains of a lattice's rows hold one another, a ratio of at least 1.
+        """The flow (u*_0) at which the first counted grain leaves by peeling over that of pivots.
 
-        The flow (u*_0) at which the first counted grain leaves by peeling, over that at which the
-        same grain moves by itself. It is 1 where the first grain of a row has none before it, as at
-        a sharp crest, and on a poured bed.
+        Grains that lie loose say nothing of it. It is infinite where the row never lets one go.
         """
-        by_grains = self.geometry.length > 0
-        if self.geometry.pouring or self.geometry.bed.is_wedge or not by_grains:
+        alone, leaving = self._undisturbed(self._by_tables()), self.leaving()
+        first_alone = _least(np.minimum(alone, self.lifting(alone)))
+        first = _least(np.minimum(leaving, self.lifting(leaving)))
+        if math.isinf(first_alone):
             return 1.0
-        leaving, alone = self.leaving(), self.alone()
-        first = int(leaving.argmin())
-        return max(float(leaving[first] / alone[first]), 1.0) if alone[first] > 0 else 1.0
+        return max(first / first_alone, 1.0)
+
+
+def _least(flows: FloatArray) -> float:
+    """The least flow above that of loose grains, 0; infinite if there is none."""
+    return float(flows[flows > 0].min(initial=np.inf))

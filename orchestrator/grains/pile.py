@@ -51,7 +51,6 @@ SPACING = 0.25  # spacing of the places at which the height of the grains is tak
 NEAREST = 0.25
 """Least distance along x of a new corner from those of the bed line, d: corners that nearly
 coincide make cells that are far too short."""
-AROUND = 1000.0  # length of bed that is packed around the place where motion starts, d
 LEVEL = 1e-6  # a bed that is less above the flat bed lies on it, d
 FAR = 1e9
 STRONGER = 2.0  # stress over the mean at which forces are compared where no gust exceeds the mean
@@ -635,22 +634,6 @@ class Pile(Geometry):
         at = int(least[len(least) // 2])  # of places that go at one flow the one in the middle
         x = self.packing.centres[self.packing.windward, 0]
         return float(x[at]) * self.scene.grain.diameter, float(flows[at])
-
-    def around(self, x: float) -> "Pile":
-        """The same bed by pivots, with grains around a counted place alone, x in m."""
-        d, counts, line = self.scene.grain.diameter, self.bed.counts, self.model.line
-        places, counted = np.array(line.x), line.counted(counts)
-        under = int(np.searchsorted(places, x)) - 1
-        bounds = np.flatnonzero(~counted)
-        # no farther than the counted side that the place is on
-        ends = places[bounds[bounds < under][-1] + 1], places[bounds[bounds > under][0]]
-        low, high = (-np.inf, np.inf) if isinstance(counts, str) else counts
-        reach = AROUND / 2 * d
-        part = (max(ends[0], low, x - reach), min(ends[1], high, x + reach))
-        bed = self.bed.model_copy(update={"counted": tuple(map(float, part))})
-        rules = self.scene.protocol.model_copy(update={"method": "pivot"})
-        parts = {name: getattr(self.scene, name) for name in Scene.model_fields}
-        return Pile(Scene(**{**parts, "bed": bed, "protocol": rules}), self.cases)
 
     def pivot_thresholds(self, speed: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which counted grains move by themselves, sorted, m/s.

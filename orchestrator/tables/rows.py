@@ -178,7 +178,7 @@ class Answer:
     def __init__(self, decision: Decision, pile: Pile, cases: Path) -> None:
         self.decision, self.pile, self.scene_id = decision, pile, decision.asked.id
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
-        self.row_hold = pile.loads(cases).row_hold()
+        self.row_hold = pile.row_hold(cases)
         self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
         if decision.levels and decision.levels.grains is levels.LOCAL and not decision.is_as_asked:
             with suppress(InputError, UnfitError):  # where no grains can lie there is no check
