@@ -1,7 +1,6 @@
 """The picture of a bed with its grains and the flow, and the grains at each stop of a slider."""
 
 import base64
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
@@ -23,7 +22,7 @@ from orchestrator.report.page import caption, fill
 from orchestrator.report.results import FRACTION, Results, split
 from orchestrator.report.style import Figure
 from orchestrator.study import fields
-from orchestrator.types import BoolArray, FloatArray, IntArray
+from orchestrator.types import FloatArray, IntArray
 
 LONG = 100.0  # length of a face, d, beyond which its upper end is shown alone: grains must be seen
 WHOLE = 4.0  # length of a whole bed over `LONG` up to which all forms are shown
@@ -62,38 +61,64 @@ def read(pile: Pile, cases: Path) -> Steps:
     Only grains within the picture are read, at `STOPS` of the load steps if there are more: all
     grains of a long bed at all load steps would need many gigabytes.
     """
-    packing, moved = pile.packing, pile.motion(cases)
-    ((left, right, bottom, _), _), (x, z) = window(pile), packing.centres.T
-    inside = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
-    rolling = packing.mobile if isinstance(pile.method, piles.Dem) else False
-    grains = np.flatnonzero(inside | rolling)
-    counted = np.zeros(len(x), np.int64)
-    counted[packing.windward] = moved.level
+    packing = pile.packing
+    moved = pile.motion(cases)
+    grains = _grains_shown(pile)
     if isinstance(pile.method, piles.Dem):
-        every = [packing.centres[None]]
-        for run in pile.method.runs:
-            steps, rows = read_dump(cases / run.name / motion.BED, motion.BED_COLUMNS)
-            fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
-            every.append(np.tile(fixed, (len(steps), 1, 1)))
-            ends, d = np.searchsorted(steps, rows["step"]), pile.scene.grain.diameter
-            every[-1][ends, rows["id"] - 1] = rows[["x", "z"]] / d
-        places = np.concatenate(every)[:, grains]
+        places = _places_by_dem(pile, pile.method, cases)[:, grains]
         stops = np.arange(len(places))
     else:
-        share = int(np.argmax(moved.moved >= FRACTION * moved.count - 1e-9))
-        spaced = np.linspace(0, len(moved.flow) - 1, min(STOPS, len(moved.flow)))
-        stops = np.unique([*spaced.round().astype(int), share])
+        stops = _stops(moved)
         places = np.broadcast_to(packing.centres[grains], (len(stops), len(grains), 2))
     lines = [(0, pile.line)]
-    for worn in pile.flows[1:]:  # the first grain that moves under its flow
-        left_ = np.isfinite(piles.grains(pile, worn, cases).left).sum()
-        stop = int(np.searchsorted(moved.moved[stops], left_, side="right"))
+    for worn in pile.flows[1:]:
+        # the first grain that moves under its flow
+        gone_before = np.isfinite(piles.grains(pile, worn, cases).left).sum()
+        stop = int(np.searchsorted(moved.moved[stops], gone_before, side="right"))
         lines.append((stop, piles.line(pile, worn, cases)))
-    level = np.where(counted > 0, np.searchsorted(stops, counted), 0)[grains]
-    if len(lines) > 1:
-        gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
-        places = np.where(gone[..., None], np.nan, places)
-    return Steps(pile, grains, places, level, moved.flow[stops], moved.moved[stops], tuple(lines))
+    left_at = np.zeros(len(packing.centres), np.int64)
+    left_at[packing.windward] = moved.level
+    level = np.where(left_at > 0, np.searchsorted(stops, left_at), 0)[grains]
+    is_worn = len(lines) > 1
+    if is_worn:
+        is_gone = (level > 0) & (level <= np.arange(len(stops))[:, None])
+        places = np.where(is_gone[..., None], np.nan, places)
+    flow = moved.flow[stops]
+    totals = moved.moved[stops]
+    return Steps(pile, grains, places, level, flow, totals, tuple(lines))
+
+
+def _grains_shown(pile: Pile) -> IntArray:
+    """Numbers of the grains in the picture; by DEM of all mobile ones, which may roll into it."""
+    (left, right, bottom, _), _ = window(pile)
+    x, z = pile.packing.centres.T
+    is_shown = (x > left - 1) & (x < right + 1) & (z > bottom - 1)
+    if isinstance(pile.method, piles.Dem):
+        is_shown |= pile.packing.mobile
+    return np.flatnonzero(is_shown)
+
+
+def _places_by_dem(pile: Pile, method: piles.Dem, cases: Path) -> FloatArray:
+    """Places of all grains as packed and after each load step, d, of shape (K + 1, N, 2)."""
+    packing = pile.packing
+    d = pile.scene.grain.diameter
+    fixed = np.where(packing.mobile[:, None], np.nan, packing.centres)
+    places = [packing.centres[None]]
+    for run in method.runs:
+        steps, rows = read_dump(cases / run.name / motion.BED, motion.BED_COLUMNS)
+        of_run = np.tile(fixed, (len(steps), 1, 1))
+        ends = np.searchsorted(steps, rows["step"])
+        of_run[ends, rows["id"] - 1] = rows[["x", "z"]] / d
+        places.append(of_run)
+    return np.concatenate(places)
+
+
+def _stops(moved: motion.Motion) -> IntArray:
+    """Load steps of the slider of a bed without dynamics: evenly spaced, and that of `FRACTION`."""
+    share = int(np.argmax(moved.moved >= FRACTION * moved.count - 1e-9))
+    count = len(moved.flow)
+    spaced = np.linspace(0, count - 1, min(STOPS, count)).round().astype(int)
+    return np.unique([*spaced, share])
 
 
 def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
@@ -102,9 +127,11 @@ def chosen(results: Results) -> Iterator[tuple[pd.Series, Pile]]:
     Where the files of that pile were pruned, the next one has its place.
     """
     for _, rows in split(results.exemplars, "alpha_deg"):
-        each = ((row, results.shown(str(row["scene_id"]))) for _, row in rows.iterrows())
-        grains = ((row, pile) for row, piles in each for pile in piles[:1] if pile.length)
-        yield from itertools.islice(grains, 1)
+        for _, row in rows.iterrows():
+            shown = results.shown(str(row["scene_id"]))
+            if shown and shown[0].length:
+                yield row, shown[0]
+                break
 
 
 def draw(results: Results) -> Iterator[Figure]:
@@ -117,43 +144,63 @@ def draw(results: Results) -> Iterator[Figure]:
         shown = steps.first(FRACTION)
         share = steps.totals[shown] / pile.packing.count
         told = ", ".join(labels.told(row, ["alpha_deg", "d_m", *telling]))
-        name = f"bed-alpha{pile.bed.slope_deg:g}"
-        title = f"The bed when {share:.0%} of its grains have moved, {told}"
         image = _svg(steps, shown, results.cases).encode()
-        cases, text = tuple(run.name for run in reversed(pile.runs)), words(results, pile)
-        look = {"fold": number > 0, "leads": number == 0}
-        yield Figure(name, title, text, cases, None, image, data(steps, shown), **look)
+        yield Figure(
+            name=f"bed-alpha{pile.bed.slope_deg:g}",
+            title=f"The bed when {share:.0%} of its grains have moved, {told}",
+            caption=words(results, pile),
+            cases=tuple(run.name for run in reversed(pile.runs)),
+            drawing=None,
+            image=image,
+            data=data(steps, shown),
+            fold=number > 0,
+            leads=number == 0,
+        )
 
 
 def words(results: Results, pile: Pile) -> str:
     """The caption: how the pile was answered, and what of it is shown."""
-    columns, rules = ["z0_over_d", "packing", "force_law"], pile.scene.protocol
+    rules = pile.scene.protocol
+    columns = ["z0_over_d", "packing", "force_law"]
     columns += labels.varying(results.beds("pile"), "alpha_deg", "d_m", *columns)
-    used = {column: fields.COLUMNS[column].used(pile.scene) for column in columns}
+    properties = []
+    for column in columns:
+        used = fields.COLUMNS[column].used(pile.scene)
+        if used is not None:
+            properties.append(labels.plain(column, used))
     return caption(
         "bed",
-        **{"width": pile.bed.width, "by_dem": pile.by_dem, "flow": bool(pile.model.cases)},
-        **{"method": rules.method, "update": rules.update, "part": window(pile)[1]},
+        width=pile.bed.width,
+        by_dem=pile.by_dem,
+        flow=bool(pile.model.cases),
+        method=rules.method,
+        update=rules.update,
+        part=window(pile)[1],
         criterion=labels.value("displacement_criterion", rules.displacement_criterion),
-        properties=", ".join(labels.plain(c, v) for c, v in used.items() if v is not None),
+        properties=", ".join(properties),
     )
 
 
 def data(steps: Steps, shown: int) -> dict[str, Any]:
     """Data for the slider: at each stop number, x and -z of the grains that have moved since."""
     mobile = steps.pile.packing.mobile[steps.grains]
-    last, frames = steps.places[0, mobile].copy(), []
+    last = steps.places[0, mobile].copy()
+    frames = []
     for places in steps.places[1:]:
         now = places[mobile]
-        gone = np.isnan(now[:, 0])
-        new = (gone != np.isnan(last[:, 0])) | (np.abs(now - last).max(axis=1) > SHIFT)
+        is_gone = np.isnan(now[:, 0])
+        was_gone = np.isnan(last[:, 0])
+        is_new = (is_gone != was_gone) | (np.abs(now - last).max(axis=1) > SHIFT)
         frame: list[float | None] = []
-        for i in np.flatnonzero(new).tolist():
-            x, z = now[i].tolist()
-            frame += [i, None, None] if gone[i] else [i, round(x, 2), round(-z, 2)]
+        for grain in np.flatnonzero(is_new).tolist():
+            x, z = now[grain].tolist()
+            if is_gone[grain]:
+                frame += [grain, None, None]
+            else:
+                frame += [grain, round(x, 2), round(-z, 2)]
         frames.append(frame)
-        last[new] = now[new]
-    return {
+        last[is_new] = now[is_new]
+    found = {
         "step": "load step" if steps.pile.by_dem else "flow",
         "shown": shown,
         "count": steps.pile.packing.count,
@@ -162,8 +209,10 @@ def data(steps: Steps, shown: int) -> dict[str, Any]:
         "level": steps.level[mobile].tolist(),
         "start": np.round(steps.places[0, mobile] * [1, -1], 2).tolist(),
         "frames": frames,
-        **({"lines": _paths(steps)} if len(steps.lines) > 1 else {}),
     }
+    if len(steps.lines) > 1:
+        found["lines"] = _paths(steps)
+    return found
 
 
 def _paths(steps: Steps) -> list[list[Any]]:
@@ -172,17 +221,21 @@ def _paths(steps: Steps) -> list[list[Any]]:
     paths = []
     for stop, line in steps.lines:
         x = np.unique([left, *np.clip(line.x, left, right), right])
-        points = (f"{a:.2f} {-b:.2f}" for a, b in zip(x, line.height(x), strict=True))
+        heights = line.height(x)
+        points = [f"{a:.2f} {-b:.2f}" for a, b in zip(x, heights, strict=True)]
         paths.append([stop, f"M{' L'.join(points)}"])
     return paths
 
 
 def window(pile: Pile) -> tuple[flows.Window, str]:
     """Left, right, bottom and top of the picture, d, and which part of a long bed it shows."""
-    (x, z), toe = pile.line.crest.tolist(), float(pile.line.toe[0])
-    if z <= 0:  # a level bed has no crest
+    x, z = pile.line.crest.tolist()
+    toe = float(pile.line.toe[0])
+    is_level = z <= 0
+    if is_level:
         left, right = pile.line.x[1] - 2, pile.line.x[-2] + 2
-        part = f"Shown: {LONG:g} d of the bed." if left + LONG < pile.line.x[-2] else ""
+        is_cut = left + LONG < pile.line.x[-2]
+        part = f"Shown: {LONG:g} d of the bed." if is_cut else ""
         return (left, min(right, left + LONG), -4.0, 6.0), part
     if x <= LONG and toe <= WHOLE * LONG:
         return (-0.06 * toe, 1.06 * toe, -2.0, z + max(0.5 * z, 6.0)), ""
@@ -192,31 +245,39 @@ def window(pile: Pile) -> tuple[flows.Window, str]:
 
 
 def _svg(steps: Steps, shown: int, cases: Path) -> str:
-    pile, places = steps.pile, steps.places[shown]
+    """The picture at one stop of the slider."""
+    pile = steps.pile
+    places = steps.places[shown]
     frame = left, right, bottom, top = window(pile)[0]
-    packing, grains = pile.packing, steps.grains
-    centres, mobile = packing.centres[grains], packing.mobile[grains]
-    here = np.where(np.isnan(places), centres, places)
-    base = np.where(packing.windward[grains], "e", "m")
-    moved = (steps.level > 0) & (steps.level <= shown)
-    look = np.select([moved & np.isnan(places[:, 0]), moved], ["v g", "v"], base)
-    length = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n > (right - left) / 25)
-
-    def circles(places: FloatArray, chosen: BoolArray) -> list[tuple[str, str, str]]:
-        rows = np.column_stack([places * [1, -1], packing.sizes[grains] / 2])[chosen]
-        return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
-
+    packing = pile.packing
+    centres = packing.centres[steps.grains]
+    radii = packing.sizes[steps.grains] / 2
+    mobile = packing.mobile[steps.grains]
+    is_gone = np.isnan(places[:, 0])
+    here = np.where(is_gone[:, None], centres, places)
+    # classes of the circles: exposed, mobile, moved, gone
+    base = np.where(packing.windward[steps.grains], "e", "m")
+    has_moved = (steps.level > 0) & (steps.level <= shown)
+    look = np.select([has_moved & is_gone, has_moved], ["v g", "v"], base)
+    lengths = (1, 2, 5, 10, 20, 50, 100)
+    bar = next(length for length in lengths if length > (right - left) / 25)
     paths = _paths(steps)
+    fixed = _circles(centres[~mobile], radii[~mobile])
+    moving = _circles(here[mobile], radii[mobile])
     return fill(
         "bed.svg.j2",
-        **{"left": left, "right": right, "top": top, "bottom": bottom, "bar": length},
+        left=left,
+        right=right,
+        top=top,
+        bottom=bottom,
+        bar=bar,
         box=f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}",
         ground=f"M{left:.2f} {-bottom:.2f} L{paths[0][1][1:]} L{right:.2f} {-bottom:.2f}Z",
         line=[path for stop, path in paths if stop <= shown][-1],
         wears=len(paths) > 1,
         flow=_flow(pile, cases, frame) if pile.model.cases else "",
-        fixed=circles(centres, ~mobile),
-        mobile=zip(circles(here, mobile), look[mobile], base[mobile], strict=True),
+        fixed=fixed,
+        mobile=zip(moving, look[mobile], base[mobile], strict=True),
         size=f"{(right - left) / 75:.3g}",
         d=labels.value("d_m", pile.scene.grain.diameter),
         case=pile.runs[-1].name if pile.runs else "",
@@ -224,13 +285,21 @@ def _svg(steps: Steps, shown: int, cases: Path) -> str:
     )
 
 
+def _circles(centres: FloatArray, radii: FloatArray) -> list[tuple[str, str, str]]:
+    """x, -z and radius of grains, as the picture writes them; it has y downwards."""
+    rows = np.column_stack([centres * [1, -1], radii])
+    return [(f"{x:.2f}", f"{y:.2f}", f"{r:.3g}") for x, y, r in rows.tolist()]
+
+
 def _flow(pile: Pile, cases: Path, frame: flows.Window) -> str:
     """The flow's speed as a pale picture, PNG in base64."""
     velocity = flows.over_u_e(pile, cases, frame, pile.scene.grain.diameter)
     speed = np.linalg.norm(velocity, axis=-1)[::-1]
-    levels = np.where(np.isnan(speed), 255, 254 * np.clip(np.nan_to_num(speed), 0, 1))
+    is_outside = np.isnan(speed)
+    levels = np.where(is_outside, 255, 254 * np.clip(np.nan_to_num(speed), 0, 1))
     shades = colormaps["Blues"](0.1 + 0.5 * np.arange(256) / 254, bytes=True)[:, :3]
     picture = Image.fromarray(levels.astype(np.uint8))
     picture.putpalette(shades.tobytes())
-    picture.save(out := BytesIO(), "PNG", transparency=255)
+    out = BytesIO()
+    picture.save(out, "PNG", transparency=255)
     return base64.b64encode(out.getvalue()).decode("ascii")

@@ -42,21 +42,27 @@ class Results:
     @cached_property
     def flow_fields(self) -> list[str]:
         """The fields of the solved flow in which the piles differ."""
-        columns, count = fields.COLUMNS.items(), self.beds("pile").nunique(dropna=False)
-        return [n for n, each in columns if each.info.scope == "solved flows" and count[n] > 1]
+        count = self.beds("pile").nunique(dropna=False)
+        solved = [
+            name for name, each in fields.COLUMNS.items() if each.info.scope == "solved flows"
+        ]
+        return [name for name in solved if count[name] > 1]
 
     _joins: dict[str, pd.DataFrame] = field(default_factory=dict, init=False)
 
     def joined(self, name: str) -> pd.DataFrame:
         """A table with the columns of its rows' scenes beside its own, or an empty one."""
         if name not in self._joins:
-            table = self.tables.get(name, pd.DataFrame())
-            if len(table):
-                columns = ["scene_id", *self.scenes.columns.difference(table.columns, sort=False)]
-                # one block: columns may be added to more than a hundred others
-                table = table.merge(self.scenes[columns], on="scene_id", how="left").copy()
-            self._joins[name] = table if len(table) else pd.DataFrame()
+            self._joins[name] = self._with_scenes(self.tables.get(name, pd.DataFrame()))
         return self._joins[name]
+
+    def _with_scenes(self, table: pd.DataFrame) -> pd.DataFrame:
+        if table.empty:
+            return pd.DataFrame()
+        others = self.scenes.columns.difference(table.columns, sort=False)
+        scenes = self.scenes[["scene_id", *others]]
+        # one block: columns may be added to more than a hundred others
+        return table.merge(scenes, on="scene_id", how="left").copy()
 
     def values(self, column: str) -> list[float]:
         """The values that the study's scenes have in a column, rising."""
@@ -83,16 +89,25 @@ class Results:
 
     def shown(self, scene_id: str) -> list[Pile]:
         """The piles whose files show how a scene's grains move, a check by DEM first."""
-        piles = filter(None, (self.plan.checks.get(scene_id), self.plan.piles[scene_id]))
-        return [pile for pile in piles if all(is_whole(item, self.cases) for item in pile.runs)]
+        piles = [self.plan.piles[scene_id]]
+        if scene_id in self.plan.checks:
+            piles.insert(0, self.plan.checks[scene_id])
+        return [pile for pile in piles if self._is_whole(pile)]
+
+    def _is_whole(self, pile: Pile) -> bool:
+        return all(is_whole(run, self.cases) for run in pile.runs)
 
     @cached_property
     def flows(self) -> dict[str, Pile]:
         """A pile for each flow case whose stress is in the tables, by the flow case's name."""
         stress = self.tables.get("wall_stress", pd.DataFrame())
         done = set() if stress.empty else set(stress["flow_case"])
-        solves = (item for pile in self.plan.piles.values() for item in pile.solves.items())
-        return {name: solve for name, solve in solves if name in done}
+        found = {}
+        for pile in self.plan.piles.values():
+            for name, solve in pile.solves.items():
+                if name in done:
+                    found[name] = solve
+        return found
 
 
 def measured_hills(results: Results) -> Iterator[tuple[float, pd.DataFrame]]:
@@ -118,14 +133,21 @@ def seeds_as_one(rows: pd.DataFrame) -> pd.DataFrame:
     Columns ``seeds``, ``of_seeds``: how many, of how many; ``least``, ``largest`` of them.
     """
     keys = [*fields.others(rows, "seed"), "fraction"]
-    twins = valid(rows).groupby([rows[key] for key in keys], dropna=False)
-    rows = rows.assign(of_seeds=twins.transform("size"))[valid(rows) | ~twins.transform("any")]
+    usable = valid(rows)
+    twins = usable.groupby([rows[key] for key in keys], dropna=False)
+    is_told = usable | ~twins.transform("any")
+    rows = rows.assign(of_seeds=twins.transform("size"))[is_told]
     groups = rows.groupby(keys, dropna=False)
     tau = groups["shields"]
-    ends = {"least": tau.transform("min"), "largest": tau.transform("max")}
     names = ["shields", "ustar0_m_s", "shields_model_low", "shields_model_high"]
     means: pd.DataFrame = groups[names].transform("mean")
-    return rows.assign(**means, **ends, seeds=tau.transform("size")).drop_duplicates(keys)
+    rows = rows.assign(
+        **means,
+        least=tau.transform("min"),
+        largest=tau.transform("max"),
+        seeds=tau.transform("size"),
+    )
+    return rows.drop_duplicates(keys)
 
 
 def drawable(table: pd.DataFrame, *columns: str) -> "pd.Series[bool]":
@@ -151,4 +173,8 @@ def valid(table: pd.DataFrame) -> "pd.Series[bool]":
 
 def case_names(*tables: pd.DataFrame) -> tuple[str, ...]:
     """The cases behind the rows of tables, each once."""
-    return tuple(sorted({str(c) for rows in tables if len(rows) for c in rows["case"].dropna()}))
+    names: set[str] = set()
+    for rows in tables:
+        if len(rows):
+            names.update(rows["case"].dropna().astype(str))
+    return tuple(sorted(names))
