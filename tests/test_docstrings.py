@@ -27,6 +27,9 @@ PHYSICS = (
 DESCRIBED = (
     *PHYSICS,
     "orchestrator.errors",
+    "orchestrator.runs.files",
+    "orchestrator.runs.process",
+    "orchestrator.runs.terminal",
     "orchestrator.solvers",
     "orchestrator.solvers.doctor",
     "orchestrator.solvers.liggghts",

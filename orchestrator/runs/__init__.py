@@ -1,1 +1,1 @@
-"""Case directories and how they are run: nothing here knows of grains, flows or studies."""
+"""Case directories and how they are run: nothing here knows of grains or studies."""
