@@ -26,10 +26,15 @@ from orchestrator.report import FIGURES
 from orchestrator.runs.files import Folder
 
 RC: dict[Any, Any] = {
-    **dict.fromkeys(("font.size", "axes.labelsize", "axes.titlesize"), 8),
-    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 7),
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
     # numbers at minor ticks stand in line with those at major ones
-    **dict.fromkeys(("xtick.minor.pad", "ytick.minor.pad"), 5),
+    "xtick.minor.pad": 5,
+    "ytick.minor.pad": 5,
     "font.sans-serif": ["DejaVu Sans"],  # which matplotlib brings: no font of the machine is used
     "axes.linewidth": 0.6,
     "axes.titley": 1.0,  # else matplotlib looks for ticks above each panel
@@ -42,19 +47,38 @@ RC: dict[Any, Any] = {
     "figure.dpi": 200,
 }
 """Settings that differ from matplotlib's defaults."""
-WIDTH = 7.0  # width of a figure across two columns of a paper, inches
-SIDES, UNDER, LINE = (0.66, 0.12), 0.42, 0.165
-"""Margins of panels: left and right, numbers and label of x, a line of a title or legend, inches"""
-PANELS = 6  # largest number of panels of a figure
+WIDTH = 7.0
+"""Width of a figure across two columns of a paper, inches."""
+SIDES = (0.66, 0.12)
+"""Margins of panels, left and right, inches."""
+UNDER = 0.42
+"""Height of the numbers and the label of an x axis, inches."""
+LINE = 0.165
+"""Height of a line of a title or a legend, inches."""
+PANELS = 6
+"""Largest number of panels of a figure."""
 SHADES = {
-    **dict.fromkeys(("beta_deg", "nu_m2_s"), ("viridis", 0.0, 0.85)),
+    "beta_deg": ("viridis", 0.0, 0.85),
+    "nu_m2_s": ("viridis", 0.0, 0.85),
     "alpha_deg": ("plasma", 0.0, 0.82),
     "fraction": ("YlGnBu", 0.35, 1.0),
     "d_m": ("turbo", 0.05, 0.95),
 }
 """Colour maps of quantities that rise in steps, for more values than `DIAMETERS` has."""
-DIAMETERS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555", "#7b3294")
-WATER, AIR, BED = "#74aed6", "#8c6d46", "#d9c9a3"
+DIAMETERS = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#56b4e9",
+    "#e69f00",
+    "#555555",
+    "#7b3294",
+)
+"""Colours of a few diameters."""
+WATER = "#74aed6"
+AIR = "#8c6d46"
+BED = "#d9c9a3"
 Panel = TypeVar("Panel")
 Look = dict[str, Any]
 """Properties of an artist."""
@@ -99,7 +123,10 @@ def palette(column: str, values: Sequence[float]) -> dict[float, str]:
         return dict(zip(values, DIAMETERS, strict=False))
     name, first, last = SHADES[column]
     step = (last - first) / max(len(values) - 1, 1)
-    return {v: to_hex(colormaps[name](first + i * step)) for i, v in enumerate(values)}
+    colours = {}
+    for place, value in enumerate(values):
+        colours[value] = to_hex(colormaps[name](first + place * step))
+    return colours
 
 
 def canvas(height: float) -> Canvas:
@@ -108,61 +135,102 @@ def canvas(height: float) -> Canvas:
 
 
 def grid(
-    titles: Sequence[str], height: float, x: str, y: str, columns: int = 2, *, sharey: bool = True
+    titles: Sequence[str],
+    height: float,
+    x: str,
+    y: str,
+    columns: int = 2,
+    *,
+    sharey: bool = True,
 ) -> tuple[Canvas, list[Axes]]:
-    """A figure of panels with titles and of a height (inches), in columns; all share x.
+    """A figure of panels, which all share x.
 
     Its margins are fixed: to measure all texts takes as long as to draw them.
+
+    Parameters
+    ----------
+    titles
+        The title of each panel.
+    height
+        Height of a panel, inches.
+    x, y
+        Labels of the axes.
+    columns
+        Panels beside each other, at most.
+    sharey
+        Whether all panels share y.
     """
     columns = min(len(titles), columns)
     lines = -(-len(titles) // columns)
-    above = LINE * max(title.count("\n") + 1 for title in titles) + SIDES[1] if any(titles) else 0.0
-    between = 2 * SIDES[1] if sharey else sum(SIDES)
-    wide = (WIDTH - sum(SIDES) - (columns - 1) * between) / columns
+    left, right = SIDES
+    above = 0.0
+    if any(titles):
+        above = LINE * max(title.count("\n") + 1 for title in titles) + right
+    between = 2 * right if sharey else left + right
+    wide = (WIDTH - left - right - (columns - 1) * between) / columns
     figure = Canvas(figsize=(WIDTH, lines * height + (lines - 1) * above))
-    ends = SIDES[0] / WIDTH, 0.0, 1 - SIDES[1] / WIDTH, 1.0
-    figure.subplots_adjust(*ends, wspace=between / wide, hspace=above / height)
-    extend(figure, above + SIDES[1], UNDER)
-    axes = figure.subplots(lines, columns, sharex=True, sharey=sharey, squeeze=False).ravel()
-    for unused in axes[len(titles) :]:
+    figure.subplots_adjust(
+        left=left / WIDTH,
+        bottom=0.0,
+        right=1 - right / WIDTH,
+        top=1.0,
+        wspace=between / wide,
+        hspace=above / height,
+    )
+    extend(figure, above + right, UNDER)
+    grid_of_axes = figure.subplots(lines, columns, sharex=True, sharey=sharey, squeeze=False)
+    every = grid_of_axes.ravel()
+    axes: list[Axes] = list(every[: len(titles)])
+    for unused in every[len(titles) :]:
         unused.remove()
-    for lowest in axes[len(titles) - columns : len(titles)]:
+    for lowest in axes[-columns:]:
         lowest.tick_params(axis="x", which="both", labelbottom=True)
         lowest.set_xlabel(x)
-    for left in axes[: len(titles) : columns]:
-        left.set_ylabel(y)
-    for ax, title in zip(axes, titles, strict=False):
+    for leftmost in axes[::columns]:
+        leftmost.set_ylabel(y)
+    for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, loc="left")
-    return figure, list(axes[: len(titles)])
+    return figure, axes
 
 
 def extend(figure: Canvas, above: float, below: float) -> None:
     """Make a figure of fixed margins higher above and below its panels, by inches."""
-    height, places = figure.get_figheight(), figure.subplotpars
-    bottom, top = places.bottom * height + below, (1 - places.top) * height + above
-    figure.set_figheight(whole := height + above + below)
+    height = figure.get_figheight()
+    places = figure.subplotpars
+    bottom = places.bottom * height + below
+    top = (1 - places.top) * height + above
+    whole = height + above + below
+    figure.set_figheight(whole)
     figure.subplots_adjust(bottom=bottom / whole, top=1 - top / whole)
 
 
 def pages(panels: Sequence[Panel]) -> Iterator[tuple[str, str, Sequence[Panel]]]:
     """At most six panels for each figure, after the endings of the figure's name and title."""
     for number, start in enumerate(range(0, len(panels), PANELS)):
-        name, title = (f"-{number + 1}", f", more panels ({number})") if number else ("", "")
+        name = f"-{number + 1}" if number else ""
+        title = f", more panels ({number})" if number else ""
         yield name, title, panels[start : start + PANELS]
 
 
 def legends(figure: Canvas, colours: Sequence[Artist], looks: Sequence[Artist]) -> None:
     """Place the legend of colours above the panels and all other samples below them."""
-    room = []
-    for items, most, edge in ((colours, 6, "upper"), (looks, 3, "lower")):
-        longest = max((len(str(item.get_label())) for item in items), default=0)
-        count = max(1, min(most, int(WIDTH / (0.5 + 0.055 * longest))))  # a sample, and letters
-        look: Look = {"handles": items, "loc": f"outside {edge} center", "ncols": count}
-        if items:
-            figure.legend(**look)
-        room.append(-(-len(items) // count) * LINE + (SIDES[1] if items else 0.0))
+    above = _legend(figure, colours, 6, "outside upper center")
+    below = _legend(figure, looks, 3, "outside lower center")
     if not figure.get_layout_engine():
-        extend(figure, *room)
+        extend(figure, above, below)
+
+
+def _legend(figure: Canvas, items: Sequence[Artist], most: int, place: str) -> float:
+    """Place a legend of at most so many columns; its height, inches."""
+    if not items:
+        return 0.0
+    longest = max(len(str(item.get_label())) for item in items)
+    inches = 0.5 + 0.055 * longest  # a sample, and letters
+    columns = max(1, min(most, int(WIDTH / inches)))
+    look: Look = {"handles": items, "loc": place, "ncols": columns}
+    figure.legend(**look)
+    lines = -(-len(items) // columns)
+    return lines * LINE + SIDES[1]
 
 
 def samples(axes: Sequence[Axes]) -> list[Artist]:
@@ -170,16 +238,23 @@ def samples(axes: Sequence[Axes]) -> list[Artist]:
     entries: dict[str, Any] = {}
     for ax in axes:
         for item in (*ax.collections, *ax.lines):
-            label, sample = str(item.get_label()), copy(item)
-            points = np.asarray(item.get_xydata(), float) if isinstance(item, Line2D) else ()
-            if label.startswith("_") or (len(points) and not ax.viewLim.count_contains(points)):
+            label = str(item.get_label())
+            if label.startswith("_") or not _is_in_frame(item, ax):
                 continue
-            before = entries.setdefault(label, sample)
+            before = entries.setdefault(label, copy(item))
             if isinstance(item, Line2D) and before.get_color() != item.get_color():
                 before.set(color="0.2", markeredgecolor="0.2")
                 if before.get_markerfacecolor() != "white":
                     before.set_markerfacecolor("0.2")
     return list(entries.values())
+
+
+def _is_in_frame(item: Artist, ax: Axes) -> bool:
+    """Whether a point of a line is in the frame of its panel; others and empty lines are."""
+    if not isinstance(item, Line2D):
+        return True
+    points = np.asarray(item.get_xydata(), float)
+    return not len(points) or bool(ax.viewLim.count_contains(points))
 
 
 def entry(label: str, colour: str) -> Line2D:
@@ -190,25 +265,40 @@ def entry(label: str, colour: str) -> Line2D:
 def plain_ticks(axis: Axis) -> None:
     """Numbers such as 0.01 or 20 on a logarithmic axis whose limits are set: at 1, 2 and 5."""
     low, high = axis.get_view_interval()
-    axis.set_minor_locator(LogLocator(subs=range(2, 9) if high < 5 * low else (2, 5)))
+    is_short = high < 5 * low
+    axis.set_minor_locator(LogLocator(subs=range(2, 9) if is_short else (2, 5)))
     axis.set_major_formatter("{x:g}")
-    decades = 3.5 if axis is axis.axes.yaxis else 2.3  # numbers beside each other take more room
-    axis.set_minor_formatter("{x:g}" if high < 10**decades * low else NullFormatter())
+    # numbers beside each other take more room
+    decades = 3.5 if axis is axis.axes.yaxis else 2.3
+    has_room = high < 10**decades * low
+    axis.set_minor_formatter("{x:g}" if has_room else NullFormatter())
 
 
 def saved(figure: Figure, folder: Folder, *, png: bool = False) -> Figure:
     """A figure with its image, put as SVG; with `png` as PNG too, which is the image then."""
-    images = {"svg": figure.image}
-    if drawn := figure.canvas:  # `savefig` would draw twice, once for the layout alone
-        if png:
-            agg: Any = FigureCanvasAgg(drawn)
-            agg.print_png(raster := BytesIO(), metadata={"Software": None})
-            images["png"] = raster.getvalue()
-            drawn.set_layout_engine("none")  # it is laid out now
-        svg: Any = FigureCanvasSVG(drawn)
-        svg.print_svg(out := BytesIO(), metadata={"Date": None})
-        # hundredths of a point are enough; a scale stays as it is
-        images["svg"] = re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
-    for ending, image in images.items():
-        folder.put(f"{FIGURES}/{figure.name}.{ending}", image)
-    return replace(figure, drawing=None, image=image)
+    drawn = figure.canvas  # `savefig` would draw twice, once for the layout alone
+    if drawn is None:
+        folder.put(f"{FIGURES}/{figure.name}.svg", figure.image)
+        return replace(figure, drawing=None)
+    if png:
+        raster = _png(drawn)
+        folder.put(f"{FIGURES}/{figure.name}.png", raster)
+        drawn.set_layout_engine("none")  # it is laid out now
+    svg = _svg(drawn)
+    folder.put(f"{FIGURES}/{figure.name}.svg", svg)
+    return replace(figure, drawing=None, image=raster if png else svg)
+
+
+def _png(drawn: Canvas) -> bytes:
+    out = BytesIO()
+    agg: Any = FigureCanvasAgg(drawn)
+    agg.print_png(out, metadata={"Software": None})
+    return out.getvalue()
+
+
+def _svg(drawn: Canvas) -> bytes:
+    out = BytesIO()
+    canvas: Any = FigureCanvasSVG(drawn)
+    canvas.print_svg(out, metadata={"Date": None})
+    # hundredths of a point are enough; a scale stays as it is
+    return re.sub(rb"(?<!\(0)(\.\d\d)\d{3,}", rb"\1", out.getvalue())
