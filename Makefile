@@ -1,5 +1,5 @@
-# Recipes use names relative to this directory only, and never the scripts in .venv/bin, whose first
-# line breaks when the path has a space or a quote in it.
+# Recipes use names relative to this directory only, and never the scripts that pip writes to .venv/bin,
+# whose first line breaks when the path has a space or a quote in it.
 
 PYTHON = .venv/bin/python
 ARGS =

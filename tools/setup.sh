@@ -1,5 +1,6 @@
 #!/bin/sh
-# Makes a Debian 12 machine ready.  A second call finds all in place and asks no server for anything.
+# Makes a machine with Debian 12 or 13 ready.  A second call finds all in place and asks no server for
+# anything.  On other systems the Containerfile makes an image of Debian 13 with the same steps.
 #
 #   sh tools/setup.sh run      Debian packages, and .venv with what requirements.lock pins
 #   sh tools/setup.sh cluster  the same, and the extra [cluster]: what requirements-cluster.lock pins
@@ -66,12 +67,13 @@ install_packages() {
     by_hand="    apt-get update && apt-get install --no-install-recommends $missing"
 
     if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
-        die "this system has no apt-get.  On Debian 12 one would call, as root:
+        die "this system has no apt-get.  On Debian 12 or 13 one would call, as root:
 
 $by_hand
 
-Here, provide OpenFOAM (1912), LIGGGHTS, Python 3.11 or newer and these libraries by other means
-and install the package itself with pip.  Nothing was installed."
+Here, build the image of Debian 13 that the Containerfile describes (docs/reliability.md), or provide
+OpenFOAM (1912), LIGGGHTS, Python 3.11 or newer and these libraries by other means and install the
+package itself with pip.  Nothing was installed."
     fi
     if [ "$(id -u)" -eq 0 ]; then
         sudo=
@@ -123,8 +125,16 @@ install_venv() {
     mv "$stamp.new" "$stamp"
 }
 
-# With a file that names the checkout, its package is found from any directory.
+# The package is installed as this checkout, so that a change of a file acts at once: a file in
+# site-packages names the checkout, and the command starts the Python beside it.  A command that pip
+# writes would name .venv in its first line, which breaks when the path has a blank or a quote in it.
+launcher='#!/bin/sh
+# Starts the program of the checkout whose .venv this file is in.
+exec "$(dirname -- "$(readlink -f -- "$0")")/python" -P -m orchestrator "$@"'
+command=$environment/bin/orchestrator
+
 linked() {
+    [ -x "$command" ] && [ "$(cat "$command")" = "$launcher" ] || return 1
     for packages in "$environment"/lib/python3*/site-packages; do
         [ "$(cat "$packages/orchestrator.pth" 2>/dev/null)" = "$PWD" ] || return 1
     done
@@ -132,8 +142,12 @@ linked() {
 
 link_checkout() {
     for packages in "$environment"/lib/python3*/site-packages; do
-        printf '%s\n' "$PWD" >"$packages/orchestrator.pth"
+        printf '%s\n' "$PWD" >"$packages/orchestrator.pth.new"
+        mv "$packages/orchestrator.pth.new" "$packages/orchestrator.pth"
     done
+    printf '%s\n' "$launcher" >"$command.new"
+    chmod +x "$command.new"
+    mv "$command.new" "$command"
 }
 
 ready() { venv_holds "$@" && linked && [ -z "$(missing_packages)" ]; }

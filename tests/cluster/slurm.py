@@ -66,9 +66,26 @@ class Slurm:
 
 
 def missing() -> list[str]:
-    """Programs that a Slurm here lacks."""
+    """What a Slurm here lacks: programs, and a first process that takes leave of orphans."""
     path = os.pathsep.join([os.environ.get("PATH", ""), SBIN])
-    return [program for program in PROGRAMS if not shutil.which(program, path=path)]
+    lacking = [program for program in PROGRAMS if not shutil.which(program, path=path)]
+    if not _orphans_vanish():
+        lacking.append("a process 1 that waits for orphans (`--init` of podman and docker)")
+    return lacking
+
+
+def _orphans_vanish() -> bool:
+    """Whether a process without a parent leaves no zombie, which slurmd takes for a running job.
+
+    It waits a minute for the end of such a job, and then takes the node out of service.
+    """
+    said = subprocess.check_output(["sh", "-c", "sleep 0.1 >/dev/null & echo $!"], text=True)
+    orphan = Path("/proc", said.strip())
+    for _ in range(200):
+        if not orphan.exists():
+            return True
+        time.sleep(0.05)
+    return False
 
 
 @contextlib.contextmanager
@@ -91,6 +108,14 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
         (f"{SBIN}/slurmctld", "-D", "-c"),
         *((f"{SBIN}/slurmd", "-D", "-N", f"n{node}") for node in range(1, nodes + 1)),
     )
+    started: list[subprocess.Popen[bytes]] = []
+
+    def goes_on() -> None:
+        for daemon in started:
+            if daemon.poll() is not None:
+                said = (root / "daemons.log").read_text()
+                raise RuntimeError(f"a daemon has ended: {daemon.args!s}\n{said}")
+
     with contextlib.ExitStack() as stack:
         log = stack.enter_context((root / "daemons.log").open("ab"))
         for command in daemons:
@@ -98,8 +123,9 @@ def running(root: Path, *, nodes: int, cores: int) -> Iterator[Slurm]:
             words = ["setpriv", "--pdeathsig", "KILL", "--", *command]
             daemon = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
             stack.callback(_end, daemon)
-            until((root / "munge.socket").exists, "munged")
-        until(lambda: slurm.idle() == nodes, "idle nodes")
+            started.append(daemon)
+            until((root / "munge.socket").exists, "munged", goes_on)
+        until(lambda: slurm.idle() == nodes, "idle nodes", goes_on)
         try:
             yield slurm
         finally:
@@ -128,10 +154,13 @@ def _end(daemon: "subprocess.Popen[bytes]") -> None:
         daemon.wait()
 
 
-def until(condition: Callable[[], object], what: str) -> None:
-    """Wait for something, at most five minutes."""
+def until(
+    condition: Callable[[], object], what: str, goes_on: Callable[[], None] = lambda: None
+) -> None:
+    """Wait for something, at most five minutes; `goes_on` raises where it can no longer come."""
     for _ in range(6000):
         if condition():
             return
+        goes_on()
         time.sleep(0.05)
     raise RuntimeError(f"waited in vain for {what}")

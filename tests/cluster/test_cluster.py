@@ -11,7 +11,15 @@ import pytest
 from tests.cluster import slurm
 from tests.cluster.slurm import Slurm, until
 from tests.conftest import Command, Shared
-from tests.faults.bench import Bench, begun, ended, processes_in, tables, undisturbed
+from tests.faults.bench import (
+    Bench,
+    begun,
+    ended,
+    processes_in,
+    tables,
+    undisturbed,
+    wait_for,
+)
 
 STUDY = """
 time_limit = 100
@@ -80,7 +88,7 @@ def test_two_nodes(bench: Bench, queue: Slurm) -> None:
 
 def test_a_cancelled_job(bench: Bench, queue: Slurm) -> None:
     driver = bench.start()
-    until(lambda: _at_work(bench), "a solver")
+    assert wait_for(lambda: bool(_at_work(bench)), driver), ended(driver)
     queue.says("scancel", *queue.jobs())
     code, printed = ended(driver)
     assert code == 0, printed
@@ -90,7 +98,12 @@ def test_a_cancelled_job(bench: Bench, queue: Slurm) -> None:
 
 def test_a_killed_driver(bench: Bench) -> None:
     driver = bench.start()
-    until(lambda: [*bench.out.glob("cases/pile-*/done.json")] and _at_work(bench), "a second one")
+
+    def second_runs() -> bool:
+        first = [*bench.out.glob("cases/pile-*/done.json")]
+        return bool(first) and bool(_at_work(bench))
+
+    assert wait_for(second_runs, driver), ended(driver)
     before = {path: path.stat().st_mtime_ns for path in bench.out.glob("cases/*/done.json")}
     driver.kill()
     driver.communicate()

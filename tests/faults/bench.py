@@ -112,13 +112,15 @@ def begun(folder: Path, text: str, *about: Any) -> Iterator[Bench]:
 
 
 def undisturbed(folder: Path, text: str) -> Path:
-    """The directory of a study that has run to its end; it is run once."""
+    """The directory of a study that has run to its end without a failure; it is run once."""
     bench = Bench(folder, folder / "out")
     folder.mkdir(exist_ok=True)
-    if not (bench.out / "report.html").is_file():
+    succeeded = folder / "succeeded"
+    if not succeeded.exists():
         bench.source.write_text(text)
         code, printed = bench.study()
         assert code == 0, printed
+        succeeded.touch()
     return bench.out
 
 

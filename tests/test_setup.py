@@ -1,0 +1,52 @@
+"""Set-up of a checkout whose path has blanks and quotes in it, without any server."""
+
+import os
+import shutil
+import subprocess
+import venv
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = Path(np.__file__).parents[1]
+"""Where the packages of `requirements.lock` are that these tests run with."""
+NAME = """the user's "checkout" of $HOME & co"""
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of this checkout with a `.venv` that holds what set-up would install."""
+    folder = tmp_path / NAME
+    ignored = shutil.ignore_patterns("__pycache__")
+    for part in ("orchestrator", "templates", "tools"):
+        shutil.copytree(ROOT / part, folder / part, ignore=ignored)
+    lock = Path(shutil.copy(ROOT / "requirements.lock", folder))
+    environment = folder / ".venv"
+    venv.create(environment, with_pip=True)
+    (own,) = environment.glob("lib/python3*/site-packages")
+    (own / "installed.pth").write_text(f"{PACKAGES}\n")
+    digest = sha256(lock.read_bytes()).hexdigest()
+    (environment / "installed.sha256").write_text(f"{digest}  {lock.name}\n")
+    return folder
+
+
+def test_set_up_installs_the_command_of_the_checkout(checkout: Path, tmp_path: Path) -> None:
+    outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+    def says(command: Path) -> str:
+        return subprocess.check_output([command, "--version"], cwd=tmp_path, env=outside, text=True)
+
+    (tmp_path / "orchestrator.py").write_text("raise SystemExit('another program')\n")
+    command = checkout / ".venv/bin/orchestrator"
+    set_up: list[str | Path] = ["sh", checkout / "tools/setup.sh", "run"]
+    subprocess.run(set_up, check=True, env=outside)
+    written = command.stat().st_mtime_ns
+    subprocess.run(set_up, check=True, env=outside)
+    assert command.stat().st_mtime_ns == written
+    link = tmp_path / "orchestrator"
+    link.symlink_to(command)
+    (checkout / "orchestrator/__init__.py").write_text('__version__ = "changed"\n')
+    assert says(command) == says(link) == "changed\n"
