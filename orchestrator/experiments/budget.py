@@ -140,7 +140,8 @@ def experiment(study: Study, out: Path) -> Experiment:
     # a flow model may refuse a bed: only runs of the scenes as they are asked count as failed
     failing = {run.name for change in listed for run in planned.piles[change.base].runs}
     title, limit_s = "What a threshold is worth", study.time_limit_s
-    return Experiment("budget", title, planned, results, limit_s, failing=failing)
+    source = study.source
+    return Experiment("budget", title, planned, results, limit_s, failing=failing, source=source)
 
 
 def measure(listed: list[Change], runs: Runs) -> pd.DataFrame:

@@ -1,19 +1,20 @@
 """What wind takes from a stockpile: the solved stress on its surface beside AP-42, section 13.2.5.
 
-Between two disturbances a surface loses its erosion potential P, which the fastest mile of that
-time decides (U.S. EPA, Industrial Wind Erosion, 2006). AP-42 has classes of u_s/u_r, the speed
-25 cm above a pile over that at 10 m, from a wind tunnel (Billman and Arya, EPA/600/S3-85/059).
+Between two disturbances a surface loses its erosion potential P, which the fastest mile of
+that time decides (U.S. EPA, Industrial Wind Erosion, 2006). AP-42 has classes of u_s/u_r,
+the speed 25 cm above a pile over that at 10 m, from a wind tunnel (Billman and Arya,
+EPA/600/S3-85/059).
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from dataclasses import dataclass
 from math import log
-from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import ArrayLike
 
@@ -24,174 +25,353 @@ from orchestrator.fidelity import limits
 from orchestrator.flow.model import FlowModel
 from orchestrator.physics.threshold import thresholds_of
 from orchestrator.physics.velocity import log_law_ustar
-from orchestrator.report import style
+from orchestrator.report import labels, style
 from orchestrator.report.flows import USTAR
 from orchestrator.report.page import Section
 from orchestrator.report.style import Figure
+from orchestrator.study import fields
 from orchestrator.study.closed_form import single_grain
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 from orchestrator.study.study import Study
-from orchestrator.types import FloatArray
+from orchestrator.types import FloatArray, Row
 
-AREAS, MATERIALS = (
-    pd.read_csv(Path(__file__).parent / "measured" / f"ap42_{name}.csv", keep_default_na=False)
-    for name in ("areas", "thresholds")
-)
+MEASURED = Path(__file__).parent / "measured"
+AREAS = pd.read_csv(MEASURED / "ap42_areas.csv", keep_default_na=False)
+MATERIALS = pd.read_csv(MEASURED / "ap42_thresholds.csv", keep_default_na=False)
 USTAR_T = dict(zip(MATERIALS["material"], MATERIALS["ustar_m_s"], strict=True))
 CLASSES = np.unique(AREAS["us_over_ur"])
 WIND_HEIGHT = 10.0  # of the fastest mile and of u_r, m
-OVER_FLAT = log(WIND_HEIGHT / 0.005) / log(0.25 / 0.005)  # u*/u*_0 over u_s/u_r, by the log laws
-PILE, FLAT = 0.10, 0.053  # AP-42: u* over u_s on a pile, and over the wind on flat ground
+OVER_FLAT = log(WIND_HEIGHT / 0.005) / log(0.25 / 0.005)
+"""u*/u*_0 over u_s/u_r, by the log laws of both heights over a roughness length of 5 mm."""
+PILE, FLAT = 0.10, 0.053
+"""AP-42: u* over u_s on a pile, and over the wind on flat ground."""
 FLAT_BELOW = 0.2  # height over base below which AP-42 takes a pile for flat ground
 LEVEL_DEG = 5.0  # slope up to which a surface is neither windward nor lee
 GROUND = 0.01  # height of the bed over the pile's up to which it is the ground around
-COLOURS, LINES, GREY = ("#0072b2", "#d55e00", "#009e73", "#cc79a7"), ("-", "--", "-.", ":"), "0.3"
-
-
-ALIKE = attrgetter("pile", "threshold")  # the same of surfaces that differ in obstacles alone
-Groups = Sequence[Sequence["Surface"]]
+IN_NAME = {"bed_shape", "profile", "h_m", "alpha_deg", "solve_z0_m", "obstacles"}
+"""Columns of a scene that the name of its pile, or of its surface, has in any case."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Colours of the surfaces of a pile in the figure."""
+LINES = ("-", "--", "-.", ":")
+"""Line styles of the four piles of AP-42."""
+GREY = "0.3"
+DRAWN = 4  # most piles of the figure
 
 
 class Surface(NamedTuple):
-    """The surface of a pile in the columns `part`, `share` and `ratio`, |u*|/u*_0, of its faces."""
+    """The surface of a pile in the columns `part`, `share` and `ratio` of its faces.
 
-    pile: str
-    obstacles: str
+    The ratio is the friction velocity |u*| over that of the undisturbed flow. `name` says
+    what the surface has on it: its obstacles, or that it is one of AP-42's.
+    """
+
+    name: str
     faces: pd.DataFrame
     ustar0_over_wind: float
     threshold: float  # u*_t, m/s
-    is_flat: bool = False  # to AP-42
 
     def potential(self, winds: ArrayLike) -> FloatArray:
-        """P = 58 (u* - u*_t)^2 + 25 (u* - u*_t), its mean in winds at 10 m (m/s), g/m2."""
-        ustar = np.multiply.outer(winds, self.ustar0_over_wind * self.faces["ratio"].to_numpy())
-        excess, share = np.maximum(ustar - self.threshold, 0), self.faces["share"].to_numpy()
-        return np.asarray((58 * excess**2 + 25 * excess) @ (share / share.sum()))
+        """Erosion potential, mean of the surface, in winds at 10 m (m/s), g/m2.
 
-    def by_epa(self) -> list["Surface"]:
+        AP-42, Eq. 3: P = 58 (u* - u*_t)^2 + 25 (u* - u*_t), 0 where u* is below u*_t.
+        """
+        ratio = self.faces["ratio"].to_numpy()
+        share = self.faces["share"].to_numpy()
+        ustar = np.multiply.outer(winds, self.ustar0_over_wind * ratio)
+        excess = np.maximum(ustar - self.threshold, 0)
+        lost = 58 * excess**2 + 25 * excess
+        return np.asarray(lost @ (share / share.sum()))
+
+    def total(self, winds: ArrayLike) -> float:
+        """Erosion potential of several winds, one after another, g/m2."""
+        return float(self.potential(winds).sum())
+
+
+@dataclass(frozen=True)
+class Pile:
+    """A pile with the surfaces that it has without and with obstacles, at least one.
+
+    They are alike in everything else: shape, grains, flow and how that is solved. The
+    surface without an obstacle comes first, if there is one. `is_flat` says whether AP-42
+    takes the pile for flat ground.
+    """
+
+    name: str
+    surfaces: Sequence[Surface]
+    is_flat: bool
+    has_bare: bool
+
+    @property
+    def by_epa(self) -> list[Surface]:
         """The surfaces by which AP-42 answers it: flat ground, or the four piles measured."""
-        every = AREAS.assign(part="all", ratio=OVER_FLAT * AREAS["us_over_ur"])
-        parts = [(str(name), faces, PILE / OVER_FLAT) for name, faces in every.groupby("pile")]
+        threshold = self.surfaces[0].threshold
         if self.is_flat:
-            parts = [("flat ground", every[:1].assign(ratio=1.0), FLAT)]
-        return [Surface(f"AP-42, {n}", "none", f, over, self.threshold) for n, f, over in parts]
+            faces = AREAS[:1].assign(part="all", ratio=1.0)
+            return [Surface("AP-42, flat ground", faces, FLAT, threshold)]
+        every = AREAS.assign(part="all", ratio=OVER_FLAT * AREAS["us_over_ur"])
+        found = []
+        for name, faces in every.groupby("pile"):
+            found.append(Surface(f"AP-42, {name}", faces, PILE / OVER_FLAT, threshold))
+        return found
+
+
+def without_obstacles(scene: Scene) -> Scene:
+    """The scene of a pile with nothing on it: piles of one such scene may be compared."""
+    bed = scene.bed.model_copy(update={"obstacles": ()})
+    parts = {name: getattr(scene, name) for name in Scene.model_fields}
+    return Scene.model_construct(**{**parts, "bed": bed})
+
+
+def names_of(scenes: Sequence[Scene]) -> list[str]:
+    """A name for each of some different piles, from what tells it from the others."""
+    table = pd.DataFrame([fields.asked(scene) for scene in scenes])
+    differing = [name for name in table if table[name].nunique(dropna=False) > 1]
+    columns = fields.others(differing, *IN_NAME)
+    found: list[str] = []
+    for scene, (_, row) in zip(scenes, table.iterrows(), strict=True):
+        bed = scene.bed
+        assert isinstance(bed, PileBed)
+        words = [str(bed.profile.name if bed.profile else bed.shape)]
+        if _rises(bed):
+            height = FlowModel(scene).line.h
+            words += [f"{height:g} m high", f"{bed.slope_deg:g}°"]
+        words.append(f"z₀ {1e3 * scene.solve_roughness:g} mm")
+        words += labels.told(row, columns)
+        name = ", ".join(words)
+        # fields that are in no table tell them apart
+        same = sum(other.partition(" (pile ")[0] == name for other in found)
+        found.append(f"{name} (pile {same + 1})" if same else name)
+    return found
 
 
 def solved(scene: Scene, threshold: float | None, cases: Path) -> Surface:
-    """The surface of a pile by its flow; the threshold by default that of the grain, level bed."""
-    bed, line, stress = scene.bed, FlowModel(scene).line, FlowModel(scene).stress(cases)
+    """The surface of a pile by its flow.
+
+    Parameters
+    ----------
+    scene
+        The scene of the pile.
+    threshold
+        u*_t, m/s; None for that of its grain on a level bed, by the closed form.
+    cases
+        The directory of the finished runs.
+
+    Returns
+    -------
+    The surface; its faces have the columns ``x_m`` and ``z_m`` as well.
+    """
+    bed = scene.bed
     assert isinstance(bed, PileBed)
-    x, z, rises = stress.x_m, stress.z_m, bool(bed.profile) or bed.form.rises
-    on = (x > line.x[1]) & (x < line.x[-2]) & ((z > GROUND * line.h) | (not rises))
+    line = FlowModel(scene).line
+    stress = FlowModel(scene).stress(cases)
+    x, z = stress.x_m, stress.z_m
+    is_on = (x > line.x[1]) & (x < line.x[-2])
+    if _rises(bed):
+        is_on &= z > GROUND * line.h
     for start, end in line.bare:
-        on &= (x < start) | (x > end)
-    slope = line.slopes_deg[np.clip(np.searchsorted(line.x, x) - 1, 0, len(line.x) - 2)]
+        is_on &= (x < start) | (x > end)
+    segment = np.searchsorted(line.x, x) - 1
+    slope = line.slopes_deg[np.clip(segment, 0, len(line.x) - 2)]
     part = np.select([slope > LEVEL_DEG, slope < -LEVEL_DEG], ["windward", "lee"], "top")
-    faces = pd.DataFrame({"x_m": x, "z_m": z, "part": part, "share": stress.length_m})
-    faces = faces.assign(ratio=np.abs(stress.ustar_over_ustar0_wall))[on]
-    z0, base, level = scene.solve_roughness, float(np.ptp(x[on])), single_grain(scene)
-    own = float(thresholds_of(scene.forces.law, [level._replace(slope_deg=0)])[0].friction_velocity)
-    over_wind, is_flat = float(log_law_ustar(1.0, WIND_HEIGHT, z0)), line.h < FLAT_BELOW * base
-    form = f"{bed.profile.name if bed.profile else bed.shape}, {line.h:g} m high"
-    name = f"{form}, {bed.slope_deg:g}°, z₀ {1e3 * z0:g} mm"
-    obstacles = ", ".join(map(str, bed.obstacles)) or "no obstacle"
-    return Surface(name, obstacles, faces, over_wind, threshold or own, is_flat or not rises)
+    columns = {
+        "x_m": x,
+        "z_m": z,
+        "part": part,
+        "share": stress.length_m,
+        "ratio": np.abs(stress.ustar_over_ustar0_wall),
+    }
+    faces = pd.DataFrame(columns)[is_on]
+    if threshold is None:
+        level = single_grain(scene)._replace(slope_deg=0)
+        (own,) = thresholds_of(scene.forces.law, [level])
+        threshold = float(own.friction_velocity)
+    over_wind = float(log_law_ustar(1.0, WIND_HEIGHT, scene.solve_roughness))
+    name = " and a ".join(map(str, bed.obstacles)) or "no obstacle"
+    return Surface(name, faces, over_wind, threshold)
+
+
+def _rises(bed: PileBed) -> bool:
+    """Whether a bed has a form on it, and is not flat ground."""
+    return bool(bed.profile) or bed.form.rises
+
+
+def grouped(scenes: Sequence[Scene], threshold: float | None, cases: Path) -> list[Pile]:
+    """The piles of some scenes whose flows are done, each without and with its obstacles."""
+    alike: dict[Scene, list[Scene]] = {}
+    for scene in scenes:
+        alike.setdefault(without_obstacles(scene), []).append(scene)
+    found = []
+    for (bare, members), name in zip(alike.items(), names_of([*alike]), strict=True):
+        bed = bare.bed
+        assert isinstance(bed, PileBed)
+        # a scene without obstacles is the first one, whatever the order of the file
+        first_bare = sorted(members, key=lambda scene: scene != bare)
+        surfaces = [solved(scene, threshold, cases) for scene in first_bare]
+        line = FlowModel(bare).line
+        base = _base(line.x, line.z, line.h)
+        is_flat = not _rises(bed) or line.h < FLAT_BELOW * base
+        found.append(Pile(name, surfaces, is_flat, bare in members))
+    return found
+
+
+def _base(x: Sequence[float], z: Sequence[float], height: float) -> float:
+    """Length of a bed line between where it first and last stands above the ground, m."""
+    places = np.linspace(x[1], x[-2], 10_001)
+    above = places[np.interp(places, x, z) > GROUND * height]
+    return float(np.ptp(above)) if len(above) else 0.0
 
 
 def experiment(study: Study, out: Path) -> Experiment:
-    """The erosion potential of the piles of a study, by the solved flow and by AP-42."""
+    """The erosion potential of the piles of a study, by the solved flow and by AP-42.
+
+    Raises
+    ------
+    InputError
+        If the threshold is neither a number that a wind can reach nor a material of AP-42,
+        if the study has no pile, or if the flow over one cannot be solved.
+    """
     winds, asked = study.erosion.fastest_mile, study.erosion.threshold
     where = study.file or study.name
     least = USTAR_T.get(asked, -1.0) if isinstance(asked, str) else asked
     if least is not None and not 0 < least <= 10:
         remedy = f"a value in m/s up to 10, or one of: {', '.join(USTAR_T)}"
         raise InputError(f"{asked!r} is not accepted", f"{where}: erosion.threshold", remedy)
-    source = f" (AP-42, {asked})" * isinstance(asked, str) or " (closed form)" * (asked is None)
+    source = ""
+    if isinstance(asked, str):
+        source = f" (AP-42, {asked})"
+    elif asked is None:
+        source = " (closed form)"
     flows = {scene: FlowModel(scene) for scene in piles(study)}
     for scene in flows:
         limits.check(scene, where, grains=False)
 
     def results(runs: Runs) -> Results:
-        done = (s for s, flow in flows.items() if all(run.name in runs.done for run in flow.cases))
-        surfaces = sorted((solved(scene, least, runs.cases) for scene in done), key=ALIKE)
-        if not surfaces:
+        done = []
+        for scene, flow in flows.items():
+            if all(run.name in runs.done for run in flow.cases):
+                done.append(scene)
+        if not done:
             return {}, ()
-        alike = [list(each) for _, each in groupby(surfaces, ALIKE)][: len(COLOURS)]
-        words, table = TEXTS["erosion"], rows(surfaces, winds)
-        figure = Figure("erosion", "Stress and loss", words["figure"], (), picture(alike, winds))
+        found = grouped(done, least, runs.cases)
+        words = TEXTS["erosion"]
+        table = rows(found, winds)
+        caption = words["figure"]
+        if len(found) > DRAWN:
+            caption += f" The first {DRAWN} of {len(found)} piles are drawn."
+        drawing = picture(found[:DRAWN], winds)
+        figure = Figure("erosion", "Stress and loss", caption, (), drawing)
+        told = "\n\n".join([*sentences(found, winds, source), words["sure"]])
         return {"erosion": table}, [
-            Section("", "\n\n".join([*sentences(alike, winds, source), words["sure"]]), [figure]),
+            Section("", told, [figure]),
             Section("Parts", words["rows"], (), [table], words["limits"].split("\n\n")),
             Section("The tables of AP-42", words["sources"], (), [AREAS, MATERIALS]),
         ]
 
     every = plan.listed(run for flow in flows.values() for run in flow.cases)
     planned = plan.Plan({}, {}, (), {}, every)
-    return Experiment("erosion", study.title, planned, results, study.time_limit_s)
+    limit_s = study.time_limit_s
+    return Experiment("erosion", study.title, planned, results, limit_s, source=study.source)
 
 
-def rows(surfaces: Sequence[Surface], winds: ArrayLike) -> pd.DataFrame:
-    """A row for each part of each surface: share, P, u*/u*_0, share nearest to each class."""
-    by_epa = {(each.pile, each.threshold): each for one in surfaces for each in one.by_epa()}
-    found = []
-    for one in (*surfaces, *by_epa.values()):
-        parts = {"all": one.faces, **dict(iter(one.faces.groupby("part", sort=False)))}
-        for part, faces in parts.items():
-            ratio, share = faces["ratio"].to_numpy(), 100 * faces["share"].to_numpy()
-            share = share / one.faces["share"].sum()
-            nearest = np.abs(ratio[:, None] - OVER_FLAT * CLASSES).argmin(axis=1)
-            lost = one._replace(faces=faces).potential(winds).sum()
-            numbers = (share.sum(), lost, np.average(ratio, weights=share), ratio[share > 0].max())
-            shares = np.bincount(nearest, share, len(CLASSES))
-            found.append((one.pile, one.obstacles, part, one.threshold, *numbers, *shares))
-    heads = ["pile", "obstacles", "part", "u*ₜ, m/s", "share, %", "P, g/m²", "u*/u*₀", "largest"]
-    near = [f"{us:g} ({OVER_FLAT * us:.2f}), %" for us in CLASSES]
-    return pd.DataFrame(found, columns=[*heads, *near])
+def rows(found: Sequence[Pile], winds: ArrayLike) -> pd.DataFrame:
+    """A row for each part of each surface of each pile, those of AP-42 after the solved ones.
+
+    It has the part's share of the surface, P, u*/u*_0, its largest value, and the share of
+    the whole surface that is nearest to each class of AP-42.
+    """
+    listed = []
+    for pile in found:
+        for surface in (*pile.surfaces, *pile.by_epa):
+            whole = surface.faces["share"].sum()
+            # the surfaces of AP-42 are whole
+            by_part = {"all": surface.faces}
+            for name, part_of in surface.faces.groupby("part", sort=False):
+                by_part[str(name)] = part_of
+            for part, faces in by_part.items():
+                row: Row = {"pile": pile.name, "surface": surface.name, "part": part}
+                row["u*ₜ, m/s"] = surface.threshold
+                ratio = faces["ratio"].to_numpy()
+                share = 100 * faces["share"].to_numpy() / whole
+                row["share, %"] = share.sum()
+                row["P, g/m²"] = surface._replace(faces=faces).total(winds)
+                row["u*/u*₀"] = np.average(ratio, weights=share)
+                row["largest"] = ratio[share > 0].max()
+                apart = np.abs(ratio[:, None] - OVER_FLAT * CLASSES)
+                shares = np.bincount(apart.argmin(axis=1), share, len(CLASSES))
+                for us, near in zip(CLASSES, shares, strict=True):
+                    row[f"{us:g} ({OVER_FLAT * us:.2f}), %"] = near
+                listed.append(row)
+    return pd.DataFrame(listed)
 
 
-def sentences(alike: Groups, winds: Sequence[float], source: str) -> Iterator[str]:
+def sentences(found: Sequence[Pile], winds: Sequence[float], source: str) -> Iterator[str]:
     """The answer in words: each pile by both, and what its obstacles take away."""
     speeds = ", ".join(map("{:g}".format, winds))
-    for first, *others in alike:
-        lost, *epa = (each.potential(winds).sum() for each in (first, *first.by_epa()))
+    for pile in found:
+        first, *others = pile.surfaces
+        lost = first.total(winds)
+        epa = [surface.total(winds) for surface in pile.by_epa]
         ends = " to ".join(dict.fromkeys(f"{end:.3g}" for end in (min(epa), max(epa))))
+        with_what = first.name if pile.has_bare else f"with {_named(first)}"
+        by_epa = "by AP-42, to which it is flat ground," if pile.is_flat else "by AP-42"
         told = (
             f"Wind of {speeds} m/s at 10 m can take {lost:.3g} g/m² from the surface of a pile "
-            f"({first.pile}; {first.obstacles}), by AP-42 {ends} g/m². Its threshold u*ₜ is "
+            f"({pile.name}; {with_what}), {by_epa} {ends} g/m². Its threshold u*ₜ is "
             f"{first.threshold:.3g} m/s{source}."
         )
-        for one in others:
-            change = f" ({one.potential(winds).sum() / lost - 1:+.0%})" if lost else ""
-            told += f" With a {one.obstacles}: {one.potential(winds).sum():.3g} g/m²{change}."
+        for other in others:
+            left = other.total(winds)
+            # obstacles are compared with none, not with one another
+            change = f" ({left / lost - 1:+.0%})" if lost and pile.has_bare else ""
+            told += f" With {_named(other)}: {left:.3g} g/m²{change}."
         yield told
 
 
-def picture(alike: Groups, winds: Sequence[float]) -> Canvas:
+def _named(surface: Surface) -> str:
+    """The obstacles of a surface with an article, such as "a fence of 2 m at -3 m"."""
+    return f"a {surface.name}"
+
+
+def picture(found: Sequence[Pile], winds: Sequence[float]) -> Canvas:
     """A row for each pile: u*/u*_0 over it, its share of the surface, P over the wind."""
-    canvas, axis = style.canvas(2.3 * len(alike) + 1.0), np.linspace(0, 1.4 * max(winds), 141)
-    grid = canvas.subplots(len(alike), 3, squeeze=False, width_ratios=[1.3, 1, 1])
-    for (left, middle, right), surfaces in zip(grid, alike, strict=True):
-        solves = [(one, one.obstacles, c, "-") for one, c in zip(surfaces, COLOURS, strict=False)]
-        by_epa = zip(surfaces[0].by_epa(), LINES, strict=False)
-        for one, label, colour, ls in (*solves, *((s, s.pile, GREY, ls) for s, ls in by_epa)):
-            faces = one.faces.sort_values("ratio", ascending=False)
-            above, first = (
-                100 * faces["share"].cumsum() / faces["share"].sum(),
-                faces["ratio"].max(),
-            )
-            middle.step([0, *above], [first, *faces["ratio"]], color=colour, ls=ls, label=label)
-            right.plot(axis, one.potential(axis), color=colour, ls=ls)
-            if colour != GREY:
-                left.plot(faces["x_m"], faces["ratio"], ".", ms=2.5, color=colour)
-        bed, (x, z) = left.twinx(), surfaces[0].faces[["x_m", "z_m"]].to_numpy().T
-        bed.fill_between(x, z, color=style.BED, lw=0)
-        bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
-        middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
-        left.set(zorder=1, frame_on=False, ylim=middle.get_ylim(), xlabel="x, m", ylabel=USTAR)
-        left.set_title(surfaces[0].pile, loc="left")
-        right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
-        right.set_title("P, g/m² of surface", loc="left")
-        right.vlines(winds, 0, right.get_ylim()[1], color="0.7", lw=0.8, zorder=0)
+    canvas = style.canvas(2.3 * len(found) + 1.0)
+    grid = canvas.subplots(len(found), 3, squeeze=False, width_ratios=[1.3, 1, 1])
+    for axes, pile in zip(grid, found, strict=True):
+        _draw(axes, pile, winds)
     style.legends(canvas, [], style.samples(grid[:, 1].tolist()))
     return canvas
+
+
+def _draw(axes: Sequence[Axes], pile: Pile, winds: Sequence[float]) -> None:
+    """Draw the row of one pile: three panels."""
+    left, middle, right = axes
+    axis = np.linspace(0, 1.4 * max(winds), 141)
+    for number, surface in enumerate(pile.surfaces):
+        colour = COLOURS[number % len(COLOURS)]
+        _draw_shares(middle, surface, colour, "-")
+        right.plot(axis, surface.potential(axis), color=colour)
+        left.plot(surface.faces["x_m"], surface.faces["ratio"], ".", ms=2.5, color=colour)
+    for surface, line_style in zip(pile.by_epa, LINES, strict=False):
+        _draw_shares(middle, surface, GREY, line_style)
+        right.plot(axis, surface.potential(axis), color=GREY, ls=line_style)
+    bed = left.twinx()
+    x, z = pile.surfaces[0].faces[["x_m", "z_m"]].to_numpy().T
+    bed.fill_between(x, z, color=style.BED, lw=0)
+    bed.set(ylim=(0, 4 * (z.max() or 1)), yticks=[])
+    middle.set(xlim=(0, 100), ylim=(0, None), xlabel="share of the surface above, %")
+    left.set(zorder=1, frame_on=False, ylim=middle.get_ylim(), xlabel="x, m", ylabel=USTAR)
+    left.set_title(pile.name, loc="left")
+    right.set(xlim=(0, axis[-1]), ylim=(0, None), xlabel="wind at 10 m, m/s")
+    right.set_title("P, g/m² of surface", loc="left")
+    right.vlines(winds, 0, right.get_ylim()[1], color="0.7", lw=0.8, zorder=0)
+
+
+def _draw_shares(ax: Axes, surface: Surface, colour: str, line_style: str) -> None:
+    """Draw u*/u*_0 over the share of the surface where it is larger."""
+    faces = surface.faces.sort_values("ratio", ascending=False)
+    above = 100 * faces["share"].cumsum() / faces["share"].sum()
+    first = faces["ratio"].max()
+    x = [0, *above]
+    y = [first, *faces["ratio"]]
+    ax.step(x, y, color=colour, ls=line_style, label=surface.name)

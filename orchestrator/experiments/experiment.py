@@ -15,9 +15,10 @@ from orchestrator.plan import Plan
 from orchestrator.report import page, style
 from orchestrator.report.page import Section
 from orchestrator.runs import case
-from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed
+from orchestrator.runs.workspace import EXPERIMENT, Workspace, claimed, read_marker
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
+from orchestrator.study.source import Source
 from orchestrator.study.study import TIME_LIMIT_S, Study
 from orchestrator.tables import csv
 
@@ -59,12 +60,14 @@ class Experiment:
     limit_s: float = TIME_LIMIT_S
     verdicts: Container[str] = ()
     failing: Container[str] | None = None
+    source: Source | None = None
+    """The study file that it is on; None for scenes of its own."""
 
     def run(self, out: Path, *, workers: int) -> Finished:
         """Run what is missing, write tables and page; an `OrchestratorError` if too little ran."""
         space, planned = Workspace(out.absolute()), self.planned
         with claimed(space.root, EXPERIMENT, self.name) as folder:
-            space.describe(EXPERIMENT, self.name, list(planned.cases))
+            self._describe(space)
             missing = planned.missing(space.cases, planned.done(space.cases)).items()
             ends = {name: case.failure(space.cases / name)[0] for name, _ in missing}
             todo = {name: run for name, run in missing if ends[name] not in self.verdicts}
@@ -84,6 +87,20 @@ class Experiment:
             failures = {name: error for name, error in failures.items() if name in self.failing}
         answer = "\n".join(p.text.replace("\n\n", "\n") for p in sections if not p.title)
         return Finished(space.page, len(todo), failures, answer)
+
+    def _describe(self, space: Workspace) -> None:
+        """Write into the directory what it is of; an InputError if it is of another file.
+
+        All experiments of a name have one directory by default, whatever file they are on.
+        """
+        source = self.source.described(space.root) if self.source else {}
+        before = read_marker(space.root, EXPERIMENT).get("source")
+        other = str(before.get("file", "")) if isinstance(before, dict) else ""
+        is_other = other not in ("", source.get("file", ""))
+        if is_other and (space.root / other).is_file():
+            what = f"the directory holds the {self.name} of another file, {other}"
+            raise InputError(what, str(space.root), "choose another with --out")
+        space.describe(EXPERIMENT, self.name, list(self.planned.cases), source=source)
 
 
 def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:

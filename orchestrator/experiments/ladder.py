@@ -83,7 +83,10 @@ def experiment(study: Study, out: Path) -> Experiment:
         known = known_errors(measured)
         return {"points": rows.fillna({"pareto": False}), "levels": known}, _sections(means, known)
 
-    return Experiment("ladder", "Speed against accuracy", planned, results, study.time_limit_s)
+    limit_s = study.time_limit_s
+    return Experiment(
+        "ladder", "Speed against accuracy", planned, results, limit_s, source=study.source
+    )
 
 
 def decisions(study: Study) -> dict[str, Decision]:

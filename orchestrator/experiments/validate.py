@@ -352,7 +352,8 @@ def experiment(study: Study, out: Path) -> Experiment:
         rows = compared(Strips(strips, runs.cases), over_hump(stress), lengths)
         return {"measured": rows, "scores": (scored := scores(rows))}, _sections(rows, scored)
 
-    return Experiment("validate", TITLE, planned, results, study.time_limit_s)
+    limit_s = study.time_limit_s
+    return Experiment("validate", TITLE, planned, results, limit_s, source=study.source)
 
 
 def _sections(rows: pd.DataFrame, scored: pd.DataFrame) -> list[Section]:
