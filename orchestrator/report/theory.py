@@ -28,22 +28,46 @@ Dash = Any
 """A line's style, as matplotlib has it."""
 _BROKEN = (0, (4, 1.5))
 LOOKS: tuple[tuple[str, Dash], ...] = (
-    *(("#5a5a5a", "--"), ("#5a5a5a", "-"), ("#c8102e", "-"), ("#c8102e", _BROKEN)),
-    *(("#009e73", "-"), ("#e69f00", "-"), ("#e69f00", _BROKEN)),
-    *(("#7b3294", "-"), ("#e377c2", "-"), ("#009e73", _BROKEN), ("#7b3294", _BROKEN)),
+    ("#5a5a5a", "--"),
+    ("#5a5a5a", "-"),
+    ("#c8102e", "-"),
+    ("#c8102e", _BROKEN),
+    ("#009e73", "-"),
+    ("#e69f00", "-"),
+    ("#e69f00", _BROKEN),
+    ("#7b3294", "-"),
+    ("#e377c2", "-"),
+    ("#009e73", _BROKEN),
+    ("#7b3294", _BROKEN),
 )
 """Colour and dash where colours mean laws, in the order of `LAWS`: variants share a colour."""
 DASHES: tuple[Dash, ...] = (
-    *("-", (0, (5, 1.2)), (0, (6, 1.2, 1, 1.2)), (0, (2.5, 1))),
-    *((0, (6, 1, 1, 1, 1, 1)), (0, (9, 1.5)), (0, (4, 1, 4, 1, 1, 1))),
+    "-",
+    (0, (5, 1.2)),
+    (0, (6, 1.2, 1, 1.2)),
+    (0, (2.5, 1)),
+    (0, (6, 1, 1, 1, 1, 1)),
+    (0, (9, 1.5)),
+    (0, (4, 1, 4, 1, 1, 1)),
 )
 """Dashes where colours mean something else. Dotted is where a law does not hold."""
-MANY = 3  # laws that dashes tell apart; more have colours of their own
-SWEEP_M = (5e-5, 1e-3)  # diameters (m) of the curves for air; a study with others widens the range
+MANY = 3
+"""Number of laws that dashes tell apart; more have colours of their own."""
+SWEEP_M = (5e-5, 1e-3)
+"""Diameters of the curves for air, m; a study with others widens the range."""
 POINTS = 240
+"""Diameters of a curve for air."""
 GRAIN = [
-    *("d_m", "z0_m", "rho_f_kg_m3", "nu_m2_s", "alpha_s"),
-    *("rho_sol_kg_m3", "alpha_deg", "beta_deg", "g_m_s2", "cohesion_n_m"),
+    "d_m",
+    "z0_m",
+    "rho_f_kg_m3",
+    "nu_m2_s",
+    "alpha_s",
+    "rho_sol_kg_m3",
+    "alpha_deg",
+    "beta_deg",
+    "g_m_s2",
+    "cohesion_n_m",
 ]
 """Columns of all that the closed form depends on, in the order of `SingleGrain`."""
 BED = ["alpha_deg", "beta_deg", "z0_over_d", "alpha_s"]
@@ -63,10 +87,15 @@ NINETIETHS = np.array([item.ninetieth for item in BINS])[_AT]
 DECADES = float(np.log10(BINS[-1].high / BINS[0].low))
 """Decades of Re* in which there are measurements."""
 HEAD = (
-    *("force law", "entrainment angle", "roughness"),
-    *("Re* where it is within the measured 10 to 90 %", f"decades, of {DECADES:.1f}"),
-    *("factor from the medians: median", "worst"),
+    "force law",
+    "entrainment angle",
+    "roughness",
+    "Re* where it is within the measured 10 to 90 %",
+    f"decades, of {DECADES:.1f}",
+    "factor from the medians: median",
+    "worst",
 )
+"""Head of the table that compares lines with measurements."""
 
 
 def look(name: str) -> tuple[str, Dash]:
@@ -77,14 +106,24 @@ def look(name: str) -> tuple[str, Dash]:
 def drawn(names: Iterable[str]) -> list[str]:
     """The laws that are drawn for some scenes: of the paper's pair both if either is used."""
     used = set(names)
-    return [name for name in LAWS if name in used or (name in PAIR and used & set(PAIR))]
+    if used & set(PAIR):
+        used |= set(PAIR)
+    return [name for name in LAWS if name in used]
 
 
 def dashes(names: Iterable[str]) -> dict[str, Dash]:
     """A dash for each of the laws that are drawn; the paper's pair has one."""
-    listed = drawn(names)
-    families = dict.fromkeys(PAIR if name in PAIR else (name,) for name in listed)
-    return {name: dash for family, dash in zip(families, DASHES, strict=False) for name in family}
+    found: dict[str, Dash] = {}
+    free = iter(DASHES)
+    for name in drawn(names):
+        if name in found:
+            continue
+        dash = next(free, None)
+        if dash is None:
+            break
+        family = PAIR if name in PAIR else (name,)
+        found.update(dict.fromkeys(family, dash))
+    return found
 
 
 class Bed(NamedTuple):
@@ -111,8 +150,9 @@ class Line:
     @property
     def words(self) -> tuple[str, str, str]:
         """Law and bed in words."""
-        beta, ratio = self.bed.entrainment_angle_deg, labels.ratio_of(self.bed.roughness_ratio, "d")
-        return labels.value("force_law", self.law), f"β = {beta:g}°", f"z₀ = {ratio}"
+        law = labels.value("force_law", self.law)
+        ratio = labels.ratio_of(self.bed.roughness_ratio, "d")
+        return law, f"β = {self.bed.entrainment_angle_deg:g}°", f"z₀ = {ratio}"
 
     @property
     def name(self) -> str:
@@ -134,7 +174,8 @@ class Line:
 
     def answers(self, reynolds: FloatArray) -> FloatArray:
         """Tau where the study has grains and the law holds, else NaN."""
-        return np.where(self.holds(reynolds) & self.near(reynolds), self.tau(reynolds), np.nan)
+        is_answered = self.holds(reynolds) & self.near(reynolds)
+        return np.where(is_answered, self.tau(reynolds), np.nan)
 
     @cached_property
     def met(self) -> BoolArray:
@@ -156,7 +197,8 @@ class Line:
     @property
     def median_factor(self) -> float:
         """Median of the factors; infinite if there are none."""
-        return float(pd.Series(self.factors).median()) if self.worst[1] else np.inf
+        _, at = self.worst
+        return float(np.nanmedian(self.factors)) if at else np.inf
 
     @property
     def worst(self) -> tuple[float, float]:
@@ -171,15 +213,19 @@ def lines(scenes: pd.DataFrame) -> list[Line]:
     listed = []
     for key, group in split(scenes[[*GRAIN, "z0_over_d", "force_law"]], *BED):
         for law in drawn(group["force_law"]):
-            listed.append(Line(law, Bed._make(key), *span(group[group["force_law"] == law])))
+            of_law = group[group["force_law"] == law]
+            first, last = span(of_law)
+            listed.append(Line(law, Bed._make(key), first, last))
     return listed
 
 
 def span(scenes: pd.DataFrame) -> tuple[float, float]:
     """Least and largest Re* of scenes at the thresholds of their single grains."""
-    laws = scenes["force_law"].unique()
-    every = [item for law in laws for item in thresholds(scenes[scenes["force_law"] == law], law)]
-    reynolds = np.array([item.reynolds for item in every], float)
+    found = []
+    for law in scenes["force_law"].unique():
+        of_law = scenes[scenes["force_law"] == law]
+        found += [threshold.reynolds for threshold in thresholds(of_law, law)]
+    reynolds = np.array(found, float)
     reynolds = reynolds[np.isfinite(reynolds) & (reynolds > 0)]
     return float(reynolds.min(initial=np.inf)), float(reynolds.max(initial=0.0))
 
@@ -205,13 +251,19 @@ def air_lines(scenes: pd.DataFrame, slope: float = 0.0) -> dict[str, tuple[Float
         return {}
     item = scenes.iloc[int(scenes["nu_m2_s"].argmin())]
     air = Air(item["rho_sol_kg_m3"], item["rho_f_kg_m3"], item["nu_m2_s"], item["g_m_s2"])
-    ends = min(SWEEP_M[0], scenes["d_m"].min()), max(SWEEP_M[1], scenes["d_m"].max())
-    d = np.geomspace(*ends, POINTS)
+    first = min(SWEEP_M[0], scenes["d_m"].min())
+    last = max(SWEEP_M[1], scenes["d_m"].max())
+    d = np.geomspace(first, last, POINTS)
     factor = curves.slope_factor_on_ustar(np.asarray(slope), item["phi_deg"])
-    each = {name: factor * _ustar(name, air, *ends) for name in curves.AIR}
-    listed = {name: air.shields_diagram(d, ustar) for name, ustar in each.items()}
-    x, y = listed["Bagnold 1941"]
-    return {**listed, "Bagnold 1941": (x[x >= BAGNOLD_FROM], y[x >= BAGNOLD_FROM])}
+    listed = {}
+    for name in curves.AIR:
+        ustar = factor * _ustar(name, air, first, last)
+        x, y = air.shields_diagram(d, ustar)
+        if name == "Bagnold 1941":
+            y = y[x >= BAGNOLD_FROM]
+            x = x[x >= BAGNOLD_FROM]
+        listed[name] = (x, y)
+    return listed
 
 
 @cache  # one of the curves is found by iteration, for each panel and slope of a figure anew
@@ -234,7 +286,10 @@ def ranked(results: Results) -> list[Line]:
 
 def best(listed: Sequence[Line]) -> list[Line]:
     """The first of each law."""
-    return [line for n, line in enumerate(listed) if line.law not in {x.law for x in listed[:n]}]
+    firsts: dict[str, Line] = {}
+    for line in listed:
+        firsts.setdefault(line.law, line)
+    return list(firsts.values())
 
 
 def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
@@ -244,11 +299,14 @@ def ranges(chosen: BoolArray) -> list[tuple[float, float]]:
 
 
 def _number(reynolds: float) -> str:
-    return f"{reynolds:.0f}" if reynolds >= 9.95 else f"{reynolds:.2g}"
+    if reynolds >= 9.95:
+        return f"{reynolds:.0f}"
+    return f"{reynolds:.2g}"
 
 
 def _ranges(chosen: BoolArray) -> str:
-    return ", ".join(" … ".join(map(_number, ends)) for ends in ranges(chosen))
+    written = [f"{_number(first)} … {_number(last)}" for first, last in ranges(chosen)]
+    return ", ".join(written)
 
 
 def section(results: Results) -> dict[str, Any] | None:
@@ -270,32 +328,73 @@ def sheet(listed: Iterable[Line]) -> pd.DataFrame:
     rows = []
     for line in listed:
         worst, at = line.worst
-        factors = (f"{line.median_factor:.2f}", f"{worst:.2f} at Re* = {_number(at)}")
-        where, decades = _ranges(line.met) or "nowhere", f"{line.decades:.1f}"
-        rows.append((*line.words, where, decades, *(factors if at else ("—", "—"))))
+        has_factors = at > 0
+        row = [*line.words]
+        row.append(_ranges(line.met) or "nowhere")
+        row.append(f"{line.decades:.1f}")
+        row.append(f"{line.median_factor:.2f}" if has_factors else "—")
+        row.append(f"{worst:.2f} at Re* = {_number(at)}" if has_factors else "—")
+        rows.append(row)
     return pd.DataFrame(rows, columns=list(HEAD))
 
 
 def nearest(results: Results) -> list[str]:
     """The law and bed nearest to measurements in water, what none meets, the nearest in air."""
-    listed, said = ranked(results), []
-    first, (_, at) = listed[0], listed[0].worst
-    if at and first.decades:
-        facts = {"count": len(listed), "decades": DECADES, "start": FACTORS_FROM}
-        said.append(caption("best_law", fit=first, at=_number(at), **facts))
-    unmet = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
-    unmet &= ~np.any([line.met for line in listed], axis=0)
-    if unmet.any():
-        said.append(caption("unmet", ranges=_ranges(unmet)))
-    outside, logs = {"left": np.nan, "right": np.nan}, np.log(MIDDLES)
-    air = air_lines(results.beds("grain")).values()
-    read = np.array([np.interp(logs, *np.log(line), **outside) for line in air])
-    covered = np.isfinite(read.reshape(-1, len(logs))).any(axis=0)
-    if covered.any() and len(listed) > 1:
-        mean, x = np.exp(np.nanmean(read[:, covered], axis=0)), MIDDLES[covered]
-        ratios = [line.answers(x) / mean for line in listed]
+    listed = ranked(results)
+    in_air = _nearest_in_air(results, listed)
+    return [*_nearest_in_water(listed), *_unmet(listed), *in_air]
+
+
+def _nearest_in_water(listed: Sequence[Line]) -> list[str]:
+    """The sentence on the line that is within the measured ranges over most decades of Re*."""
+    first = listed[0]
+    _, at = first.worst
+    if not (at and first.decades):
+        return []
+    sentence = caption(
+        "best_law",
+        fit=first,
+        at=_number(at),
+        count=len(listed),
+        decades=DECADES,
+        start=FACTORS_FROM,
+    )
+    return [sentence]
+
+
+def _unmet(listed: Sequence[Line]) -> list[str]:
+    """The sentence on the Re* at which lines answer, none within the measured range."""
+    is_answered = np.any([np.isfinite(line.answers(GRID)) for line in listed], axis=0)
+    is_met = np.any([line.met for line in listed], axis=0)
+    unmet = is_answered & ~is_met
+    return [caption("unmet", ranges=_ranges(unmet))] if unmet.any() else []
+
+
+def _nearest_in_air(results: Results, listed: Sequence[Line]) -> list[str]:
+    """The sentence on the line that is nearest to the mean of the curves for air."""
+    logs = np.log(MIDDLES)
+    read = []
+    for curve in air_lines(results.beds("grain")).values():
+        x, y = np.log(curve)
+        read.append(np.interp(logs, x, y, left=np.nan, right=np.nan))
+    if not read or len(listed) < 2:
+        return []
+    is_covered = np.isfinite(read).any(axis=0)
+    if not is_covered.any():
+        return []
+    mean = np.exp(np.nanmean(np.array(read)[:, is_covered], axis=0))
+    x = MIDDLES[is_covered]
+    off = []
+    for line in listed:
+        ratio = line.answers(x) / mean
+        factors = np.maximum(ratio, 1 / ratio)
         # infinite where a law does not hold: few of the curves' Re* judge no line
-        off = [np.median(np.nan_to_num(np.maximum(r, 1 / r), nan=np.inf)) for r in ratios]
-        at_ends, of = f"{_number(x[0])} … {_number(x[-1])}", listed[int(np.argmin(off))]
-        said.append(caption("best_in_air", fit=of, off=min(off), of_first=off[0], ends=at_ends))
-    return said
+        off.append(float(np.median(np.nan_to_num(factors, nan=np.inf))))
+    sentence = caption(
+        "best_in_air",
+        fit=listed[int(np.argmin(off))],
+        off=min(off),
+        of_first=off[0],
+        ends=f"{_number(x[0])} … {_number(x[-1])}",
+    )
+    return [sentence]
