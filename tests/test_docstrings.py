@@ -26,6 +26,7 @@ PHYSICS = (
 """Modules whose public functions have an example each."""
 DESCRIBED = (
     *PHYSICS,
+    "orchestrator.digits",
     "orchestrator.errors",
     "orchestrator.runs.files",
     "orchestrator.runs.process",

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from orchestrator import digits
 from orchestrator.errors import SolverError
 from orchestrator.study.parts import Grain, Gusts, Protocol, extremes
 from orchestrator.types import FloatArray, IntArray
@@ -108,11 +109,12 @@ def protocol(
 def flows(first: float, last: float, step: float) -> FloatArray:
     """The flow of the settling, then those of load steps, each higher by a relative `step`.
 
-    The last load step reaches at least the flow `last`.
+    The last load step reaches at least the flow `last`. All have the nine digits that the
+    deck reads.
     """
-    count = 1 + math.ceil(math.log(last / first) / math.log1p(step))
+    count = 1 + digits.whole_up(math.log(last / first) / math.log1p(step))
     rising = first * (1 + step) ** np.arange(count)
-    return np.concatenate([[SETTLE_FLOW * first], rising])
+    return digits.all_rounded([SETTLE_FLOW * first, *rising.tolist()])
 
 
 def cost_s(
@@ -197,8 +199,8 @@ def write(
         directory, grains.position, grains.kind, diameters, grains.density, bounds, present
     )
     write_parameters(directory, {**parameters, "width": grains.width, "ranks": ranks})
-    for name, values in {"load_steps": flows, "gusts": gusts}.items():
-        (directory / f"{name}.txt").write_text("".join(f"{each!r}\n" for each in values.tolist()))
+    write_numbers(directory / "load_steps.txt", flows)
+    write_numbers(directory / "gusts.txt", gusts)
     pushed = np.flatnonzero(grains.kind >= COUNTED)
     counted = np.flatnonzero(grains.kind == COUNTED)
     for place, axis in enumerate("xz"):
@@ -208,9 +210,14 @@ def write(
         _write_sets(directory / f"along.{axis}.txt", counted, direction)
 
 
+def write_numbers(path: Path, values: FloatArray) -> None:
+    """Write numbers, one a line."""
+    path.write_text("".join(f"{digits.text(each)}\n" for each in values.tolist()))
+
+
 def _write_sets(path: Path, grains: IntArray, sets: FloatArray) -> None:
     """Write sets of values of grains as LIGGGHTS reads them: a count, then ids and values."""
-    rows = "".join(f"{number} %r\n" for number in (grains + 1).tolist())
+    rows = "".join(f"{number} {digits.FORMAT}\n" for number in (grains + 1).tolist())
     with path.open("w") as stream:
         for values in sets.tolist():
             stream.write(f"{len(values)}\n{rows}" % tuple(values))
@@ -223,10 +230,9 @@ def write_parameters(
     lines = []
     for name, value in values.items():
         if isinstance(value, tuple):
-            text = f"index {' '.join(map(repr, value))}"
+            text = f"index {' '.join(map(digits.text, value))}"
         else:
-            # float() because LIGGGHTS cannot read the repr of a numpy number
-            text = f"equal {value if isinstance(value, int) else float(value)!r}"
+            text = f"equal {value if isinstance(value, int) else digits.text(value)}"
         lines.append(f"variable        {name} {text}  # {MEANING[name]}\n")
     (directory / "parameters.liggghts").write_text("".join(lines))
 
@@ -240,18 +246,20 @@ def write_grains(
     bounds: FloatArray,
     order: IntArray,
 ) -> None:
-    """Write ``grains.data``, SI, with all digits: a rounded bound of the box would lose grains.
+    """Write ``grains.data``, SI, with nine digits.
 
-    Positions have the shape (n, 3), `bounds` (2, 3); `order` has the numbers of those written.
+    Positions have the shape (n, 3), `bounds` (2, 3); `order` has the numbers of those
+    written. The bounds are so far from the grains that rounding loses none.
     """
+    row = "%d %d" + 5 * f" {digits.FORMAT}" + "\n"
     box = "".join(
-        f"{low!r} {high!r} {axis}lo {axis}hi\n"
+        f"{digits.text(low)} {digits.text(high)} {axis}lo {axis}hi\n"
         for axis, low, high in zip("xyz", *bounds.tolist(), strict=True)
     )
     columns = (values[order].tolist() for values in (kind, diameters, position))
     rows = "".join(
-        f"{place + 1} {number} {diameter!r} {density!r} {x!r} {y!r} {z!r}\n"
-        for place, number, diameter, (x, y, z) in zip(order.tolist(), *columns, strict=True)
+        row % (place + 1, number, diameter, density, *centre)
+        for place, number, diameter, centre in zip(order.tolist(), *columns, strict=True)
     )
     head = f"grains: id type diameter density x y z\n\n{len(order)} atoms\n4 atom types\n\n"
     (directory / "grains.data").write_text(f"{head}{box}\nAtoms\n\n{rows}")

@@ -11,6 +11,7 @@ from math import pi, radians, tan
 
 import numpy as np
 
+from orchestrator.digits import DIGITS
 from orchestrator.study.parts import Obstacle, PileBed, Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -85,7 +86,9 @@ class BedLine:
     @cached_property
     def slopes_deg(self) -> FloatArray:
         """Slope of each segment, positive where the bed rises downstream, shape (n - 1,)."""
-        return np.degrees(np.arctan2(self.tangents[:, 1], self.tangents[:, 0]))
+        slopes = np.degrees(np.arctan2(self.tangents[:, 1], self.tangents[:, 0]))
+        # a bed of 15 degrees has a bend of 15 degrees, and not of a last digit more
+        return np.asarray(np.round(slopes, DIGITS))
 
     @cached_property
     def bends_deg(self) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import whole_up
 from orchestrator.study.parts import Packing as Pattern
 from orchestrator.study.parts import Range, UnfitError
 from orchestrator.types import BoolArray, FloatArray, IntArray
@@ -24,8 +25,9 @@ APRON = 10.0  # length of the fixed flat bed beyond each toe, diameters
 STRAY = 0.1  # rows of a disordered bed are straight within this, diameters
 DISORDERED = 4
 """Least disordered rows: the packing is the same for any number of mobile layers up to it."""
-PERTURBATION = 1e-9
-"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes first."""
+PERTURBATION = 1e-6
+"""How far a replica's grains lie aside, diameters: it decides which grain of a chain goes first. A
+deck has nine digits of each place."""
 LEE_DEPTH = 1.5  # thickness of the fixed lee side, layers: no grain falls through it
 SHARP_DEG = 8.0  # bend from which on rows do not follow the bed round a corner
 SLIT = 0.15
@@ -56,7 +58,11 @@ class Places:
         """Places from x and z, shape (n, 2), and y."""
         x, z = centres.T
         y = np.broadcast_to(np.asarray(across, float), x.shape)
-        return cls(np.column_stack([x, np.mod(y, width) if width else y, z]), width)
+        if width:
+            y = np.mod(y, width)
+            # the remainder of a tiny negative number is rounded to the width itself
+            y = np.where(y < width, y, 0.0)
+        return cls(np.column_stack([x, y, z]), width)
 
     def pairs(self, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
         """First and second grain of each of k pairs within a reach, in both orders, (k,).
@@ -181,7 +187,7 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     """Pack a pile of two straight faces: rows of its windward face fill it to the lee one."""
     beta, surface = lattice.beta, 0.5 + lattice.gap
     row_height, faces = np.sin(beta), (line.top - 1, line.top)
-    most = int(np.ceil(line.crest[1] / line.tangents[faces[0], 0] / row_height)) + 1
+    most = whole_up(line.crest[1] / line.tangents[faces[0], 0] / row_height) + 1
     mobile_layers = min(lattice.mobile_layers, most)
     # under a slope's level rows a grain rests on one that lies deeper below the face
     layers = mobile_layers + (lattice.pattern == "horizontal")
@@ -220,8 +226,8 @@ def _filling(
     apex = line.crest + np.array([0, surface / face[0]])
     corners = np.array([np.zeros(2), line.toe, line.crest]) - apex
     along, down = corners @ direction / np.cos(beta) / 2, -corners @ normal / np.sin(beta)
-    rows = np.arange(0, np.ceil(down.max()) + 3)
-    columns = np.arange(np.floor(along.min()) - 3, np.ceil(along.max()) + 4)
+    rows = np.arange(0, whole_up(down.max()) + 3)
+    columns = np.arange(-whole_up(-along.min()) - 3, whole_up(along.max()) + 4)
     offset = (2 * columns + rows[:, None] % 2) * np.cos(beta)
     fall, near = np.broadcast_to(rows[:, None] * np.sin(beta), offset.shape), offset < -np.inf
     for face, most in thick.items():
@@ -232,7 +238,7 @@ def _filling(
     if not lattice.uneven:
         return np.asarray(points)
     uneven = max(lattice.mobile_layers, DISORDERED)
-    count = int(np.ceil(line.crest_s / np.cos(beta) / 2)) + uneven + 4
+    count = whole_up(line.crest_s / np.cos(beta) / 2) + uneven + 4
     upper = apex + _disordered(count, uneven, lattice) @ np.vstack([direction, normal])
     return np.vstack([upper, points[(apex - points) @ normal > (uneven + 0.5) * np.sin(beta)]])
 
@@ -363,14 +369,14 @@ def _on_a_curve(
 ) -> list[FloatArray]:
     """Rows over a curve, on which the lowest lies with random gaps, the uppermost first."""
     spacing = 2 * np.cos(lattice.beta)
-    count = int(np.ceil(curve.lengths.sum() / spacing)) + 1
+    count = whole_up(curve.lengths.sum() / spacing) + 1
     rng = np.random.default_rng(seed)
     gaps = rng.uniform(0, size, count) if size else np.zeros(count)
     aside = rng.uniform(-OFFSET * size, OFFSET * size, count + 1)
     close = np.concatenate([[0.0], np.cumsum(spacing + gaps)])
     # the opening belongs to places of the curve: grains that it shifts leave it where it is
     length = 2 * float(close[-1]) + 1
-    places = np.linspace(0, length, int(np.ceil(length / FINE)) + 1)
+    places = np.linspace(0, length, whole_up(length / FINE) + 1)
     step, opened = places[1] - places[0], np.zeros(len(places))
     arc = curve.arc_lengths - curve.arc_lengths[0]
     for _ in range(TURNS):
@@ -400,10 +406,13 @@ def _level_rows(top: BedLine, lattice: Lattice) -> FloatArray:
     layers = lattice.mobile_layers + 1
     thick = (layers + 1) * row_height / np.cos(np.radians(np.abs(top.slopes_deg).max()))
     highest = float(np.max(top.z))
-    x = np.arange(top.x[0], top.x[-1], 2 * half)
-    x += (top.crest[0] - x[0]) % (2 * half)
+    spacing = 2 * half
+    # where a whole number of spacings lies before the crest, its last digit decides nothing
+    before = -whole_up(-(top.crest[0] - top.x[0]) / spacing)
+    count = whole_up((top.x[-1] - top.x[0]) / spacing)
+    x = top.crest[0] + spacing * (np.arange(count) - before)
     parts = []
-    for row in range(int(np.ceil((highest - min(top.z)) / row_height)) + layers + 2):
+    for row in range(whole_up((highest - min(top.z)) / row_height) + layers + 2):
         places = np.column_stack([x + row % 2 * half, np.full_like(x, highest - row * row_height)])
         over = top.height(places[:, 0]) - places[:, 1]
         parts.append(places[(over > -1) & (over < thick)])
@@ -489,4 +498,4 @@ def within(x: FloatArray, counts: str | Range) -> BoolArray:
     """Which places along x a range contains; words contain all."""
     if isinstance(counts, str):
         return np.ones(len(x), bool)
-    return np.asarray((x >= counts[0]) & (x <= counts[1]))
+    return np.asarray((x >= counts[0] - TIE) & (x <= counts[1] + TIE))

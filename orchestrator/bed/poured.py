@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 
+from orchestrator import digits
 from orchestrator.bed import deck
 from orchestrator.bed.line import BedLine
 from orchestrator.bed.packing import APRON, Packing, Places, unshadowed, within
@@ -59,17 +60,19 @@ def drawn(
     3 dimensions a size has its part of the volume. In 2 it has that part of the area, as on the
     face of any bed and on every cut through it.
     """
-    part = (np.arange(count) + 0.5) / count
     if sizes is None:
         return np.ones(count)
+    part = (np.arange(count) + 0.5) / count
     if isinstance(sizes, LogNormal):
         each = sizes.quantile(part, power=dimensions)
     else:
         diameters, fractions = np.array(sizes).T
         number = fractions / diameters**dimensions
-        classes = np.searchsorted(np.cumsum(number) / number.sum(), part)
+        finer = np.cumsum(number) / number.sum()
+        # a part that is a class's end belongs to that class, whatever its last digit
+        classes = np.searchsorted(finer + digits.SLACK / count, part)
         each = diameters[np.minimum(classes, len(diameters) - 1)] / diameter
-    return np.random.default_rng(seed).permutation(each)
+    return np.random.default_rng(seed).permutation(digits.all_rounded(each))
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ class PouredBed(Case):
 
     kind: ClassVar[str] = "poured"
     template: ClassVar[str] = "liggghts/poured"
-    recipe: ClassVar[int] = 4
+    recipe: ClassVar[int] = 5
     results: ClassVar[tuple[str, ...]] = (SETTLING, DUMP)
     derived: ClassVar[tuple[str, ...]] = (BED,)
     made: ClassVar[tuple[str, ...]] = ("log.liggghts",)
@@ -136,7 +139,8 @@ class PouredBed(Case):
         sizes, (start, end) = self._drawn(1000, 0), self.ends
         mean = float(np.pi * np.mean(sizes**3 / 6 if self.width else sizes**2 / 4))
         part = FILLED_IN_SPACE * self.width if self.width else FILLED
-        return int(np.ceil((self.depth + self.surface + HEAP) * (end - start) * part / mean))
+        area = (self.depth + self.surface + HEAP) * (end - start)
+        return digits.whole_up(area * part / mean)
 
     def _drawn(self, count: int, seed: int) -> FloatArray:
         """Diameters of so many of its grains, d."""
@@ -154,14 +158,16 @@ class PouredBed(Case):
 
         Those of a strip lie in two layers, each over the gaps of the other: nothing falls through.
         """
-        x, z = self.line.corners.T
+        corners_x, corners_z = self.line.corners.T
         along = np.concatenate([[0.0], np.cumsum(self.line.lengths)])
-        first, last = np.interp(self.ends, x, along)
-        places = np.arange(first + 0.5, last, 1.0)
-        x, z = np.interp(places, along, x), np.interp(places, along, z) - self.depth
+        first, last = np.interp(self.ends, corners_x, along)
+        places = np.arange(first + 0.5, last - digits.SLACK, 1.0)
+        # where grains fall in their rows depends on whether the columns over them are free
+        x = digits.on_grid(np.interp(places, along, corners_x))
+        z = digits.on_grid(np.interp(places, along, corners_z) - self.depth)
         if not self.width:
             return np.column_stack([x, np.zeros_like(x), z])
-        rows = int(np.ceil(self.width))
+        rows = digits.whole_up(self.width)
         y = np.tile(np.arange(rows) * self.width / rows, len(x))
         upper = np.column_stack([np.repeat(x, rows), y, np.repeat(z, rows)])
         return np.vstack([upper, upper + np.array([0.5, self.width / rows / 2, -np.sqrt(0.5)])])
@@ -229,8 +235,9 @@ class PouredBed(Case):
         deck.write_parameters(directory, {**grain, **contact, **walls, **sharing, **stages})
         (x, z), (run, rise) = self.line.corners.T, self.line.tangents.T
         x, raised = x * DIAMETER, (z[:-1] + self.surface / run) * DIAMETER
-        for name, scaled in {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}.items():
-            (directory / f"cut.{name}.txt").write_text("".join(f"{v!r}\n" for v in scaled.tolist()))
+        cut = {"x0": x[:-1], "x1": x[1:], "z0": raised, "slope": rise / run}
+        for name, values in cut.items():
+            deck.write_numbers(directory / f"cut.{name}.txt", values)
         margin = float(sizes.max()) + 1
         bounds = np.array([centres.min(axis=0) - margin, centres.max(axis=0) + margin])
         if self.width:
@@ -262,7 +269,8 @@ class PouredBed(Case):
         number = rows["id"].to_numpy(np.int64) - 1
         bed = pd.DataFrame({f"{axis}_over_d": rows[axis] / DIAMETER for axis in "xyz"})
         fixed = (number < len(self.floor)).astype(int)
-        bed.assign(size=self.grains[1][number], fixed=fixed).to_csv(directory / BED, index=False)
+        bed = bed.assign(size=self.grains[1][number], fixed=fixed)
+        bed.to_csv(directory / BED, index=False, float_format=digits.FORMAT)
 
 
 def read(

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from orchestrator.digits import rounded, whole_up
 from orchestrator.physics.constants import KARMAN
 from orchestrator.study.closed_form import closed_form, outer_roughness
 from orchestrator.study.fields import PARTS
@@ -122,10 +123,12 @@ class Level:
             fields["flow.speed"] = float(f"{speed:.6g}")
             fields["flow.first_cell_height"] = scene.first_cell_height
         elif self.derived == "paper_stiffness":
-            fields["grain.stiffness"] = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
+            stiffness = 1e6 * scene.grain.diameter / scene.weight  # of 1e6 N/m
+            fields["grain.stiffness"] = rounded(stiffness)
         elif self.derived == "strip_width":
-            least = math.ceil(LEAST_WIDTH * extremes(scene.grain.sizes, scene.grain.diameter)[1])
-            fields["bed.width"] = max(STRIP_WIDTH, float(least)) if scene.is_poured else 0.0
+            largest = extremes(scene.grain.sizes, scene.grain.diameter)[1]
+            least = max(STRIP_WIDTH, float(whole_up(LEAST_WIDTH * largest)))
+            fields["bed.width"] = least if scene.is_poured else 0.0
         return fields
 
 

@@ -11,9 +11,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from orchestrator import digits
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.errors import Exploded, InputError, SolverError
-from orchestrator.flow.foam import SolvedFlow, start_from, write_poly_mesh
+from orchestrator.flow.foam import (
+    INTERPOLATED_DIGITS,
+    SolvedFlow,
+    start_from,
+    write_poly_mesh,
+)
 from orchestrator.flow.mesh import NEAR, Grid, along, extended, growth_far, made_by_gmsh
 from orchestrator.flow.stress import WallStress, diagnostics
 from orchestrator.physics.constants import KARMAN
@@ -74,7 +80,7 @@ class FlowCase(Case):
 
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
-    recipe: ClassVar[int] = 8
+    recipe: ClassVar[int] = 9
     results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
@@ -127,7 +133,11 @@ class FlowCase(Case):
         """The bed line, m, from the inlet to the outlet."""
         line, settings = self.line or triangle(self.slope_deg, self.height_m), self.settings
         ends = (settings.upstream * self.height_m, settings.downstream * self.height_m)
-        return extended(line, *ends)
+        whole = extended(line, *ends)
+        x, z = digits.on_grid(whole.corners, self.height_m).T.tolist()
+        bare = digits.on_grid(np.reshape(whole.bare, (-1, 2)), self.height_m).tolist()
+        ranges = tuple((start, end) for start, end in bare)
+        return replace(whole, x=tuple(x), z=tuple(z), bare=ranges)
 
     @cached_property
     def grid(self) -> Grid:
@@ -234,7 +244,7 @@ class FlowCase(Case):
             line, omega = self.bed_line, settings.turbulence_model == "kOmegaSST"
             for name in ("U", "p", "k", "nut", "omega" if omega else "epsilon"):
                 values = coarser.at(name, x, z - line.height(x)[:, None], line)
-                start_from(directory / "0" / name, values)
+                start_from(directory / "0" / name, values, INTERPOLATED_DIGITS)
         else:
             # a third of the iterations from a uniform flow
             ustar, over = self.ustar0_m_s, np.abs(z.ravel())
@@ -285,10 +295,11 @@ class FlowCase(Case):
 
 
 def set_values(path: Path, values: Mapping[str, object]) -> None:
-    """Replace the values in a template's list; its comments stay."""
+    """Replace the values in a template's list; its comments stay. Numbers get nine digits."""
     text = path.read_text(encoding="utf-8")
     for name, value in values.items():
-        text, count = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{value};", text)
+        new = digits.text(value) if isinstance(value, float) else value
+        text, count = re.subn(rf"(?m)^({name}[ =]+)[^;]+;", rf"\g<1>{new};", text)
         if count != 1:
             raise ValueError(f"{path.name} has {count} entries named {name}")
     path.write_text(text, encoding="utf-8")

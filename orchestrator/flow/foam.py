@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import DIGITS, FORMAT, on_grid
 from orchestrator.errors import SolverError
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
@@ -20,6 +21,10 @@ SIDES = np.array(
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 )
 """Corners of the sides of a hexahedron, seen from outside against the clock."""
+VECTOR = f"({FORMAT} {FORMAT} {FORMAT})"
+INTERPOLATED_DIGITS = 6
+"""Digits of a field that is interpolated from another flow: fewer than those which the
+fields of two processors share."""
 _HEAD = "FoamFile\n{{\n    version 2.0;\n    format ascii;\n    class {};\n    object {};\n}}\n\n"
 _END = "// ***"
 _WITHOUT_BRACKETS = str.maketrans("()", "  ")
@@ -82,7 +87,7 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     at = np.concatenate(chosen)
     (directory / "constant/polyMesh").mkdir(parents=True)
     for name, kind, text in (
-        ("points", "vectorField", listed(points, "(%.15g %.15g %.15g)")),
+        ("points", "vectorField", listed(points, VECTOR)),
         ("faces", "faceList", listed(faces[at], "4(%d %d %d %d)")),
         ("owner", "labelList", listed(owner[at], "%d")),
         ("neighbour", "labelList", listed(neighbour, "%d")),
@@ -93,12 +98,16 @@ def write_poly_mesh(mesh: Any, directory: Path, types: Mapping[str, str]) -> Flo
     return np.asarray(middles[columns])
 
 
-def start_from(path: Path, values: FloatArray) -> None:
-    """Let a field in ``0/`` start from a value or a vector of each cell."""
-    vector = values.ndim > 1 and values.shape[1] > 1
-    kind, item = ("vector", "(%.10g %.10g %.10g)") if vector else ("scalar", "%.10g")
+def start_from(path: Path, values: FloatArray, digits: int = DIGITS) -> None:
+    """Let a field in ``0/`` start from a value or a vector of each cell, with some digits."""
+    if values.ndim > 1 and values.shape[1] > 1:
+        # a component that is nothing but round-off has no digits of its own
+        values = on_grid(values, digits=digits)
+        field = f"nonuniform List<vector>\n{listed(values, VECTOR)};"
+    else:
+        field = f"nonuniform List<scalar>\n{listed(values, f'%.{digits}g')};"
     text = path.read_text(encoding="utf-8")
-    field = f"internalField nonuniform List<{kind}>\n{listed(values, item)};"
+    field = f"internalField {field}"
     path.write_text(re.sub(r"internalField [^;]+;", lambda _: field, text), encoding="utf-8")
 
 

@@ -6,13 +6,14 @@ cells are a geometric series. They are shortest at sharp tops, where the stress 
 
 import threading
 from dataclasses import dataclass, replace
-from math import ceil, expm1, inf, log, radians, tan
+from math import expm1, inf, log, radians, tan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import FORMAT, whole_up
 from orchestrator.errors import SolverError
 from orchestrator.types import FloatArray
 
@@ -65,7 +66,8 @@ class Grid:
     def write(self, path: Path) -> None:
         """Write the bed line and the cells along it as `pile.geo` includes them."""
         rows = zip(self.line.x, self.line.z, (*self.cells, 0), (*self.ratio, 1.0), strict=True)
-        lines = ",\n".join(f"  {x!r}, {z!r}, {cells}, {ratio!r}" for x, z, cells, ratio in rows)
+        form = f"  {FORMAT}, {FORMAT}, %d, {FORMAT}"
+        lines = ",\n".join(form % row for row in rows)
         path.write_text(f"{LINE_HEAD}bed_line() = {{\n{lines}\n}};\n", encoding="utf-8")
 
 
@@ -155,7 +157,7 @@ def _piece(length: float, start: float, end: float) -> tuple[int, float]:
         return 1, 1.0
     ratio = (length - first) / (length - last)
     count = length / first if ratio - 1 < 1e-9 else 1 + log(last / first) / log(ratio)
-    cells = max(ceil(count - 1e-6), 1)
+    cells = max(whole_up(count), 1)
     if cells < 3 or ratio - 1 < 1e-6 or first * cells >= length:
         return cells, 1.0
     ratio = ratio_of(cells, first, length)
@@ -164,7 +166,7 @@ def _piece(length: float, start: float, end: float) -> tuple[int, float]:
 
 def _away(length: float, first: float, growth: float) -> tuple[int, float]:
     """Cells that begin with `first` and grow until they fill a length."""
-    cells = ceil(log(1 + length * (growth - 1) / first) / log(growth))
+    cells = whole_up(log(1 + length * (growth - 1) / first) / log(growth))
     return cells, ratio_of(cells, first, length)
 
 

@@ -18,11 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from math import ceil, pi
+from math import pi
 
 import numpy as np
 
 from orchestrator.bed.line import BedLine
+from orchestrator.digits import whole_up
 from orchestrator.flow.stress import WallStress
 from orchestrator.types import FloatArray
 
@@ -91,7 +92,7 @@ class Seen:
 def seen_by_the_flow(line: BedLine) -> Seen:
     """A bed line with separation streamlines where the flow does not follow it."""
     cell, crest = line.h / CELLS, float(line.crest[0])
-    first, last = (ceil(abs(end - crest) / cell) for end in (line.x[0], line.x[-1]))
+    first, last = (whole_up(abs(end - crest) / cell) for end in (line.x[0], line.x[-1]))
     x = crest + cell * np.arange(-first, last + 1, dtype=np.float64)
     z, bubbles = line.height(x), []
     slopes = np.diff(line.z) / np.diff(line.x)
@@ -164,7 +165,7 @@ def response(slopes: FloatArray, cell: float, coefficients: Coefficients) -> Flo
 
 def _wall_stress(line: BedLine, integral: Callable[[FloatArray], FloatArray]) -> WallStress:
     """The stress on faces of h/100 from its integral along x."""
-    counts = (ceil(length / line.h * FACES) + 1 for length in np.diff(line.x))
+    counts = (whole_up(length / line.h * FACES) + 1 for length in np.diff(line.x))
     pieces = zip(pairwise(line.x), counts, strict=True)
     parts = [np.linspace(*ends, count)[:-1] for ends, count in pieces]
     edges = np.append(np.concatenate(parts), line.x[-1])

@@ -70,7 +70,7 @@ class SingleGrainCase(GrainCase):
 
     scenes: tuple[Scene, ...]
     kind: ClassVar[str] = "cells"
-    recipe: ClassVar[int] = 8
+    recipe: ClassVar[int] = 9
 
     @property
     def parameters(self) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator import digits
 from orchestrator.bed import packing, poured
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.bed.packing import APRON, Lattice, Packing, Places
@@ -38,8 +39,8 @@ MARGIN = 20.0
 LOOSE = 1e-4
 """Threshold over that of the scene's grain, below which a grain lies loose: at the limiting slope
 round-off leaves it 1e-8. Tables of forces begin there."""
-DIGITS = 9
-"""Digits of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
+DECIMALS = 7
+"""Decimals of the lengths, in d, that a poured bed depends on: beds of another scale share it."""
 
 _covered = cache(packing.cover)
 
@@ -182,12 +183,12 @@ class Geometry:
         line, grain = self.line, self.scene.grain
         # the bed does not depend on how far the flow's domain goes on before and behind it
         ends = (max(line.x[0], line.x[1] - APRON), min(line.x[-1], line.x[-2] + APRON))
-        x = tuple(round(v, DIGITS) for v in (ends[0], *line.x[1:-1], ends[1]))
-        z = tuple(round(v, DIGITS) for v in line.z)
+        x = tuple(round(v, DECIMALS) for v in (ends[0], *line.x[1:-1], ends[1]))
+        z = tuple(round(v, DECIMALS) for v in line.z)
         bed = PouredBed(
             line=replace(line, x=x, z=z),
             depth=self.bed.poured_depth,
-            surface=round(self.surface, DIGITS),
+            surface=round(self.surface, DECIMALS),
             sizes=grain.sizes,
             diameter=grain.diameter if isinstance(grain.sizes, tuple) else 1.0,
             friction_angle_deg=grain.friction_angle_deg,
@@ -369,7 +370,7 @@ class Geometry:
         how, d = self.scene.forces, self.scene.grain.diameter
         length = max(d, how.averaging_length * self.bed.relief)
         tau = stress.mean_over(s * d, length, how.stress)
-        return np.asarray(np.sign(tau) * np.sqrt(np.abs(tau)))
+        return digits.all_rounded(np.sign(tau) * np.sqrt(np.abs(tau)))
 
     def around(self, x: float) -> Self:
         """The same bed by pivots, with grains on a part of it alone, of `LONG` around x in m."""
@@ -479,7 +480,7 @@ class Loads:
             places, sizes = bed.packing.places, bed.packing.sizes
             loading = replace(self.loading, ratio=np.where(counted, self.loading.ratio, 0.0))
             flows = peeling.pivots(places, sizes, loading, self.tables, bed.scene.bond)
-            return np.asarray(flows[counted])
+            return digits.all_rounded(flows[counted])
         if bed.is_balanced:
             return self._undisturbed(self._by_tables())
         return self._undisturbed(on_slopes(bed.scene, self._slopes_deg))
@@ -495,7 +496,7 @@ class Loads:
         """The undisturbed friction velocity to local ones of the counted grains, m/s, (N,)."""
         ratio = np.abs(self.ratio[self.geometry.packing.windward])
         flows = np.full(len(ratio), np.inf)
-        return np.asarray(np.divide(local, ratio, out=flows, where=ratio > 0))
+        return digits.all_rounded(np.divide(local, ratio, out=flows, where=ratio > 0))
 
     def _by_tables(self) -> FloatArray:
         """Local mean u* (m/s) at which each counted grain of a lattice rolls on its slope.
@@ -530,7 +531,7 @@ class Loads:
         given = packed.places, packed.sizes, loading, self.tables
         criterion, bond = bed.scene.protocol.displacement_criterion, bed.scene.bond
         flows = peeling.flows(*given, criterion, self.present, bond, renew)
-        return np.asarray(flows[packed.windward])
+        return digits.all_rounded(flows[packed.windward])
 
     def lifting(self, rolling: FloatArray) -> FloatArray:
         """Undisturbed friction velocity at which lift takes each counted grain off, m/s, (N,).
@@ -540,16 +541,19 @@ class Loads:
         """
         bed, scene, counted = self.geometry, self.geometry.scene, self.geometry.packing.windward
         hold = 2 * scene.bond * np.sin(np.radians(scene.pocket_angle_deg)) + bed.tangents[:, 0]
-        hold *= scene.weight * bed.packing.sizes**3 / LIFT_OFF  # to climb straight up is to lift
+        hold *= scene.weight * bed.packing.sizes**3
         ratio = np.abs(self.ratio) * np.sqrt(scene.gust)
         last = np.full(len(ratio), RANGE[1] * float(closed_form(scene).friction_velocity))
         with np.errstate(divide="ignore", invalid="ignore"):
             last[counted] = np.minimum(rolling * ratio[counted], last[counted])
-            lifted = counted & (self.loading.lift(last) > hold)
+            # to climb straight up is to lift
+            lifted = counted & (self.loading.lift(last) > hold / LIFT_OFF)
             if not lifted.any():
                 return np.full_like(rolling, np.inf)
-            local = root(lambda ustar: self.loading.lift(ustar) - hold, RANGE[0] * last, last)
-            return np.where(lifted, local / ratio, np.inf)[counted]
+            bounds = RANGE[0] * last, LIFT_OFF * last
+            local = root(lambda ustar: self.loading.lift(ustar) - hold, *bounds)
+            flows = np.where(lifted, local / ratio, np.inf)[counted]
+        return np.where(np.isfinite(flows), np.minimum(digits.all_rounded(flows), rolling), np.inf)
 
     def row_hold(self) -> float:
         """The flow (u*_0) at which the first counted grain leaves by peeling over that of pivots.

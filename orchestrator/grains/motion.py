@@ -15,6 +15,7 @@ import pandas as pd
 
 from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_dump, read_table, read_texts
 from orchestrator.bed.packing import across
+from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -65,7 +66,8 @@ class Motion:
     def of_flows(cls, rolling: FloatArray, lifting: FloatArray | float = np.inf) -> "Motion":
         """The motion of grains that roll or are lifted at given flows, (N,); infinite for never."""
         flows = np.minimum(rolling, lifting)
-        moves, carried = np.isfinite(flows), flows < rolling
+        # to be lifted straight over a neighbour is to be lifted
+        moves, carried = np.isfinite(flows), np.isfinite(lifting) & (lifting <= rolling)
         levels = np.unique(flows[moves])
         # before the first level nothing moves
         flow = np.concatenate([levels[:1] * SETTLE_FLOW, levels]) if len(levels) else np.zeros(1)
@@ -145,7 +147,8 @@ class Motion:
             "carried_off": self.carried_off,
             "fallen_upstream": self.fallen_upstream,
         }
-        pd.DataFrame(load_steps).to_csv(directory / LOAD_STEPS, index=False)
+        table = pd.DataFrame(load_steps)
+        table.to_csv(directory / LOAD_STEPS, index=False, float_format=FORMAT)
         moved = {
             "id": grains.counted_ids,
             "moved_in": self.level,

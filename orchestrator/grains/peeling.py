@@ -14,13 +14,13 @@ the deck; rolling needs no friction.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from orchestrator import digits
 from orchestrator.bed.packing import TOUCH, Places
 from orchestrator.types import BoolArray, FloatArray, IntArray
 
@@ -77,7 +77,7 @@ class ForceTable:
 
     def __init__(self, log_ustar: FloatArray, forces: FloatArray, pieces: FloatArray) -> None:
         self._log_ustar, self._forces, self._pieces = log_ustar, forces, pieces
-        self.reaching = cache(self._reaching)  # a grain asks again when a neighbour has left
+        self._reached: dict[tuple[float, float, float], float] = {}
 
     @classmethod
     def of(
@@ -99,11 +99,18 @@ class ForceTable:
         given = zip(forces, np.ascontiguousarray(pieces), strict=True)
         return [cls(np.log(ustar), *values) for values in given]
 
-    def _reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
-        """The local friction velocity at which drag and lift times their arms reach a goal, m/s.
+    def reaching(self, drag_arm: float, lift_arm: float, goal: float) -> float:
+        """The local friction velocity at which drag and lift times their arms reach a goal.
 
-        0 where they always do, infinite where they never do.
+        In m/s; 0 where they always do, infinite where they never do.
         """
+        asked = drag_arm, lift_arm, goal
+        # a grain asks again when a neighbour has left
+        if asked not in self._reached:
+            self._reached[asked] = self._solved(*asked)
+        return self._reached[asked]
+
+    def _solved(self, drag_arm: float, lift_arm: float, goal: float) -> float:
         moment = drag_arm * self._forces[0] + lift_arm * self._forces[1]
         above = int((moment >= goal).argmax())
         if moment[above] < goal:
@@ -241,20 +248,26 @@ def flows(
     present = np.ones(len(sizes), bool) if present is None else present.copy()
     rollers, known = dict(_rollers(places, sizes, loading, present, bond)), dict(tables)
     left, next_flow = np.full(len(sizes), np.inf), np.full(len(sizes), np.inf)
+    # of two grains that go at one flow no last digit says which is first
+    turn = np.full(len(sizes), np.inf)
     ways: dict[int, list[int]] = {}
 
     def sample(i: int) -> None:
         numbers = [k for k in rollers[i].others if present[k]]
         next_flow[i], ways[i] = rollers[i].way(numbers, known[i], criterion)
+        turn[i] = digits.rounded(next_flow[i])
 
     for i in rollers.keys() & known:
         sample(i)
     reached = 0.0
     asked = np.array(list(tables), int)
-    while present[asked].any() and math.isfinite(lowest := next_flow[i := int(next_flow.argmin())]):
+    while present[asked].any():
+        i = int(turn.argmin())
+        if math.isinf(turn[i]):
+            break
         # a grain that is freed late leaves at once
-        reached = max(reached, lowest)
-        left[i], next_flow[i], present[i] = reached, np.inf, False
+        reached = max(reached, next_flow[i])
+        left[i], turn[i], present[i] = reached, np.inf, False
         # only neighbours whose rolling path crossed grain i are affected by its departure, and
         # those that now bear another force
         affected = {k for k in rollers[i].others if i in ways.get(k, ())}

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 
+from orchestrator import digits
 from orchestrator.bed import deck
 from orchestrator.bed.deck import GrainTable
 from orchestrator.bed.line import BedLine
@@ -53,7 +54,9 @@ NEAREST = 0.25
 coincide make cells that are far too short."""
 LEVEL = 1e-6  # a bed that is less above the flat bed lies on it, d
 FAR = 1e9
-STRONGER = 2.0  # stress over the mean at which forces are compared where no gust exceeds the mean
+HARDLY, STRONGER = 1.1, 2.0
+"""Of gusts whose largest stress is less than the first over the mean, the forces are compared at
+the second: those of two equal stresses say of no power, 0/0."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,7 @@ class Worn:
         table = pd.DataFrame(self.places, columns=["x_d", "z_d"])
         table = table.assign(moved_at_m_s=self.left, ustar_over_ustar0=self.speed)
         table.index = pd.RangeIndex(1, len(table) + 1, name="id")
-        table.to_csv(directory / GRAINS)
+        table.to_csv(directory / GRAINS, float_format=digits.FORMAT)
 
     @classmethod
     def from_csv(cls, directory: Path) -> "Worn":
@@ -223,7 +226,7 @@ def peeled(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
 def sunk(geometry: Geometry, worn: Worn) -> BedLine:
     """The bed line over worn grains, d: as much lower as their upper sides are, averaged."""
     line, packed, present = geometry.line, geometry.packing, worn.present
-    x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE, SPACING)
+    x = np.arange(line.x[1] - EDGE, line.x[-2] + EDGE - digits.SLACK, SPACING)
     before = _tops(packed.centres, packed.sizes / 2, x)
     depth = before - _tops(worn.places[present], packed.sizes[present] / 2, x)
     window = np.ones(round(EDGE / SPACING)) * SPACING / EDGE
@@ -232,7 +235,7 @@ def sunk(geometry: Geometry, worn: Worn) -> BedLine:
     step = round(EDGE / 2 / SPACING)
     changes = np.convolve(np.abs(np.gradient(depth)) > 1e-3, np.ones(2 * step + 1), mode="same") > 0
     places = x[changes & (np.arange(len(x)) % step == 0)]
-    apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST
+    apart = np.abs(places[:, None] - line.x).min(axis=1) > NEAREST + digits.SLACK
     finer = line.with_corners(places[apart & (places > line.x[0]) & (places < line.x[-1])].tolist())
     whole, ground = np.array(finer.z), min(line.z[0], line.z[-1])
     z = whole - np.interp(finer.x, x, depth, left=0.0, right=0.0)
@@ -249,7 +252,8 @@ def _tops(centres: FloatArray, radii: FloatArray, x: FloatArray) -> FloatArray:
     tops = np.full(len(x), -FAR)
     for (xc, zc), radius in zip(centres.tolist(), radii.tolist(), strict=True):
         # as wide as half the way to the next: the gaps of a row do not count
-        first, last = np.searchsorted(x, [xc - 2 * radius, xc + 2 * radius])
+        ends = np.array([xc - 2 * radius, xc + 2 * radius])
+        first, last = np.searchsorted(x, ends - digits.SLACK)
         tops[first:last] = np.maximum(tops[first:last], zc + radius)
     return tops
 
@@ -426,15 +430,13 @@ def in_time(gusts: Gusts, loads: Loads, rising: FloatArray) -> FloatArray:
 
     `rising` are the flows (u*_0, m/s) of the load steps; the forces of `loads` are those under the
     largest stress. The force is a power of the stress, which is found between the mean and the
-    largest stress. Where no event exceeds the mean, it is found above the mean.
+    largest stress, or one that is `STRONGER` where the largest is hardly above the mean.
     """
     peak = loads.geometry.scene.gust
-    force, mean = _size(loads, rising), _size(loads, rising / np.sqrt(peak))
-    if peak > 1:
-        power = np.log(force / mean) / np.log(peak)
-    else:
-        stronger = _size(loads, rising * np.sqrt(STRONGER))
-        power = np.log(stronger / mean) / np.log(STRONGER)
+    mean = rising / np.sqrt(peak)
+    span = peak if peak > HARDLY else STRONGER
+    ratio = _size(loads, mean * np.sqrt(span)) / _size(loads, mean)
+    power = np.log(ratio) / np.log(span)
     stress = gust_stresses(gusts.intensity, gusts.events, len(rising), loads.geometry.bed.seed)
     with_mean = np.pad(stress, ((0, 0), (0, 1)), constant_values=1.0)
     each = (with_mean / peak) ** power[:, None]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from orchestrator.bed.packing import Packing
+from orchestrator.digits import SLACK
 from orchestrator.physics.threshold import root
 from orchestrator.types import FloatArray, IntArray
 
@@ -44,8 +45,10 @@ def patches(packing: Packing, length: float) -> tuple[IntArray, FloatArray]:
     edges, starts = np.concatenate([[first], middle, [last]]), [0]
     for i in range(1, len(s)):
         begun = starts[-1]
-        enough = i - begun >= GRAINS and edges[i] - edges[begun] >= length
-        if enough and len(s) - i >= GRAINS and edges[-1] - edges[i] >= length:
+        many = i - begun >= GRAINS and len(s) - i >= GRAINS
+        # in a lattice a patch may be just that long
+        behind, before = edges[i] - edges[begun], edges[-1] - edges[i]
+        if many and min(behind, before) >= length - SLACK:
             starts.append(i)
     patch = np.searchsorted(edges[starts[1:]], packing.arc_length, side="right")
     return patch, np.diff(edges[[*starts, len(s)]]) * (packing.width or 1.0)

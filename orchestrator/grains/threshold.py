@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.digits import DIGITS
 from orchestrator.grains.motion import Motion
 from orchestrator.types import BoolArray, FloatArray
 
@@ -141,7 +142,8 @@ class SizeClass(NamedTuple):
 
 def classes(sizes: FloatArray) -> Iterator[SizeClass]:
     """The classes that some counted grains are in, rising; sizes in d, shape (N,)."""
-    number = np.rint(np.log(sizes) / np.log(STEP)).astype(int)
+    # a size on the border of two classes is in one of them, whatever its last digit
+    number = np.rint(np.round(np.log(sizes) / np.log(STEP), DIGITS)).astype(int)
     for index in np.unique(number).tolist():
         chosen = number == index
         yield SizeClass(index, float(np.exp(np.log(sizes[chosen]).mean())), chosen)

@@ -26,10 +26,11 @@ RUNGS = np.geomspace(1e-9, 1e9, 37)
 A sum that is above its target for less than half a decade is missed; the sum of a pivot
 rises throughout.
 """
-LIFT_OFF = 1 + 1e-9
+LIFT_OFF = 1 + 1e-6
 """Lift over the weight normal to the bed from which a grain leaves without rolling.
 
-On a level bed without drag the pivot itself is at 1.
+On a level bed without drag the pivot itself is at 1, but for the ninth digit of its
+friction velocity.
 """
 MOST_STEPS = 100
 """Steps after which `root` ends at the latest."""

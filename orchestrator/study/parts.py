@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, InstanceOf, PlainSerializer, model_validator
 from pydantic.fields import FieldInfo
 
+from orchestrator.digits import rounded
 from orchestrator.physics.constants import GRAVITY, LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS
 from orchestrator.study.profile import Profile
@@ -431,7 +432,7 @@ class PileBed(Bed):
     layer in the plane of the flow"""
     seed: int = field(0, scope="random beds and replicas", about="replica", ge=0, le=10**9)
     """which of the many random packings; of a lattice 0 is itself, any other a replica with grains
-    up to 1e-9 d aside"""
+    up to 1e-6 d aside"""
     mobile_layers: int = _answer(2, ge=1, le=1000)
     """layers that may move, of a poured bed by default 4; those below are fixed"""
 
@@ -500,11 +501,11 @@ def percentile(sizes: Sizes | None, diameter: float, part: float) -> float:
     if sizes is None:
         return diameter
     if isinstance(sizes, LogNormal):
-        return diameter * float(sizes.quantile(part, power=0))
+        return rounded(diameter * float(sizes.quantile(part, power=0)))
     diameters, fractions = np.array(sizes).T
     finer = np.cumsum(fractions) - fractions / 2
     # the exponential of a logarithm is not the number itself to the last digit
-    return float(f"{np.exp(np.interp(part, finer, np.log(diameters))):.12g}")
+    return rounded(np.exp(np.interp(part, finer, np.log(diameters))))
 
 
 def extremes(sizes: Sizes | None, diameter: float) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
 from orchestrator.study.shapes import SHAPES
@@ -240,7 +241,8 @@ def read_profile(text: str, name: str, where: str, smoothing: float) -> Profile:
     if abs(slopes[steep]) > STEEPEST_DEG:
         what = f"{slopes[steep]:.0f} deg at x = {x[steep]:g} m, above {STEEPEST_DEG:g}"
         refuse(what, f"{more}; check that x and z are both in m", steep + 1)
-    xs, zs = (tuple((values - values[0]).tolist()) for values in (x, z))
+    # to nine digits of the length: means are known no better, and the name of a bed is its corners
+    xs, zs = (tuple(on_grid(values - values[0], np.ptp(x)).tolist()) for values in (x, z))
     corners = "\n".join(f"{a!r},{b!r}" for a, b in zip(xs, zs, strict=True))
     return Profile(name, xs, zs, text, digest_text(corners))
 

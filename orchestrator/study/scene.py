@@ -10,6 +10,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from orchestrator.digits import rounded
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
@@ -260,7 +261,8 @@ def default_first_cell_height(height: float, roughness: float, viscous: float = 
     viscosity is below the molecular one, `viscous` = nu/(kappa u*_0), the flow is not turbulent.
     h/4 is the end.
     """
-    return min(max(height / 40, CELLS_OVER_Z0 * roughness, VISCOUS_CELLS * viscous), height / 4)
+    least = max(height / 40, CELLS_OVER_Z0 * roughness, VISCOUS_CELLS * viscous)
+    return rounded(min(least, height / 4))
 
 
 def roughness_length(text: str, diameter: float, mixture: parts.Sizes | None = None) -> float:

@@ -1,7 +1,7 @@
 """The tables of a study: what was asked, what was measured, with units in the columns' names.
 
-Tables of results hold no time and no path of a machine: the same study gives the same bytes
-wherever and whenever it runs. The times of the runs are in `timings`.
+Tables of results hold no time and no path of a machine, and numbers of nine digits: the same study
+gives the same bytes wherever and whenever it runs. The times of the runs are in `timings`.
 """
 
 import re
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from orchestrator import digits
 from orchestrator.errors import OrchestratorError
 from orchestrator.plan import Plan
 from orchestrator.runs.files import Folder
@@ -93,22 +94,45 @@ def timings(plan: Plan, states: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame
     return pd.DataFrame(rows, columns=["case", "kind", "solver_s", "cpu_s", "outside_s"])
 
 
-def csv(table: pd.DataFrame, digits: str = "") -> str:
-    """A table as CSV, its numbers in a format such as ``%.9g``; `FORMULA` gets an apostrophe."""
+def csv(table: pd.DataFrame, form: str = "") -> str:
+    """A table as CSV, in which no text is one of `FORMULA`.
+
+    Parameters
+    ----------
+    table
+        Its columns have numbers, texts or None.
+    form
+        Format of its numbers that are not whole, such as ``%.6g``; by default they have
+        nine digits, as few as tell them from their neighbours, and a point.
+
+    Returns
+    -------
+    str
+        A line for the names of the columns, and one for each row; nothing stands where a
+        number is NaN or a value is None.
+    """
     # pandas takes twice as long: it writes equal numbers anew
-    columns = [[_harmless(str(name)), *_written(table[name], digits)] for name in table]
-    writer(text := StringIO(), lineterminator="\n").writerows(zip(*columns, strict=True))
+    columns = [[_harmless(str(name)), *_written(table[name], form)] for name in table]
+    text = StringIO()
+    writer(text, lineterminator="\n").writerows(zip(*columns, strict=True))
     return text.getvalue()
 
 
-def _written(column: "pd.Series[Any]", digits: str) -> Iterable[str]:
+def _written(column: "pd.Series[Any]", form: str) -> Iterable[str]:
     values = column.to_numpy()
     if values.dtype.kind not in "biuf":
-        return ["" if v is None or v != v else _harmless(str(v)) for v in column.tolist()]
+        return [_text(value, form) for value in column.tolist()]
     codes, bits = pd.factorize(values.view(f"i{values.itemsize}"))
-    form = digits.__mod__ if digits and values.dtype.kind == "f" else str
-    each = ["" if v != v else form(v) for v in bits.view(values.dtype).tolist()]
+    each = [_text(value, form) for value in bits.view(values.dtype).tolist()]
     return np.array(each, object)[codes]
+
+
+def _text(value: Any, form: str) -> str:
+    if value is None or value != value:
+        return ""
+    if not isinstance(value, float):
+        return _harmless(str(value))
+    return form % value if form else digits.text(value)
 
 
 @cache

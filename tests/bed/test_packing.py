@@ -159,3 +159,23 @@ def test_a_grain_across_the_sides_covers_and_touches(
     assert _unshadowed(x, z, np.full(2, 0.5), y, width).tolist() == free
     places = Places.of(np.column_stack([x, z]), y, width)
     assert len(places.contacts(np.ones(2))[0]) == contacts
+
+
+@pytest.mark.parametrize("y", [-1e-17, -5e-324, 0.0, 6.0, -6.0, 6.0 - 1e-15, 12.0])
+def test_a_grain_on_the_seam_of_a_strip_touches_those_beside_it(y: float) -> None:
+    centres = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.0]])
+    aside = float(np.sqrt(0.75))
+    places = Places.of(centres, np.array([y, aside, -aside]), 6.0)
+    assert (places.xyz[:, 1] < 6.0).all()
+    first, second, _ = places.contacts(np.ones(3))
+    assert second[first == 0].tolist() == [1, 2]
+
+
+def test_no_last_digit_decides_which_grains_a_range_counts() -> None:
+    shape = bed(shape="flat", slope_deg=0.0, height=0.02, length=0.04)
+    line = of_bed(shape).scaled(1 / D)
+    whole = cover(line, line, "all", _lattice())
+    x = whole.centres[whole.windward, 0]
+    start, end = float(x[5]), float(x[20])
+    for ends in ((np.nextafter(start, 99), np.nextafter(end, 0)), (start, end)):
+        assert cover(line, line, ends, _lattice()).count == 16

@@ -60,8 +60,9 @@ def test_a_mesh_for_each_shape(name: str, tmp_path: Path) -> None:
     corners, heights = first_cells(case.prepare(flow, tmp_path))
     line, corners = flow.bed_line, corners[2:]
     # the corners of the bed line are among the grid lines, and all others lie on it
-    np.testing.assert_allclose(corners[:, 1], line.height(corners[:, 0]), atol=2e-9)
-    assert all(np.abs(corners[:, 0] - x).min() < 2e-9 for x in line.x)
+    # as far as nine digits go
+    np.testing.assert_allclose(corners[:, 1], line.height(corners[:, 0]), atol=5e-9)
+    assert all(np.abs(corners[:, 0] - x).min() < 1e-8 for x in line.x)
     # but for bed at a sharp bend, neighbours differ by less than a factor
     steps = np.diff(corners[:, 0])
     assert (steps[1:] / steps[:-1]).max() < 3

@@ -1,8 +1,10 @@
 """Peeling and pivots: exact in the plane and in space, blocked by a neighbour in the way."""
 
+import gc
 import math
 import shutil
 import subprocess
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,18 @@ def _flows(
     loading = Loading(*_law(lift), ratio, *_along(slope_deg, len(centres)))
     tables = {i: table for i, table in _tables(len(centres), lift).items() if ratio[i]}
     return peeling.flows(Places.of(centres), np.ones(len(centres)), loading, tables, 0.3)
+
+
+def test_a_table_of_forces_is_freed_with_its_last_user() -> None:
+    table = _tables(1)[0]
+    assert table.reaching(0.5, 0.0, 1.0) == table.reaching(0.5, 0.0, 1.0)
+    freed = weakref.ref(table)
+    gc.disable()
+    try:
+        del table
+        assert freed() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0])

@@ -128,7 +128,7 @@ def test_along_a_plane_the_closed_form_is_that_of_a_grain_on_it(
     text = text.replace("cells_per_face = 20", 'model = "flat"')
     (scene,) = study.parse(text, name="plane", where="test").scenes
     exact = closed_form(scene).friction_velocity
-    np.testing.assert_allclose(Pile(scene).loads(tmp_path).alone(), exact, rtol=1e-9)
+    np.testing.assert_allclose(Pile(scene).loads(tmp_path).alone(), exact, rtol=5e-9)
 
 
 STUDY = """
@@ -217,7 +217,7 @@ def test_the_deck_has_the_grains_as_they_lie(request: pytest.FixtureRequest, nam
     rows = [row.split() for row in text.partition("Atoms\n\n")[2].splitlines()]
     _, _, diameter, _, _, y, _ = np.array(rows, float).T
     force, exposed = pile.loads(results.cases).loading.at(0.02), pile.packing.windward
-    np.testing.assert_allclose(diameter, pile.packing.sizes * 1e-3, rtol=1e-14)
+    np.testing.assert_allclose(diameter, pile.packing.sizes * 1e-3, rtol=5e-9)
     if name == "mixed":  # each is driven by its own size
         sizes = pile.packing.sizes[exposed]
         assert pile.packing.sizes.max() / pile.packing.sizes.min() > 1.5

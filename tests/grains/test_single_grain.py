@@ -98,8 +98,13 @@ STOPPED = """pid=$$
 @pytest.mark.parametrize(
     ("script", "limit_s", "word"),
     [
-        # LIGGGHTS itself ends with 0: a spring too stiff for the step throws all grains out
-        ("sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts", 120, "lost"),
+        # LIGGGHTS itself ends with 0: a spring too stiff for the step throws the grains apart, and
+        # out; whether some of them are left is chance
+        (
+            "sed -i 's/time_step equal 0.2/time_step equal 3.0/' parameters.liggghts",
+            120,
+            "lost|burst",
+        ),
         ("echo 'fix nothing' >>parameters.liggghts", 120, "ERROR"),
         (STOPPED, 120, "before its protocol did"),
         ("kill -STOP $$", 1, "within 1 s"),

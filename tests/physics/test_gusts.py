@@ -53,7 +53,10 @@ def test_no_gusts_strengthen_a_bed(intensity: float, events: int) -> None:
     assert float(gusty.shields) <= float(closed_form(steady).shields)
 
 
-@pytest.mark.parametrize(("intensity", "events"), [(1e-17, 2), (0.4, 2), (1.0, 3), (0.4, 100)])
+# the largest stress of the second is above the mean by its last digits alone
+@pytest.mark.parametrize(
+    ("intensity", "events"), [(1e-17, 2), (1e-15, 100), (0.4, 2), (1.0, 3), (0.4, 100)]
+)
 def test_the_force_of_each_event_is_that_of_its_stress(intensity: float, events: int) -> None:
     scene = _scene(PILE, intensity, events)
     loads = Geometry(scene).loads(Path())

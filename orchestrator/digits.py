@@ -1,0 +1,144 @@
+"""Numbers with as many digits as mean something, so that all processors have the same.
+
+The vector units of two processors, and two C libraries, differ in the last digit of a
+sine, an exponential or a sum. A bed of grains is chaotic: with another last digit it is
+another bed. So what a solver is given, what the name of a case is made of, and what
+decides between two branches is rounded to nine digits where it is made, and tables are
+written with nine. Two processors then differ only where a number lies within their
+last digits of the middle between two numbers of nine digits, once in some ten millions.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from orchestrator.types import FloatArray
+
+DIGITS = 9
+FORMAT = f"%.{DIGITS}g"
+"""Format of a number in an input of a solver."""
+SLACK = 1e-6
+"""How near a ratio is to a whole number that it stands for.
+
+Where a length is a whole number of others, its last digit must not add one.
+"""
+
+
+def rounded(value: float) -> float:
+    """Round a number to nine digits.
+
+    Parameters
+    ----------
+    value
+        Any number; NaN and infinity stay what they are.
+
+    Returns
+    -------
+    float
+        The number that its nine digits stand for.
+
+    Examples
+    --------
+    >>> rounded(0.1 + 0.2)
+    0.3
+    """
+    return float(FORMAT % value)
+
+
+def text(value: float) -> str:
+    """Write a number with nine digits at most, and a point.
+
+    Parameters
+    ----------
+    value
+        Any number.
+
+    Returns
+    -------
+    str
+        As few digits as tell the rounded number from its neighbours.
+
+    Examples
+    --------
+    >>> text(2 / 3), text(15.0)
+    ('0.666666667', '15.0')
+    """
+    return repr(rounded(value))
+
+
+def all_rounded(values: ArrayLike) -> FloatArray:
+    """Round each of some numbers to nine digits of its own.
+
+    Parameters
+    ----------
+    values
+        Numbers in an array of any shape.
+
+    Returns
+    -------
+    FloatArray
+        The rounded numbers, of the same shape.
+
+    Examples
+    --------
+    >>> all_rounded([1 / 3, 1e-17 / 3]).tolist()
+    [0.333333333, 3.33333333e-18]
+    """
+    array = np.asarray(values, float)
+    each = [float(FORMAT % value) for value in array.ravel().tolist()]
+    return np.array(each).reshape(array.shape)
+
+
+def on_grid(values: ArrayLike, unit: float = 0.0, digits: int = DIGITS) -> FloatArray:
+    """Round numbers that have one unit to some digits of that unit.
+
+    Of coordinates, differences and components a small one is known no better than a
+    large one: its own ninth digit may be the last digit of what it is a difference of.
+
+    Parameters
+    ----------
+    values
+        Numbers in an array of any shape.
+    unit
+        A number whose leading digit counts as the first one; by default the largest of
+        the values.
+    digits
+        How many digits are left.
+
+    Returns
+    -------
+    FloatArray
+        The rounded numbers, of the same shape, none of them -0.0.
+
+    Examples
+    --------
+    >>> on_grid([10.0, 3e-17, 1 / 3]).tolist()
+    [10.0, 0.0, 0.3333333]
+    """
+    array = np.asarray(values, float)
+    unit = unit or float(np.abs(array).max(initial=0.0))
+    if not unit:
+        return np.zeros_like(array)
+    # the slack makes one decade of 0.1 and of the next smaller number
+    decimals = digits - 1 - int(np.floor(np.log10(unit) + SLACK))
+    return np.round(array, decimals) + 0.0
+
+
+def whole_up(value: float) -> int:
+    """Count up to a whole number, but for `SLACK`.
+
+    Parameters
+    ----------
+    value
+        A ratio.
+
+    Returns
+    -------
+    int
+        The least whole number that is not below it, or is below it by `SLACK` at most.
+
+    Examples
+    --------
+    >>> whole_up(0.3 / 0.1), whole_up(0.7 / 0.1), whole_up(7.1)
+    (3, 7, 8)
+    """
+    return int(np.ceil(value - SLACK))
