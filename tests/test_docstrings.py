@@ -28,6 +28,8 @@ DESCRIBED = (
     *PHYSICS,
     "orchestrator.digits",
     "orchestrator.errors",
+    "orchestrator.runs.cluster",
+    "orchestrator.runs.engine",
     "orchestrator.runs.files",
     "orchestrator.runs.process",
     "orchestrator.runs.terminal",

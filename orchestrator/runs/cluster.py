@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from filelock import FileLock
@@ -19,20 +20,44 @@ from orchestrator.runs import engine, process
 from orchestrator.runs.case import PACKAGE, Case, done_state, names_in
 from orchestrator.runs.engine import Pool
 
-_NAMES = ("HTCondor", "LSF", "Moab", "OAR", "PBS", "SGE", "SLURM")
-SYSTEMS = {name.lower(): f"{name}Cluster" for name in _NAMES}
+SYSTEMS = {
+    "htcondor": "HTCondorCluster",
+    "lsf": "LSFCluster",
+    "moab": "MoabCluster",
+    "oar": "OARCluster",
+    "pbs": "PBSCluster",
+    "sge": "SGECluster",
+    "slurm": "SLURMCluster",
+}
 """Names of the queues, and dask-jobqueue's classes for them."""
 AHEAD = 2
-"""Cases handed to a job for each core: no core waits for the next while this process is busy."""
+"""Cases handed to a job for each core.
+
+No core waits for the next case while this process is busy.
+"""
 LOST_S = 5.0
-"""Time after which a worker without a sign of life is lost, and its job is asked for again, s."""
+"""Time without a sign of life after which a worker is lost, s.
+
+Its job is asked for again.
+"""
 PATIENCE_S = 60.0
-"""Time without a job that has begun until a line says so, s; the next line takes twice as long."""
+"""Time without a job that has begun until a line says so, s.
+
+Until the next line it is twice as long.
+"""
 
 
 @dataclass(frozen=True)
 class Queue:
-    """One of `SYSTEMS`, and the table ``[cluster]`` of the study file: arguments of its class."""
+    """A queue, and what its jobs ask for.
+
+    Attributes
+    ----------
+    system
+        One of `SYSTEMS`.
+    settings
+        The table ``[cluster]`` of the study file: arguments of dask-jobqueue's class.
+    """
 
     system: str
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -40,66 +65,145 @@ class Queue:
 
 @contextlib.contextmanager
 def pool(queue: Queue, cases: Path, *, workers: int, limit_s: float) -> Iterator[Pool]:
-    """Jobs of a queue that run so many solvers at a time; a job that is lost is asked for again.
+    """Make a pool of the jobs of a queue; a job that is lost is asked for again.
 
-    Wrong settings are an InputError, and jobs that the queue does not take an OrchestratorError.
+    Parameters
+    ----------
+    queue
+        The queue.
+    cases
+        Directory of the cases.
+    workers
+        Number of solvers that run at a time.
+    limit_s
+        Time that a solver may take, s.
+
+    Yields
+    ------
+    Pool
+        The pool.
+
+    Raises
+    ------
+    InputError
+        If the settings make no jobs, or dask-jobqueue is not installed.
+    OrchestratorError
+        If the queue does not take the jobs.
     """
-    try:
-        dask, jobqueue, distributed = map(import_module, ("dask", "dask_jobqueue", "distributed"))
-    except ImportError as error:
-        what = f"a cluster needs the package's extra [cluster]: {error.name} is not installed"
-        remedy = "pip install 'dask-jobqueue>=0.9', with the Python that runs this"
-        raise InputError(what, where="--cluster", remedy=remedy) from None
-    kind = getattr(jobqueue, SYSTEMS[queue.system])
+    dask = _imported("dask")
+    jobqueue = _imported("dask_jobqueue")
+    distributed = _imported("distributed")
     cases.mkdir(exist_ok=True)
-    logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
+    kind = getattr(jobqueue, SYSTEMS[queue.system])
     name = queue.settings.get("config_name", kind.job_cls.config_name)
+    # dask's own configuration of this queue, and over it the study's settings
     given = {**dask.config.get(f"jobqueue.{name}"), **queue.settings}
-    # a job begins in an environment of its own, where this package need not be installed
-    path = f"export PYTHONPATH={shlex.quote(str(PACKAGE.parent))}:$PYTHONPATH"
-    scheduler = {"dashboard": False, "dashboard_address": ":0"}
-    settings = {
-        **queue.settings,
-        "python": given.get("python") or shlex.quote(sys.executable),
-        "log_directory": logs,
-        "job_script_prologue": [path, *(given.get("job_script_prologue") or [])],
-        "scheduler_options": {**scheduler, **queue.settings.get("scheduler_options", {})},
-    }
+    logs = str(queue.settings.get("log_directory", cases.parent / "jobs"))
     dask.config.set({"distributed.deploy.lost-worker-timeout": f"{LOST_S}s"})
-    try:
-        cluster = kind(**settings)
-    except (TypeError, ValueError, RuntimeError, OSError) as error:
-        what = f"these settings make no jobs: {str(error).splitlines()[0]}"
-        remedy = "see [cluster] in the study file, and dask's own configuration of jobqueue"
-        raise InputError(what, where="cluster", remedy=remedy) from None
-    jobs = math.ceil(workers / int(given["cores"]))
+    cluster = _made(kind, _settings(queue, given, logs))
+    cores = int(given["cores"])
+    jobs = math.ceil(workers / cores)
     with cluster, distributed.Client(cluster) as client:
         _submit(cluster, jobs, queue.system, distributed.Status.failed)
         print(f"asked {queue.system} for {jobs} jobs; logs: {logs}", file=sys.stderr)
         # at least as many jobs as at most: it only makes up for those that are lost
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
         _await_first(client, Path(logs))
-        task = partial(execute_unless_done, cases=cases, limit_s=limit_s)
-        places, executor = AHEAD * jobs * int(given["cores"]), client.get_executor(pure=False)
-        yield Pool(executor, task, places, (distributed.KilledWorker,))
-    for name in names_in(cases):
-        (cases / f".{name}.lock").unlink(missing_ok=True)
+        yield Pool(
+            executor=client.get_executor(pure=False),
+            task=partial(execute_unless_done, cases=cases, limit_s=limit_s),
+            places=AHEAD * jobs * cores,
+            lost=(distributed.KilledWorker,),
+        )
+    for case in names_in(cases):
+        _lock_of(case, cases).unlink(missing_ok=True)
+
+
+def _imported(name: str) -> ModuleType:
+    """A module of the package's extra; an InputError says what to install."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        extra = "a cluster needs the package's extra [cluster]"
+        raise InputError(
+            f"{extra}: {error.name} is not installed",
+            where="--cluster",
+            remedy="pip install 'dask-jobqueue>=0.9', with the Python that runs this",
+        ) from None
+
+
+def _settings(queue: Queue, given: Mapping[str, Any], logs: str) -> dict[str, Any]:
+    """Arguments of dask-jobqueue's class: those of the study, and ours beside them."""
+    # a job begins in an environment of its own, which need not have this package
+    folder = shlex.quote(str(PACKAGE.parent))
+    prologue = [f"export PYTHONPATH={folder}:$PYTHONPATH"]
+    prologue += given.get("job_script_prologue") or []
+    scheduler = {
+        "dashboard": False,
+        "dashboard_address": ":0",
+        **queue.settings.get("scheduler_options", {}),
+    }
+    return {
+        **queue.settings,
+        "python": given.get("python") or shlex.quote(sys.executable),
+        "log_directory": logs,
+        "job_script_prologue": prologue,
+        "scheduler_options": scheduler,
+    }
+
+
+def _made(kind: Any, settings: Mapping[str, Any]) -> Any:
+    """A cluster of dask-jobqueue; an InputError if it cannot be made."""
+    try:
+        return kind(**settings)
+    except (TypeError, ValueError, RuntimeError, OSError) as error:
+        first_line = str(error).splitlines()[0]
+        configuration = "dask's own configuration of jobqueue"
+        raise InputError(
+            f"these settings make no jobs: {first_line}",
+            where="cluster",
+            remedy=f"see [cluster] in the study file, and {configuration}",
+        ) from None
+
+
+def _lock_of(case: str, cases: Path) -> Path:
+    """The lock of a case, by its name."""
+    return cases / f".{case}.lock"
 
 
 def execute_unless_done(case: Case, cases: Path, limit_s: float) -> float:
-    """Run one case on a machine of the cluster, unless it is done by now; its time, s.
+    """Run one case on a machine of the cluster, unless it is done by now.
 
-    A worker that was given up as lost, or one of an earlier study, may still be at work on the
-    case: this one waits for its end.
+    A worker that was given up as lost, or one of an earlier study, may still be at work
+    on the case: this one waits for its end.
+
+    Parameters
+    ----------
+    case
+        The case.
+    cases
+        Directory of the cases.
+    limit_s
+        Time that the solver may take, s.
+
+    Returns
+    -------
+    float
+        Its time, s.
     """
-    with FileLock(cases / f".{case.name}.lock"):
+    with FileLock(_lock_of(case.name, cases)):
         state = done_state(case, cases)
-        return float(state["wall_s"]) if state else engine.execute(case, cases, limit_s)
+        if state:
+            return float(state["wall_s"])
+        return engine.execute(case, cases, limit_s)
 
 
 def _submit(cluster: Any, jobs: int, system: str, failed: object) -> None:
-    """Ask for the jobs, and wait until the queue has taken them."""
-    # a connection that closes with its job is no news: distributed logs it with a traceback
+    """Ask for the jobs, and wait until the queue has taken them.
+
+    `failed` is the status of a job that does not begin.
+    """
+    # a connection that closes with its job is no news, but is logged with a traceback
     logging.getLogger("distributed.batched").setLevel(logging.WARNING)
     while len(cluster.worker_spec) < jobs:
         cluster.worker_spec.update(cluster.new_worker_spec())
@@ -108,22 +212,41 @@ def _submit(cluster: Any, jobs: int, system: str, failed: object) -> None:
         cluster.sync(lambda: cluster)
     except (RuntimeError, OSError, ValueError) as error:
         for job in cluster.workers.values():
-            job.status = failed  # else the cluster's end trips over jobs that never began
-        what = f"{system} does not take the job: {' '.join(str(error).split())}"
-        remedy = "see [cluster] in the study file; this machine must be one that may submit jobs"
-        raise OrchestratorError(what, "--cluster", remedy) from None
+            # else the cluster's end trips over jobs that never began
+            job.status = failed
+        cause = " ".join(str(error).split())
+        machine = "this machine must be one that may submit jobs"
+        raise OrchestratorError(
+            f"{system} does not take the job: {cause}",
+            where="--cluster",
+            remedy=f"see [cluster] in the study file; {machine}",
+        ) from None
 
 
 def _await_first(client: Any, logs: Path) -> None:
-    """Wait for the first job to begin; where that takes long, repeat the end of its log."""
-    patience = PATIENCE_S
+    """Wait for the first job to begin; where that takes long, say so."""
+    patience_s = PATIENCE_S
     while True:
         try:
-            client.wait_for_workers(1, timeout=patience)
+            client.wait_for_workers(1, timeout=patience_s)
             return
         except TimeoutError:
-            newest = sorted(logs.glob("*"), key=lambda path: path.stat().st_mtime, reverse=True)
-            words = ((path.name, process.last_words(path)) for path in newest)
-            hint = next((f"{name} says: {text}" for name, text in words if text), "ask the queue")
-            print(f"no job has begun for {patience:.0f} s; {hint}", file=sys.stderr)
-            patience *= 2
+            hint = _last_words_of_jobs(logs) or "ask the queue"
+            waited = f"no job has begun for {patience_s:.0f} s"
+            print(f"{waited}; {hint}", file=sys.stderr)
+            patience_s *= 2
+
+
+def _last_words_of_jobs(logs: Path) -> str:
+    """The end of the newest log of a job that says something; empty if none does."""
+    newest = sorted(logs.glob("*"), key=_time_of_change, reverse=True)
+    for path in newest:
+        text = process.last_words(path)
+        if text:
+            return f"{path.name} says: {text}"
+    return ""
+
+
+def _time_of_change(path: Path) -> float:
+    """Time of the last change of a file, s."""
+    return path.stat().st_mtime
