@@ -38,15 +38,17 @@ add to them. The [glossary](glossary.md) explains the words.
 | `title` | the file's name | a line for the page |
 | `time_limit` | {TIME_LIMIT_S:g} | wall time after which a run of a solver counts as hung, s |
 | `seeds` | none | number of beds that differ in their seed alone; also of a group |
-| `tolerance` | none | relative error that τ_c may have: [ladder.md](ladder.md#the-default) |
+| `tolerance` | none | relative error that τ_c may have: [ladder.md](ladder.md) |
 | `cluster` | none | settings of a queue: [cluster.md](cluster.md) |
 | `group` | one group | the experiments |
 
 The *scope* says on which scenes a field has an effect; on others its column in the tables is empty.
 The *column* is named as the field where none is given. A field marked *answer* is about how the
-question is answered, not about the question: a tolerance may change it, and column `answered_...`
-of the table of scenes has the value that was run. Ranges are intervals; a parenthesis leaves out
-the end. The [limits](#limits) are what a study refuses within the ranges.
+question is answered, not about the question: the method `auto` and a tolerance may change it
+([ladder.md](ladder.md#how-a-scene-is-answered)), and column `answered_...` of the table of scenes
+has the value that was run. Whether a file writes a default or leaves it out is the same. Ranges are
+intervals; a parenthesis leaves out the end. The [limits](#limits) are what a study refuses within
+the ranges.
 """
 DAMPED = ", ".join(f"{step:g} up to a damping of {most:g}" for most, step in limits.TIMESTEPS)
 LOW, HIGH = limits.PILE_SLOPES_DEG
@@ -89,9 +91,9 @@ LIMITS = {
     ),
     "grain.damping": (f"below {limits.LEAST_DAMPING:g} in DEM", "0.1"),
     "protocol.time_step": (f"above {DAMPED}", "lower it"),
-    "forces.law": ("`zeng-torque` by peeling or DEM", "the method `pivot`"),
-    "flow.gusts": ("DEM of single grains", "the method `pivot`"),
-    "grain.cohesion": ("by DEM", "the method `pivot` or `peeling`"),
+    "forces.law": ("`zeng-torque` by peeling or DEM", "the method `auto` or `pivot`"),
+    "flow.gusts": ("DEM of single grains", "the method `auto` or `pivot`"),
+    "grain.cohesion": ("by DEM", "the method `auto`, `peeling` or `pivot`"),
 }
 """What is refused within the ranges of the fields, and the remedy."""
 SIGNS = {Gt: ("gt", "({:g},"), Ge: ("ge", "[{:g},"), Lt: ("lt", "{:g})"), Le: ("le", "{:g}]")}

@@ -107,7 +107,7 @@ def _parser() -> argparse.ArgumentParser:
             add("--workers", type=int, default=count, metavar="N", help="cases at a time")
             add("--plan", action="store_true", help="say what would run, how long, and end")
         if name == "study":
-            text = "error that tau_c may have: the cheapest models within it; 0: as the file asks"
+            text = "error that tau_c may have, such as 0.05: the cheapest models known to be within"
             add("--tolerance", type=float, metavar="X", help=text)
             text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
             add("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)

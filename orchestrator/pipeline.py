@@ -56,32 +56,37 @@ def run(study: Study, out: Path, *, workers: int, queue: Queue | None = None) ->
     """
     space = Workspace(out.absolute())
     # what cannot be answered is refused before anything is written
-    first = plan.make(study, cases=space.cases)
+    planned = plan.make(study, cases=space.cases)
     with claimed(space.root, STUDY, study.name):
-        planned = plan.settled(study, space.cases, first)
         changed = _describe(space, study, planned)
-        started, states = 0, planned.done(space.cases)
-        failures: dict[str, OrchestratorError] = {}
-        while todo := planned.missing(space.cases, {**states, **failures}):
-            started += len(todo)
-            rest = {"queue": queue, "after_s": planned.drawing_s}
-            failures |= complete(todo, space, workers=workers, limit_s=study.time_limit_s, **rest)
-            # where a cheap run failed, or a check overrules it, the plan goes on to a dearer one
-            planned = plan.settled(study, space.cases, first)
-            _describe(space, study, planned)
+        states = planned.done(space.cases)
+        todo = planned.missing(space.cases, states)
+        rest = {"queue": queue, "after_s": planned.drawing_s}
+        failed = complete(todo, space, workers=workers, limit_s=study.time_limit_s, **rest)
+        failures = _with_advice(failed, planned)
+        if todo:
             states |= planned.done(space.cases, but=states)
-        if not started:
+        else:
             print("every case was done already; no solver was started", file=sys.stderr)
         answer = space.answer(planned.ids)
         undrawn: Sequence[str] = ()
-        if started or answer is None:
-            failures = {n: error for n, error in failures.items() if n in planned.cases}
+        if todo or answer is None:
             print("drawing tables, figures and page", file=sys.stderr)
             answer, undrawn = _draw(study, planned, space, states, failures, False)
         if changed and (left := space.left(planned.cases)):
             what = f"the study file has changed: {len(left)} cases are not asked for any more"
             print(f"{what}; `orchestrator status {out}` names them", file=sys.stderr)
-        return Finished(space.page, started, failures, answer, undrawn)
+        return Finished(space.page, len(todo), failures, answer, undrawn)
+
+
+def _with_advice(failures: Failures, planned: Plan) -> Failures:
+    """Failures with what to do where levels were chosen: the scenes can be answered otherwise."""
+    advised = dict(failures)
+    for name in planned.chosen & failures.keys():
+        error = failures[name]
+        remedies = filter(None, (error.remedy, plan.BY_DEM))
+        advised[name] = type(error)(error.what, error.where, "; or ".join(remedies))
+    return advised
 
 
 def _describe(space: Workspace, study: Study, planned: Plan) -> bool:
@@ -131,7 +136,7 @@ def reopen(space: Workspace) -> tuple[Study, Plan]:
     files = Files(None)
     study = parse(about["study"], name=about["name"], where=str(space.root), files=files)
     study = replace(study, tolerance=about.get("tolerance"))
-    return study, plan.settled(study, space.cases)
+    return study, plan.make(study, space.cases)
 
 
 def redraw(out: Path, *, every: bool = False) -> Finished:
@@ -142,7 +147,8 @@ def redraw(out: Path, *, every: bool = False) -> Finished:
         states = planned.done(space.cases)
         space.check_cases_of_tables(states)
         causes = {name: case.failure(space.cases / name)[1] for name in planned.cases}
-        failures = {name: OrchestratorError(why) for name, why in causes.items() if why}
+        failed = {name: OrchestratorError(why) for name, why in causes.items() if why}
+        failures = _with_advice(failed, planned)
         answer, undrawn = _draw(study, planned, space, states, failures, every)
         return Finished(space.page, 0, failures, answer, undrawn)
 

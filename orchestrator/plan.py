@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from orchestrator.fidelity import decision, limits
-from orchestrator.fidelity.decision import Bound, Decision, decide
+from orchestrator.fidelity.decision import Decision, decide
 from orchestrator.grains.cells import SingleGrainCase, batches
 from orchestrator.grains.pile import Pile
-from orchestrator.runs.case import Case, done_state, failure, is_whole
+from orchestrator.runs.case import Case, done_state, is_whole
 from orchestrator.runs.engine import human
 from orchestrator.study.closed_form import law_holds, regime_of
 from orchestrator.study.parts import PileBed
@@ -27,6 +27,8 @@ START_S, SCENE_S, GRAIN_S = 2.5, 4e-3, 4e-5
 BESIDE = 1.3  # time of a case with the Python beside its solver, over that of the solver
 SORT_S = 4.3e-3  # of `pace` on the machine of these times and of those that cases expect, s
 BYTES = 2.2e6  # mean size of a case of the preset `paper`
+BY_DEM = 'protocol.method = "dem", without a tolerance, answers its scenes as they are written'
+"""What to do where a run on levels that were chosen has failed."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,14 @@ class Plan:
         return START_S + SCENE_S * len(self.decisions) + GRAIN_S * lengths
 
     @property
+    def chosen(self) -> frozenset[str]:
+        """The names of the cases that no scene as it is written needs, nor a check by DEM."""
+        piles = [pile for asked, pile in self.piles.items() if not self.decisions[asked].is_chosen]
+        needed = {run.name for pile in (*piles, *self.checks.values()) for run in pile.runs}
+        cells = {cell.name for cell in self.cells}
+        return frozenset(self.cases) - needed - cells
+
+    @property
     def ids(self) -> dict[str, str]:
         """The ids of the cases, by name."""
         return {name: case.id for name, case in self.cases.items()}
@@ -69,34 +79,50 @@ class Plan:
         return {case.name: case for case in starts if not is_whole(case, directory)} | missing
 
 
-def make(study: Study, above: Mapping[str, Bound] | None = None, cases: Path | None = None) -> Plan:
+def make(study: Study, cases: Path | None = None) -> Plan:
     """Decide how each scene of a study is answered, and list the cases that it needs.
 
-    `above` has levels that turned out to be not good enough, by scene id. The grains of a poured
-    bed are read from `cases`, the directory of the runs. A scene beyond a limit of the methods, or
-    a flow that cannot be solved, raises an `InputError` with the field.
+    Parameters
+    ----------
+    study
+        The study.
+    cases
+        The directory of the runs, where the grains of poured beds are read.
+
+    Raises
+    ------
+    InputError
+        With the field, for a scene beyond a limit of the methods or a flow that cannot be solved.
     """
     limits.check_study(study)
-    return of(decide(study.scenes, study.tolerance, above or {}), study.tolerance, cases)
+    decisions = {scene.id: decide(scene, study.tolerance) for scene in study.scenes}
+    checks = decision.checks(decisions.values()) if study.tolerance else {}
+    return of(decisions, checks, cases)
 
 
 def of(
-    decisions: Mapping[str, Decision], tolerance: float | None = None, cases: Path | None = None
+    decisions: Mapping[str, Decision],
+    checks: Mapping[str, Decision] | None = None,
+    cases: Path | None = None,
 ) -> Plan:
-    """List the cases that some decisions need; with a tolerance, those of checks by DEM too."""
-
-    def piles_of(answers: Mapping[str, Decision]) -> dict[str, Pile]:
-        scenes = {asked: answer.scene for asked, answer in answers.items()}
-        kept = {asked: scene for asked, scene in scenes.items() if isinstance(scene.bed, PileBed)}
-        return {asked: Pile(scene, cases) for asked, scene in kept.items()}
-
-    piles = piles_of(decisions)
-    checks = piles_of(decision.checks(decisions, tolerance)) if tolerance else {}
-    scenes = (answer.scene for asked, answer in decisions.items() if asked not in piles)
+    """List the cases that some decisions need, and those of the `checks` of some of them."""
+    piles = _piles(decisions, cases)
+    checking = _piles(checks or {}, cases)
+    scenes = [answer.scene for asked, answer in decisions.items() if asked not in piles]
     grains = {scene.id: scene for scene in scenes if scene.protocol.method == "dem"}
     cells = tuple(batches(grains.values()))
-    runs = (run for pile in (*piles.values(), *checks.values()) for run in pile.runs)
-    return Plan(dict(decisions), piles, cells, checks, listed((*runs, *cells)))
+    runs = [run for pile in (*piles.values(), *checking.values()) for run in pile.runs]
+    return Plan(dict(decisions), piles, cells, checking, listed((*runs, *cells)))
+
+
+def _piles(decisions: Mapping[str, Decision], cases: Path | None) -> dict[str, Pile]:
+    """The piles that answer, by the keys of their decisions."""
+    scenes = {asked: answer.scene for asked, answer in decisions.items()}
+    return {
+        asked: Pile(scene, cases)
+        for asked, scene in scenes.items()
+        if isinstance(scene.bed, PileBed)
+    }
 
 
 def listed(cases: Iterable[Case]) -> dict[str, Case]:
@@ -113,33 +139,9 @@ def listed(cases: Iterable[Case]) -> dict[str, Case]:
     return {name: case for name, case in found.items() if not case.needs} | found
 
 
-def settled(study: Study, directory: Path, first: Plan | None = None) -> Plan:
-    """The plan after the runs that are done: dearer levels where one failed or DEM overrules it.
-
-    `first` is the plan for the same directory before any run, where it is known.
-    """
-    above: dict[str, Bound] = {}
-    plan = first or make(study, above, directory)
-    while True:
-        more = {
-            asked: Bound(*answer.levels, f"a run on {answer.levels.text} failed")
-            for asked, answer in plan.decisions.items()
-            if answer.levels and answer.is_chosen and asked in plan.piles
-            if any(failure(directory / run.name)[1] for run in plan.piles[asked].runs)
-        }
-        if study.tolerance:
-            done = plan.done(directory)
-            compared = decision.compare(plan.piles, plan.checks, study.tolerance, directory, done)
-            more |= decision.overruled(compared, plan.decisions)
-        if not more:
-            return plan
-        above |= more
-        plan = make(study, above, directory)
-
-
 def forecast(study: Study, directory: Path, workers: int) -> Iterator[str]:
     """Lines of text: scenes with their regimes, cases by kind, expected time and disk."""
-    plan = settled(study, directory)
+    plan = make(study, directory)
     regimes = _counted(regime_of(scene) for scene in study.scenes)
     yield f"{study.title}: {_number(len(study.scenes), 'scene')}; regimes: {regimes}"
     if outside := sum(not law_holds(scene) for scene in study.scenes):

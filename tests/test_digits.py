@@ -72,6 +72,8 @@ height = 0.006
 roughness = "d/30"
 [flow]
 model = "waves"
+[protocol]
+method = "dem"
 """
 NUMBER = re.compile(rb"(?<![\w.])[-+]?(\d+\.\d+|\d+\.|\.\d+|\d+)(e[-+]?\d+)?(?![\w.])")
 

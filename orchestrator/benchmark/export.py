@@ -70,8 +70,9 @@ def export(root: Path, source: Path | None, levels: Collection[int]) -> int:
     asked, planned = pipeline.reopen(space)
     unknown = [(s.flow.gusts, s.grain.cohesion, s.forces.sheltering) for s in asked.scenes]
     what, remedy = "", "run the study without it into another directory"
-    if not all(answer.is_as_asked for answer in planned.decisions.values()):
-        what = f"tolerance of {asked.tolerance}: a pack has the answers as the scenes ask"
+    if any(answer.is_chosen for answer in planned.decisions.values()):
+        what = "levels were chosen for its scenes: a pack has the answers of scenes as written"
+        remedy = 'run it with protocol.method = "dem" and no tolerance into another directory'
     elif any(pile.scene.protocol.update or pile.bed.width for pile in planned.piles.values()):
         what = "protocol.update or bed.width: a pack holds one flow over each bed, in its plane"
     elif any(one != (None, 0.0, "none") for one in unknown):
@@ -107,7 +108,8 @@ def problems(
         has_decks = shutil.which(liggghts.PROGRAM) is not None
         yield from map(_with_ours, scenes.checks()) if has_decks else scenes.checks()
     names, piles = scene_names(planned, asked), planned.piles
-    cell_of = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
+    cells = {scene.id: cell.name for cell in planned.cells for scene in cell.scenes}
+    answers = {asked: answer.scene.id for asked, answer in planned.decisions.items()}
     thresholds = results.get("single_grain")
     ours = {} if thresholds is None else dict(thresholds.set_index("scene_id")["ustar_m_s"])
     for scene in (scene for scene in asked.scenes if scene.id not in piles):
@@ -116,7 +118,7 @@ def problems(
             yield scenes.closed_form(name, scene)
         if "pivot" in kinds and scenes.has_pivot(scene):
             problem = scenes.pivot(name, scene, ours.get(scene.id, np.nan))
-            yield replace(problem, runs=(cell_of[scene.id],) if scene.id in ours else ())
+            yield replace(problem, runs=(cells[answers[scene.id]],) if scene.id in ours else ())
     # neither a theory's stress nor a channel's is a question at levels 3 and 5
     solved = {i: p for i, p in piles.items() if p.model.cases and not p.scene.flow.depth}
     flows = {run: solve for pile in solved.values() for run, solve in pile.solves.items()}
@@ -131,7 +133,7 @@ def problems(
         for kind in ("pile", "line") if has_line else ("pile",):
             if kind in kinds:
                 runs = (*(pile.solves if kind == "line" else ()), pile.case.name)
-                yield replace(scenes.bed(names[id_], kind, pile, results, cases), runs=runs)
+                yield replace(scenes.bed(names[id_], kind, id_, pile, results, cases), runs=runs)
 
 
 def scene_names(planned: Plan, asked: Study) -> dict[str, str]:

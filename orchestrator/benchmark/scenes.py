@@ -216,15 +216,16 @@ def flow(name: str, pile: Pile, results: Tables) -> Problem:
     return Problem(name, "flow", *_flow_tables(pile), rows)
 
 
-def bed(name: str, kind: str, pile: Pile, results: Tables, cases: Path) -> Problem:
+def bed(name: str, kind: str, scene_id: str, pile: Pile, results: Tables, cases: Path) -> Problem:
     """Levels 4 and 5: the grains of a bed that DEM answered.
 
     The kind is ``pile``, under the given stress, or ``line``, whose flow the solver finds.
-    `results` are the tables of the study, `cases` is the directory of the runs, which are done.
+    `results` are the tables of the study, which have the bed under the id of the scene that was
+    asked for; `cases` is the directory of the runs, which are done.
     """
     scene = pile.scene
-    curve = results["pile_curve"].set_index("scene_id").loc[[scene.id]].reset_index()
-    thresholds = results["pile_threshold"].set_index("scene_id").loc[[scene.id]]
+    curve = results["pile_curve"].set_index("scene_id").loc[[scene_id]].reset_index()
+    thresholds = results["pile_threshold"].set_index("scene_id").loc[[scene_id]]
     total, moved, off = (int(curve[key].iloc[-1]) for key in ("count", "moved", "carried_off"))
     tolerance, until = THRESHOLD[kind], 1.0
     scatter = POURED_SCATTER if pile.pouring else SCATTER

@@ -10,6 +10,7 @@ import pandas as pd
 
 from orchestrator import pipeline
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.fidelity.decision import written
 from orchestrator.pipeline import Finished
 from orchestrator.plan import Plan
 from orchestrator.report import page, style
@@ -103,17 +104,21 @@ class Experiment:
         space.describe(EXPERIMENT, self.name, list(self.planned.cases), source=source)
 
 
-def piles(study: Study, *, by_dem: bool = False) -> dict[Scene, PileBed]:
-    """The piles of a study with their beds; with `by_dem`, lattices that DEM answers."""
-    chosen = {
-        scene: scene.bed
-        for scene in study.scenes
-        if isinstance(scene.bed, PileBed)
-        and not (by_dem and (scene.is_poured or scene.protocol.method != "dem"))
-    }
+def piles(study: Study) -> dict[Scene, PileBed]:
+    """The piles of a study as they are written, with their beds and with the method that answers.
+
+    Raises
+    ------
+    InputError
+        If the study has no pile.
+    """
+    chosen = {}
+    for scene in study.scenes:
+        if isinstance(scene.bed, PileBed):
+            chosen[written(scene)] = scene.bed
     if not chosen:
-        what = f"there is no pile{' that is answered by DEM and is not poured' * by_dem}"
-        raise InputError(what, where=study.name, remedy='give a group `bed.kind = "pile"`')
+        remedy = 'give a group `bed.kind = "pile"`'
+        raise InputError("there is no pile", where=study.name, remedy=remedy)
     return chosen
 
 

@@ -19,7 +19,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from orchestrator import plan
 from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
-from orchestrator.fidelity.decision import as_asked
+from orchestrator.fidelity.decision import as_asked, written
 from orchestrator.grains import threshold
 from orchestrator.grains.motion import Motion
 from orchestrator.report import style
@@ -90,14 +90,14 @@ def _axis(axis: Mapping[str, Any]) -> Iterator[tuple[Any, Mapping[str, Any]]]:
 
 
 def _scenes(data: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> tuple[Scene, ...]:
-    """The scene with some changes; in the transition one for each force law."""
+    """The scene with some changes, with its method; in the transition one for each force law."""
     parts = {part: dict(data.get(part, {})) for part in PARTS}
     for key, value in changes.items():
         part, _, field = key.partition(".")
         parts[part].pop(field, None)
         if value != DEFAULT:
             parts[part][field] = value
-    return next(resolved([make_scene(parts, where)]))
+    return tuple(map(written, next(resolved([make_scene(parts, where)]))))
 
 
 def experiment(out: Path, folder: Path = FOLDER) -> Experiment:

@@ -1,43 +1,59 @@
-"""The decision how a scene is answered: its fidelity levels, their known error, the reason.
+"""The decision how a scene is answered: a look-up by the scene and the tolerance of its study.
 
-A study with a tolerance is answered on the cheapest levels that are known to meet it. Of the piles
-of each slope, packing and force law that are answered without DEM, the cheapest by DEM is answered
-by DEM as well; where the two differ by more than the tolerance, all of them go to higher levels.
+The decision depends on the values of the scene's fields and on the tolerance. It depends neither on
+other scenes of the study and their order, nor on how a study file spells the values: ``auto``, the
+default of `protocol.method`, is a value like any other.
 """
 
 import itertools
 import math
-from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from typing import NamedTuple
 
 from orchestrator.fidelity import levels
-from orchestrator.fidelity.levels import LEVELS, LOCAL, Known, Level, Pair, changed, level, pair_of
+from orchestrator.fidelity.levels import (
+    FLAT,
+    FLOW,
+    GRAINS,
+    LOCAL,
+    Known,
+    Level,
+    Pair,
+    changed,
+    pair_of,
+    value_of,
+)
 from orchestrator.grains.loads import LONG, Geometry, has_rows_along
 from orchestrator.grains.pile import Pile
-from orchestrator.grains.threshold import PileThreshold
-from orchestrator.study.fields import FIELDS
+from orchestrator.study.fields import FIELDS, PARTS
 from orchestrator.study.parts import PileBed
 from orchestrator.study.scene import Scene
 
-Piles = Mapping[str, Pile]
 Names = tuple[str, ...]
 LEAST_HELD = 6.0  # waiting time, sqrt(d/g'), below which load steps are a ramp of the flow
-ROUNDS = 4
-ASKED = "as the study asks"
-ALONG = f"more than {LONG:g} grains long: closed form along the bed, checked where motion starts"
-ANSWERS = [q.name.split(".") for q in FIELDS if q.info.about == "answer"]
+EXACT = "the closed form is exact for a single grain in a held flow"
+LONG_BED = f"more than {LONG:g} grains long"
+ALONG = f"{LONG_BED}: closed form along the bed, checked where motion starts"
+KEPT = ("flow.speed", "flow.viscosity")
+"""Numbers of the solve that every level keeps: u*/U_e is the same at each of them (docs/flow.md).
+Their values do not ask for DEM."""
+_NUMBERS = [
+    field.name.split(".")
+    for field in FIELDS
+    if field.info.about == "answer" and field.name not in ("protocol.method", "flow.model", *KEPT)
+]
+NUMBERS = {f"{part}.{name}": PARTS[part].model_fields[name].default for part, name in _NUMBERS}
+"""Fields of mesh, contact, load steps and mobile layers, with the defaults of a lattice: a scene in
+which one has another value is answered by DEM, which uses it."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """How a scene is answered: as `asked` by the study, and the `scene` that answers it.
+    """How the scene `asked` for is answered: by the `scene`, whose method is never ``auto``.
 
-    The `levels` (None for a single grain) with their `known` error of tau_c; why; and whether the
-    study file left the levels open.
+    The `levels` (None for a single grain) with their `known` error of tau_c; why; and whether these
+    levels were chosen by their known errors, in place of what the scene has written.
     """
 
     asked: Scene
@@ -45,213 +61,78 @@ class Decision:
     levels: Pair | None
     known: Known
     why: str
-    by_default: bool = False
-
-    @property
-    def is_as_asked(self) -> bool:
-        """Whether the scene is answered as the study asks for it."""
-        return self.scene == self.asked
-
-    @property
-    def is_chosen(self) -> bool:
-        """Whether its levels are of those that higher ones can follow, and not as asked."""
-        return self.levels is not None and not self.is_as_asked and self.levels[1] != LOCAL
+    is_chosen: bool = False
 
     @property
     def error_estimate(self) -> float | None:
         """The known error with its uncertainty; None where it is not known."""
-        return None if math.isinf(self.known.total) else self.known.total
+        if math.isinf(self.known.total):
+            return None
+        return self.known.total
+
+    @property
+    def is_along(self) -> bool:
+        """Whether the closed form along the bed answers because the bed is long."""
+        is_local = self.levels is not None and self.levels.grains is LOCAL
+        return is_local and self.asked.protocol.method == "auto"
 
     @property
     def is_unchecked(self) -> bool:
-        """Whether it is a pile that the tool chose to answer without DEM."""
-        return self.is_chosen and self.scene.protocol.method != "dem"
+        """Whether it is a pile for which levels without DEM were chosen."""
+        is_pile = isinstance(self.scene.bed, PileBed)
+        return is_pile and self.is_chosen and self.scene.protocol.method != "dem"
 
 
-class Bound(NamedTuple):
-    """The highest levels that are not good enough for a scene, and why: higher ones are chosen."""
+def decide(scene: Scene, tolerance: float | None) -> Decision:
+    """How a resolved scene is answered.
 
-    flow: Level | None = None
-    grains: Level | None = None
-    because: str = ""
+    The methods ``auto`` and, with a tolerance, ``dem`` are answered by the cheapest levels with a
+    solved flow that are known to be good enough. All other scenes are answered as they are written:
+    those whose method or flow model says how, those for which no error is known, and with ``auto``
+    those in which one of `NUMBERS` has another value than its default.
 
+    Parameters
+    ----------
+    scene
+        A scene with one force law.
+    tolerance
+        Relative error that tau_c may have, the uncertainty of its reference included. None: with
+        ``auto`` the least of `levels.floors`, half the spread of the choices that all levels share.
 
-NO_BOUND = Bound()
-NO_BOUNDS: Mapping[str, Bound] = {}
-CHECK = Bound(level("flow", "coarse"), levels.PEELING, "it checks answers without DEM")
-
-
-def decide(
-    scenes: Iterable[Scene], tolerance: float | None, above: Mapping[str, Bound] = NO_BOUNDS
-) -> dict[str, Decision]:
-    """Choose for each resolved scene levels known to be within a tolerance, at least cost in all.
-
-    A flow that several piles share is run once, and a run of DEM costs what it takes for that pile.
-    Where no levels are within the tolerance, a scene is on the cheapest whose error is below the
-    uncertainty of their reference; it is as asked where nothing is known, or where the way to the
-    answer is a part of what is asked. `above` has, by id, levels that turned out to be too low.
-
-    The tolerance is the relative error of tau_c, the uncertainty of the reference included; 0: all
-    scenes as they are asked. None: a pile whose file sets no field about the answer is answered on
-    a solved flow, within the lowest `levels.floors` of all classes, so that the scenes of a figure
-    are answered alike; all other scenes, and poured beds, as asked.
+    Returns
+    -------
+    Decision
+        The scene that answers, its levels, what is known of them, and why.
     """
-    decided, offered = {}, {}
-    for scene in scenes:
-        if (along := along_if_long(scene)) is not scene:
-            decided[scene.id] = replace(as_asked(along, ALONG), asked=scene)
-            continue
-        pairs, why = _offered(scene, tolerance, above.get(scene.id, NO_BOUND))
-        if pairs:
-            offered[scene.id] = [_option(scene, pair, why, tolerance is None) for pair in pairs]
-        elif why or isinstance(scene.bed, PileBed):
-            decided[scene.id] = as_asked(scene, why)
-        else:
-            exact = changed(scene, {"protocol.method": "pivot"})
-            why = "the closed form is exact for a single grain in a held flow"
-            decided[scene.id] = Decision(scene, exact, None, levels.UNKNOWN, why)
-    return decided | _cheapest(offered)
-
-
-def along_if_long(scene: Scene) -> Scene:
-    """A scene by the closed form along the bed if it leaves the method open on long rows.
-
-    Level rows are no rows along the bed: they stay with the method that packs them.
-    """
-    rules = scene.protocol
-    if "method" in rules.model_fields_set or rules.update:
-        return scene
-    if not has_rows_along(scene):
-        return scene
-    return LOCAL.answer(scene) if Geometry(scene).length > LONG else scene
-
-
-def _offered(scene: Scene, tolerance: float | None, above: Bound) -> tuple[Sequence[Pair], str]:
-    """The pairs of levels that are good enough for a scene, and why it is answered as it is."""
-    rules, model, bed = scene.protocol, scene.flow.model, scene.bed
-    limit, start = "within the tolerance", ""
-    if tolerance is None:
-        floors = levels.floors()
-        is_set = any(name in getattr(scene, part).model_fields_set for part, name in ANSWERS)
-        is_lattice = isinstance(bed, PileBed) and not scene.is_poured
-        if is_set or not is_lattice or levels.model_class(scene) not in floors:
-            return (), ASKED
-        tolerance, start = min(floors.values()), "chosen by default: "
-        limit = f"within the model's own spread of {tolerance:.0%}"
-    if not tolerance:
-        return (), ASKED
-    # the levels approximate DEM in a held, solved flow
-    if rules.method != "dem":
-        return (), f"the study asks for the method {rules.method}"
-    if model not in ("solve", _best_model(scene)):
-        return (), f"the study asks for the flow model {model}"
-    if rules.update:
-        return (), "the study asks for a bed that changes, for which no error is known"
-    if rules.waiting_time < LEAST_HELD:
-        return (), "the study asks for a ramp of the flow"
-    if not isinstance(bed, PileBed):
-        beyond = bed.slope_deg > bed.entrainment_angle_deg
-        return (), "a slope beyond the entrainment angle: the closed form is off" * beyond
-    if name := levels.unmeasured(scene):
-        return (), f"no error is known for {name}: {ASKED}"
-    taken = [tuple(level for level in part if level.takes(scene)) for part in LEVELS.values()]
-    classes = tuple(levels.classes(part, scene) for part in LEVELS)
-    pairs, why = _good_enough(tuple(taken), classes, above, tolerance)
-    why = f"{start}{why} {limit}" if pairs else why
-    return pairs, f"{why}; {above.because}" if above.because else why
-
-
-@cache  # a study has thousands of scenes of a few classes
-def _good_enough(
-    taken: Sequence[tuple[Level, ...]], classes: Sequence[Names], above: Bound, tolerance: float
-) -> tuple[Sequence[Pair], str]:
-    """Pairs of the levels taken that are good enough, of which any may be the cheapest, and why."""
-    offered = []
-    for part, bound in zip(taken, above[:2], strict=True):
-        start = part.index(bound) + 1 if bound in part else 0
-        offered.append([level for level in part[start:] if level.is_offered])
-    if classes[0] == (levels.LEVEL_BED,):
-        offered[0] = [levels.FLAT]
-    pairs = (Pair(*pair) for pair in itertools.product(*offered))
-    known = {pair: levels.known_of_classes(*pair, *classes) for pair in pairs}
-    cheap_first = sorted(known, key=lambda pair: known[pair].cost_core_s)
-    within, why = [pair for pair in cheap_first if known[pair].total <= tolerance], "cheapest"
-    if not within:
-        best = min(known, key=lambda pair: known[pair].total, default=None)
-        if best is None or math.isinf(known[best].total):
-            return (), f"no error is known: {ASKED}"
-        # errors below the uncertainty of the reference cannot be ranked, but those of flows can
-        exact, most = levels.GRAINS[-1], known[best].total
-        flow = {pair: levels.known_of_classes(pair.flow, exact, *classes).error for pair in known}
-        limit = max(tolerance, flow[best])
-        within = [one for one in cheap_first if known[one].error <= most and flow[one] <= limit]
-        why = "cheapest whose error is below the uncertainty of the reference: none is"
-    kept: list[Pair] = []
-    for pair in within:
-        cost = known[pair]
-        if not any(
-            known[other].flow_s <= cost.flow_s and known[other].grains_s <= cost.grains_s
-            for other in kept
-        ):
-            kept.append(pair)
-    return kept, why
-
-
-class _Option(NamedTuple):
-    """A decision that is good enough, and the expected times of its flows, by name, and grains."""
-
-    decision: Decision
-    flows_s: Mapping[str, float]
-    grains_s: float
-
-    def time_s(self, users: Mapping[str, int], mine: Container[str]) -> float:
-        """Its time, with each flow divided by its users; it would be one more of those not mine."""
-        flows = self.flows_s.items()
-        shares = (time / (users.get(name, 0) + (name not in mine)) for name, time in flows)
-        return self.grains_s + sum(shares)
-
-
-@cache  # a plan is made several times
-def _option(scene: Scene, pair: Pair, why: str, by_default: bool) -> _Option:
-    """The option to answer a scene on a pair of levels."""
-    pile, known = Pile(pair.answer(scene)), levels.known(pair, scene)
-    flows_s = {run.name: run.cost_s for flow in pile.model.cases for run in (*flow.needs, flow)}
-    grains_s = sum(run.cost_s for run in pile.method.cases) or known.grains_s
-    return _Option(Decision(scene, pile.scene, pair, known, why, by_default), flows_s, grains_s)
-
-
-def _cheapest(offered: Mapping[str, Sequence[_Option]]) -> dict[str, Decision]:
-    """One option for each scene, with the least time of all runs together that the rounds find.
-
-    In each every scene takes the option with the least time, where a flow is shared by those who
-    took it in the round before: in the first by all who could, and once more by none.
-    """
-    names = ({name for one in options for name in one.flows_s} for options in offered.values())
-    best, least = dict[str, _Option](), math.inf
-    for users in (Counter(itertools.chain(*names)), Counter[str]()):
-        mine: dict[str, Mapping[str, float]] = dict.fromkeys(offered, users)
-        for _ in range(ROUNDS):
-            chosen = {
-                key: min(options, key=lambda option: option.time_s(users, mine[key]))
-                for key, options in offered.items()
-            }
-            mine = {key: option.flows_s for key, option in chosen.items()}
-            users = Counter(itertools.chain(*mine.values()))
-            flows = {name: s for one in chosen.values() for name, s in one.flows_s.items()}
-            total = sum(flows.values()) + sum(option.grains_s for option in chosen.values())
-            if total < least:
-                best, least = chosen, total
-    return {key: option.decision for key, option in best.items()}
-
-
-def as_asked(scene: Scene, why: str = ASKED) -> Decision:
-    """The decision to answer a scene as it is."""
     if not isinstance(scene.bed, PileBed):
-        return Decision(scene, scene, None, levels.UNKNOWN, why)
-    pair, name = pair_of(scene), levels.unmeasured(scene)
-    if name and name not in why:
-        why = f"{why}; no error is known for {name}"
-    return Decision(scene, scene, pair, levels.known(pair, scene), why)
+        return _of_grain(scene, tolerance)
+    why_as_written = _why_as_written(scene, tolerance)
+    if why_as_written is not None:
+        return as_asked(scene, why_as_written)
+    if tolerance is None:
+        most = min(levels.floors().values())
+        start, limit = "chosen by default: ", f"within the model's own spread of {most:.0%}"
+    else:
+        most, start, limit = tolerance, "", "within the tolerance"
+    pair, why = _looked_up(scene, most)
+    if pair is None:
+        return as_asked(scene, why)
+    known = levels.known(pair, scene)
+    answer = pair.answer(scene)
+    return Decision(scene, answer, pair, known, f"{start}{why} {limit}", is_chosen=True)
+
+
+def as_asked(scene: Scene, why: str = "") -> Decision:
+    """The decision to answer a scene as it is written; `why` says more than its method does."""
+    answer = written(scene)
+    why = "; ".join(filter(None, (method_of(scene)[1], why)))
+    if not isinstance(answer.bed, PileBed):
+        return Decision(scene, answer, None, levels.UNKNOWN, why)
+    pair = pair_of(answer)
+    unmeasured = levels.unmeasured(answer)
+    if unmeasured and unmeasured not in why:
+        why = f"{why}; no error is known for {unmeasured}"
+    return Decision(scene, answer, pair, levels.known(pair, answer), why)
 
 
 def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
@@ -259,67 +140,182 @@ def on_levels(scene: Scene, pair: Pair, why: str) -> Decision:
     return Decision(scene, pair.answer(scene), pair, levels.known(pair, scene), why)
 
 
+@cache
+def written(scene: Scene) -> Scene:
+    """A scene with the method that answers it as it is written, in place of ``auto``."""
+    if scene.protocol.method != "auto":
+        return scene
+    return changed(scene, {"protocol.method": method_of(scene)[0]})
+
+
+@cache
+def method_of(scene: Scene) -> tuple[str, str]:
+    """The method that answers a scene as it is written, and why.
+
+    For ``auto`` that is DEM where it can: not on a lattice of more than `LONG` grains, nor with
+    what DEM does not know. There it is the closed form along the bed, else peeling, else pivots.
+    """
+    method, bed = scene.protocol.method, scene.bed
+    if method != "auto":
+        return method, f"the study asks for the method {method}"
+    unknown = scene.unknown_to_dem
+    if not isinstance(bed, PileBed):
+        if unknown:
+            return "pivot", f"by the closed form: {unknown}"
+        return "dem", "by DEM: a single grain"
+    if is_along(scene):
+        return "local", ALONG
+    if scene.is_turned:
+        return "pivot", f"by pivots: {unknown}"
+    if unknown and bed.width:
+        return "pivot", f"by pivots: {unknown}, peeling no bed in space"
+    if unknown:
+        return "peeling", f"by peeling: {unknown}"
+    if _is_long(scene):
+        return "peeling", f"by peeling: {LONG_BED}"
+    return "dem", "by DEM"
+
+
+def is_along(scene: Scene) -> bool:
+    """Whether the closed form along the bed may answer a pile, which has too many grains for DEM.
+
+    Its rows have to lie along the bed, and each grain has to feel the flow by itself.
+    """
+    if not has_rows_along(scene) or scene.protocol.update:
+        return False
+    return scene.forces.sheltering == "none" and _is_long(scene)
+
+
+@cache
+def _is_long(scene: Scene) -> bool:
+    """Whether it is a lattice of too many grains for DEM."""
+    is_lattice = isinstance(scene.bed, PileBed) and not scene.is_poured
+    return is_lattice and Geometry(scene).length > LONG
+
+
+def _of_grain(scene: Scene, tolerance: float | None) -> Decision:
+    """The decision on a single grain: with a tolerance the closed form, where it is exact."""
+    as_written = as_asked(scene)
+    if tolerance is None or as_written.scene.protocol.method != "dem":
+        return as_written
+    if scene.protocol.waiting_time < LEAST_HELD:
+        return as_asked(scene, "the study asks for a ramp of the flow")
+    if scene.bed.slope_deg > scene.bed.entrainment_angle_deg:
+        return as_asked(scene, "a slope beyond the entrainment angle: the closed form is off")
+    exact = changed(scene, {"protocol.method": "pivot"})
+    return Decision(scene, exact, None, levels.UNKNOWN, EXACT, is_chosen=True)
+
+
+def _why_as_written(scene: Scene, tolerance: float | None) -> str | None:
+    """Why a pile is answered as it is written; None where levels may be chosen for it.
+
+    It is empty where the method says it all.
+    """
+    method = scene.protocol.method
+    if method not in ("auto", "dem"):
+        return ""
+    if method == "auto" and (scene.unknown_to_dem or is_along(scene)):
+        return ""
+    if tolerance is None:
+        if method == "dem":
+            return ""
+        if why := _why_not_by_default(scene):
+            return why
+    # the levels approximate DEM in a held, solved flow
+    if scene.flow.model != _best_model(scene):
+        return f"the study asks for the flow model {scene.flow.model}"
+    if scene.protocol.update:
+        return "no error is known for a bed that changes"
+    if scene.protocol.waiting_time < LEAST_HELD:
+        return "the study asks for a ramp of the flow"
+    if unmeasured := levels.unmeasured(scene):
+        return f"no error is known for {unmeasured}"
+    return None
+
+
+def _why_not_by_default(scene: Scene) -> str:
+    """Why no levels are chosen for a pile where neither method nor tolerance is given."""
+    if scene.is_poured:
+        return "a poured bed"
+    for name, default in NUMBERS.items():
+        if value_of(scene, name) != default:
+            return f"{name} is not its default"
+    if levels.model_class(scene) not in levels.floors():
+        return "the model's own spread on such a bed is not known"
+    return ""
+
+
 def _best_model(scene: Scene) -> str:
     """The flow model of the best levels: over a level bed no flow is solved."""
-    return "flat" if isinstance(scene.bed, PileBed) and scene.bed.is_level else "solve"
-
-
-def _check_group(scene: Scene) -> tuple[float, str, str]:
     assert isinstance(scene.bed, PileBed)
-    return scene.bed.slope_deg, scene.bed.packing, scene.forces.law
+    return "flat" if scene.bed.is_level else "solve"
 
 
-def checks(answers: Mapping[str, Decision], tolerance: float) -> dict[str, Decision]:
-    """The decisions on the piles by DEM that check answers without it, by the scene asked for.
+def _looked_up(scene: Scene, most: float) -> tuple[Pair | None, str]:
+    """The pair of levels that answers a pile with a known error of at most `most`, and why it."""
+    classes = (levels.classes("flow", scene), levels.classes("grains", scene))
+    flows = [level for level in FLOW if level.is_offered and level.takes(scene)]
+    if classes[0] == (levels.LEVEL_BED,):
+        flows = [FLAT]
+    grains = [level for level in GRAINS if level.is_offered and level.takes(scene)]
+    if scene.protocol.method == "auto" and _is_long(scene):
+        grains = [level for level in grains if level.sets["protocol.method"] != "dem"]
+    return _cheapest(tuple(flows), tuple(grains), classes, most)
 
-    Of each group the pile that DEM, as asked, answers in the least time; the tolerance is that of
-    tau_c.
+
+@cache  # a study has thousands of scenes of a few classes
+def _cheapest(
+    flows: Sequence[Level], grains: Sequence[Level], classes: tuple[Names, Names], most: float
+) -> tuple[Pair | None, str]:
+    """The cheapest pair of some levels with a known error of at most `most`, and why it is taken.
+
+    Where there is none, it is the cheapest whose error is below the uncertainty of the reference,
+    or no pair where no error is known.
     """
-    cheapest: dict[object, tuple[float, str]] = {}
-    for asked, answer in answers.items():
-        if answer.is_unchecked:
-            group, member = _check_group(answer.scene), (Pile(answer.asked).case.cost_s, asked)
-            cheapest[group] = min(cheapest.get(group, member), member)
-    made = {}
-    for _, asked in cheapest.values():
-        scene = answers[asked].scene
-        dem = changed(scene, {"protocol.method": "dem", "flow.model": _best_model(scene)})
-        (made[asked],) = decide([dem], tolerance, {dem.id: CHECK}).values()
-    return made
+    pairs = [Pair(*both) for both in itertools.product(flows, grains)]
+    known = {pair: levels.known_of_classes(*pair, *classes) for pair in pairs}
+    pairs = [pair for pair in pairs if math.isfinite(known[pair].total)]
+    if not pairs:
+        return None, "no error is known for such a bed"
+
+    def cost(pair: Pair) -> float:
+        return known[pair].cost_core_s
+
+    within = [pair for pair in pairs if known[pair].total <= most]
+    if within:
+        return min(within, key=cost), "cheapest"
+    # errors below the uncertainty of the reference cannot be ranked, but those of flows can
+    best = min(pairs, key=lambda pair: known[pair].total)
+    exact = GRAINS[-1]
+    flow_error = {pair: levels.known_of_classes(pair.flow, exact, *classes).error for pair in pairs}
+    alike = [
+        pair
+        for pair in pairs
+        if known[pair].error <= known[best].total
+        and flow_error[pair] <= max(most, flow_error[best])
+    ]
+    why = "cheapest whose error is below the uncertainty of the reference: none is"
+    return min(alike, key=cost), why
 
 
-class Comparison(NamedTuple):
-    """An answer without DEM and that of DEM, at one fraction of the pile `asked` for, by its id."""
-
-    asked: str
-    cheap: PileThreshold
-    dem: PileThreshold
-    agree: bool
+def _check_group(scene: Scene) -> tuple[object, ...]:
+    """What the piles have in common of which DEM checks one: slope, force law, known errors."""
+    classes = (levels.scene_class(part, scene) for part in levels.LEVELS)
+    return (scene.bed.slope_deg, scene.forces.law, *classes)
 
 
-def compare(
-    piles: Piles, checking: Piles, tolerance: float, cases: Path, done: Container[str]
-) -> Iterator[Comparison]:
-    """Compare the answers of the piles that DEM checks at each fraction, where both are run.
+def checks(answers: Iterable[Decision]) -> dict[str, Decision]:
+    """The decisions on the piles by DEM that check answers without it, by the id of the asked.
 
-    They agree where the answer without DEM lies in the interval of DEM, widened by the tolerance,
-    or where neither reaches the fraction.
+    Of each group it is the pile that DEM, as the scene is written, answers in the least time.
     """
-    for asked, check in checking.items():
-        both, fractions = (piles[asked], check), piles[asked].scene.protocol.fractions
-        if all(pile.is_run(done) for pile in both):
-            answers = (pile.thresholds(cases, fractions) for pile in both)
-            for cheap, dem in zip(*answers, strict=True):
-                low, high = dem.tau_low * (1 - tolerance), dem.tau_high * (1 + tolerance)
-                neither = math.isnan(cheap.tau) and math.isnan(dem.tau)
-                yield Comparison(asked, cheap, dem, neither or low <= cheap.tau <= high)
-
-
-def overruled(compared: Iterable[Comparison], answers: Mapping[str, Decision]) -> dict[str, Bound]:
-    """For each pile of a group whose check disagrees, the levels that are not good enough."""
-    lost = {_check_group(answers[row.asked].scene) for row in compared if not row.agree}
-    return {
-        asked: Bound(*answer.levels, f"DEM overruled {answer.levels.text}")
-        for asked, answer in answers.items()
-        if answer.levels and answer.is_unchecked and _check_group(answer.scene) in lost
-    }
+    cheapest: dict[object, tuple[float, str, Scene]] = {}
+    for answer in answers:
+        if not answer.is_unchecked:
+            continue
+        dem = changed(answer.asked, {"protocol.method": "dem"})
+        member = (Pile(dem).case.cost_s, answer.asked.id, dem)
+        group = _check_group(answer.asked)
+        cheapest[group] = min(cheapest.get(group, member), member, key=lambda one: one[:2])
+    why = "it checks an answer without DEM"
+    return {asked: as_asked(dem, why) for _, asked, dem in cheapest.values()}

@@ -13,11 +13,11 @@ import numpy as np
 
 from orchestrator.bed.line import BedLine, of_bed
 from orchestrator.errors import InputError
-from orchestrator.fidelity.decision import along_if_long
+from orchestrator.fidelity.decision import is_along, written
 from orchestrator.flow.case import SPEED_HEIGHT
 from orchestrator.flow.model import FlowModel
 from orchestrator.flow.theory import seen_by_the_flow
-from orchestrator.grains.loads import Geometry, has_rows_along
+from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.study.parts import PileBed, UnfitError
@@ -61,7 +61,7 @@ def check(scene: Scene, where: str, *, grains: bool = True) -> None:
     flow over a pile counts.
     """
     with suppress(UnfitError):  # which is told below
-        scene = along_if_long(scene)
+        scene = written(scene)
     for limit in exceeded(scene, grains=grains):
         seen = f"; map “{limit.map}” of `orchestrator stability`" if limit.map else ""
         remedy = limit.remedy + seen
@@ -105,12 +105,7 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     try:
         if (count := Geometry(scene).length) > MOST_GRAINS:
             what = f"{count * scene.grain.diameter:g} m of bed are {count:.0f} grains"
-            remedy = "a range of bed.counted; is a profile in mm?"
-            if has_rows_along(scene):
-                remedy = f'protocol.method = "local", or {remedy}'
-            if scene.is_poured:
-                remedy = "a shorter bed"
-            yield Limit("", "bed", f"{what}, more than {MOST_GRAINS:g}", remedy)
+            yield Limit("", "bed", f"{what}, more than {MOST_GRAINS:g}", _for_long(scene))
             return
         what = _unfit(scene, bed, of_bed(bed))
     except UnfitError as error:
@@ -128,6 +123,15 @@ def _pile(scene: Scene, bed: PileBed) -> Iterator[Limit]:
     if (loaded := scene.forces.loaded_grains) != "exposed":
         what = f"{loaded}: a grain without its force blocks those behind it"
         yield Limit("forced", "forces.loaded_grains", what, "exposed", refused=False)
+
+
+def _for_long(scene: Scene) -> str:
+    """What to do with a pile that has too many grains for its method."""
+    if scene.is_poured:
+        return "a shorter bed"
+    if is_along(scene):
+        return 'protocol.method = "local", or a range of bed.counted; is a profile in mm?'
+    return "a range of bed.counted, or a shorter bed; is a profile in mm?"
 
 
 def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:

@@ -576,7 +576,7 @@ class Pile(Geometry):
 
     @cached_property
     def method(self) -> Method:
-        """How its threshold is found."""
+        """How its threshold is found; the scene's method is not left open (``auto``)."""
         return METHODS[self.scene.protocol.method](self)
 
     @cached_property

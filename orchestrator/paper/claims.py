@@ -79,7 +79,7 @@ def card(judged: Sequence[Judged], has_tolerance: bool, file: str) -> Guest:
     told = ", ".join(f"{counts[verdict]} {word}" for verdict, word in WORDS.items())
     said = f"{len(judged)} claims of the paper: {told}."
     if lacking := counts["no data"]:
-        why = "a tolerance leaves scenes without DEM; `--tolerance 0` judges all"
+        why = "a tolerance leaves scenes without DEM; without one all are judged"
         why = why if has_tolerance else "the study has no scenes for them"
         said += f" {lacking} could not be judged: {why}."
 

@@ -158,11 +158,13 @@ def doubts(results: Results) -> list[str]:
     beyond = piles[piles["frozen_bed"] > FROZEN_BED]
     if len(beyond):
         said.append(caption("frozen", beyond=beyond, count=count, limit=FROZEN_BED))
-    chosen = [d for d in results.plan.decisions.values() if d.by_default]
-    if chosen:
+    chosen = [each for each in results.plan.decisions.values() if each.is_chosen]
+    if chosen and results.study.tolerance is None:
         names = ", ".join(dict.fromkeys(item.levels.text for item in chosen if item.levels))
         error, floor = max(item.known.total for item in chosen), min(fidelity.floors().values())
         said.append(caption("defaults", names=names, error=error, floor=floor))
+    if "check" in results.tables:
+        said.append(caption("checked", checks=results.tables["check"]))
     rows, tolerance = piles.dropna(subset=["shields", "shields_model_low"]), results.study.tolerance
     if tolerance and len(rows):
         low = 1 - rows["shields_model_low"] / rows["shields"]

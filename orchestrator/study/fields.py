@@ -64,6 +64,7 @@ def _of_piles(condition: Callable[[Scene, PileBed], Any]) -> Callable[[Scene], b
 
 
 RANDOM = ("disordered", "poured")
+MAYBE_DEM = ("dem", "auto")
 APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "every scene": lambda scene: True,
     "single grains": lambda scene: not isinstance(scene.bed, PileBed),
@@ -75,8 +76,8 @@ APPLIES: Mapping[str, Callable[[Scene], bool]] = {
     "poured beds": lambda scene: scene.is_poured,
     "random beds and replicas": _of_piles(lambda _, bed: bed.packing in RANDOM or bed.is_replica),
     "solved flows": _of_piles(lambda scene, bed: scene.flow.model == "solve"),
-    "DEM": lambda scene: scene.protocol.method == "dem",
-    "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method == "dem"),
+    "DEM": lambda scene: scene.protocol.method in MAYBE_DEM,
+    "DEM of piles": _of_piles(lambda scene, bed: scene.protocol.method in MAYBE_DEM),
     "DEM and peeling": lambda scene: scene.protocol.method not in CLOSED,
     "DEM and peeling of piles": _of_piles(lambda scene, bed: scene.protocol.method not in CLOSED),
 }

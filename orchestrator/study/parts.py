@@ -218,12 +218,13 @@ class Forces(Part):
 class Protocol(Part):
     """How the threshold is found; by DEM the flow rises in load steps."""
 
-    method: Literal["dem", "peeling", "pivot", "local"] = field(
-        "dem", label="threshold method", about="answer"
+    method: Literal["auto", "dem", "peeling", "pivot", "local"] = field(
+        "auto", label="threshold method", about="answer"
     )
-    """how the threshold is found: the pivot of each grain by itself, peeling (pivots that free one
-    another), DEM, or the closed form along the bed line, without grains and for any length; it is
-    the default of more than 5000 grains in rows along the bed, with pivots around the first motion
+    """how the threshold is found: DEM, peeling (pivots that free one another), the pivot of each
+    grain by itself, or the closed form along the bed line, without grains and for any length; left
+    open, the program chooses one by known errors and by what each method knows
+    - auto: chosen for the scene
     - dem: DEM
     - peeling: peeling
     - pivot: pivot

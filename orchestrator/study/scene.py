@@ -43,7 +43,7 @@ a roughness length of d/30 are made."""
 Rule = tuple[object, str, str, str]
 """Whether a rule between fields is broken, the field that breaks it, what is wrong, the remedy."""
 CLOSED = ("pivot", "local")  # methods without contacts: nothing that moves changes the bed
-ALONG_ROWS = "local is of rows along the bed, these are level", 'choose the method "peeling"'
+LEFT_OPEN = 'protocol.method = "auto", which takes one that does'
 OUT, POURED = "leave it out", 'leave it out, or bed.packing = "poured"'
 
 
@@ -75,26 +75,18 @@ class Scene(parts.Part):
         size = d / bed.relative_size * parts.extremes(grain.sizes, d)[1]
         what = f"above d, or a third of the bed's grains of {size:g} m"
         yield z0 > ROUGHEST * size * (1 + 1e-9) or z0 >= d, "bed.roughness", what, "typical: d/30"
-        turns = law in LAWS and LAWS[law].turns and method not in CLOSED
-        yield turns, "forces.law", f"{law} turns the grain", 'choose the method "pivot"'
-        packs = self.is_poured or is_balanced
-        is_level = isinstance(bed, PileBed) and bed.packing == "horizontal"
-        yield method == "local" and packs, "protocol.method", "local packs no grains", "pivot does"
-        yield method == "local" and is_level, "protocol.method", *ALONG_ROWS
         is_raised = self.forces.exposure == "protrusion"
         blind = law in LAWS and not LAWS[law].protrudes
         for name, is_asked in {"exposure": is_raised, "sheltering": is_balanced}.items():
             what = f"the law {law} has none"
             yield is_asked and blind, f"forces.{name}", what, 'choose "bridged"'
-        remedy, is_dem = 'protocol.method = "pivot" or "peeling"', method == "dem"
-        yield grain.cohesion and is_dem, "grain.cohesion", "DEM knows none", remedy
-        alone, remedy = is_dem and isinstance(bed, GrainBed), 'protocol.method = "pivot"'
-        yield self.flow.gusts and alone, "flow.gusts", "DEM of single grains knows none", remedy
+        yield from self._rules_of_method()
         width = bed.width if isinstance(bed, PileBed) else 0.0
         poured = {"grain.sizes": grain.sizes, "forces.exposure": is_raised, "bed.width": width}
         for name, value in poured.items():
             yield value and not self.is_poured, name, "it is of poured beds", POURED
-        stiff = self.is_poured and method == "dem" and grain.stiffness > MOST_POURED_STIFFNESS
+        by_dem = method == "dem" or (method == "auto" and not self.unknown_to_dem)
+        stiff = self.is_poured and by_dem and grain.stiffness > MOST_POURED_STIFFNESS
         most = f"at most {MOST_POURED_STIFFNESS:g}"
         yield stiff, "grain.stiffness", "such springs throw poured grains apart", most
         few, least = 0 < update < LEAST_UPDATE, f"0, or at least {LEAST_UPDATE:g}"
@@ -111,6 +103,28 @@ class Scene(parts.Part):
             yield falls, "bed.relative_size", "it falls between its neighbours", "raise it"
             yield update, "protocol.update", "it is of piles", OUT
             yield is_balanced, "forces.sheltering", "a single grain has no neighbours", OUT
+
+    def _rules_of_method(self) -> Iterator[Rule]:
+        """What a method does not know; the method ``auto`` takes one that does."""
+        method, law = self.protocol.method, self.forces.law
+        is_packed = self.is_poured or self.forces.sheltering == "balanced"
+        fails = self.is_turned and self.is_poured
+        what = f"{law} turns the grain, which no method knows on a poured bed"
+        yield fails, "forces.law", what, "choose another law"
+        fails = self.is_turned and self.protocol.update > 0
+        what = f"{law} turns the grain, which no method knows on a bed that changes"
+        yield fails, "protocol.update", what, OUT
+        fails = method == "local" and is_packed
+        yield fails, "protocol.method", "local packs no grains", LEFT_OPEN
+        is_level = isinstance(self.bed, PileBed) and self.bed.packing == "horizontal"
+        fails = method == "local" and is_level
+        yield fails, "protocol.method", "local is of rows along the bed, these are level", LEFT_OPEN
+        fails = self.is_turned and method in ("dem", "peeling")
+        yield fails, "forces.law", f"{law} turns the grain, which {method} does not know", LEFT_OPEN
+        fails = method == "dem" and self.grain.cohesion > 0
+        yield fails, "grain.cohesion", "DEM knows none", LEFT_OPEN
+        fails = method == "dem" and isinstance(self.bed, GrainBed) and self.flow.gusts is not None
+        yield fails, "flow.gusts", "DEM of single grains knows none", LEFT_OPEN
 
     def _rules_of_sizes(self, mixture: parts.Sizes) -> Iterator[Rule]:
         d, slack = self.grain.diameter, OFF_MEDIAN
@@ -185,6 +199,23 @@ class Scene(parts.Part):
     def is_poured(self) -> bool:
         """Whether its bed is poured by LIGGGHTS."""
         return isinstance(self.bed, PileBed) and self.bed.packing == "poured"
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether its force law turns the grain about its centre."""
+        law = self.forces.law
+        return law in LAWS and LAWS[law].turns
+
+    @property
+    def unknown_to_dem(self) -> str:
+        """What of the scene DEM does not know, in words; empty where it knows all."""
+        if self.is_turned:
+            return f"DEM does not know how {self.forces.law} turns the grain"
+        if self.grain.cohesion:
+            return "DEM knows no cohesion"
+        if self.flow.gusts and not isinstance(self.bed, PileBed):
+            return "DEM of single grains knows no gusts"
+        return ""
 
     @property
     def gust(self) -> float:

@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
 from orchestrator.physics import fluids
@@ -31,6 +31,7 @@ from orchestrator.study.source import Source, find
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
+NO_TOLERANCE = 'leave it out; protocol.method = "dem" answers by DEM'
 MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
 GONE_KEYS = {
     "flow.nodes": (
@@ -49,6 +50,14 @@ GONE_VALUES = {
 Table = dict[str, Any]
 Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
+
+
+def _not_zero(tolerance: float | None) -> float | None:
+    """Refuse a tolerance that no levels are within."""
+    if tolerance is not None and tolerance <= 0:
+        what = f"{tolerance:g} is not above 0: no levels are known to be without an error"
+        raise UnfitError("tolerance", what, NO_TOLERANCE)
+    return tolerance
 
 
 class _Tables(Part):
@@ -80,7 +89,7 @@ class _Group(_Tables):
 class _File(_Tables):
     title: str = ""
     time_limit: float = Field(default=TIME_LIMIT_S, gt=0, le=1e8)  # s, at most three years
-    tolerance: float | None = Field(default=None, ge=0, lt=1)
+    tolerance: Annotated[float | None, AfterValidator(_not_zero), Field(lt=1)] = None
     cluster: Table = Field(default={})
     profiles: dict[str, str] = Field(default={})
     erosion: Erosion = Erosion()
@@ -105,7 +114,7 @@ class Study:
     groups: tuple[Group, ...]
     time_limit_s: float  # wall time after which one solver run counts as hung, s
     tolerance: float | None
-    """Relative error that tau_c may have; 0: every scene as it is asked for; None: not given."""
+    """Relative error that tau_c may have; None: not given."""
     cluster: dict[str, Any]  # settings of the queue that runs the cases
     erosion: Erosion  # winds and threshold of `orchestrator erosion`
     text: str  # the file itself, and the texts of the files that it names
@@ -138,9 +147,9 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
         With the file, the field and the remedy.
     """
     path = find(source)
-    if tolerance is not None and not 0 <= tolerance < 1:
-        what = f"{tolerance!r} is not a relative error from 0 to below 1"
-        raise InputError(what, "tolerance", "0.05 allows tau_c to be 5 % off")
+    if tolerance is not None and not 0 < tolerance < 1:
+        what = f"{tolerance!r} is not a relative error above 0 and below 1"
+        raise InputError(what, "tolerance", f"0.05 allows tau_c to be 5 % off; or {NO_TOLERANCE}")
     content = read_bytes(path, MOST_BYTES, str(source))
     text = decoded(content, str(source))
     files = Files(path.parent)

@@ -23,6 +23,7 @@ from orchestrator.runs.files import Folder
 from orchestrator.study import fields
 from orchestrator.study.study import Study
 from orchestrator.tables import rows
+from orchestrator.tables.check import contradictions, with_agreement
 from orchestrator.tables.usable import with_scatter, with_usable
 from orchestrator.types import Row
 
@@ -54,7 +55,7 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
     grains = pd.DataFrame(rows.single_grain(plan, cells, cases))
     thresholds = pd.DataFrame(row for answer in answers for row in rows.pile_threshold(answer))
     thresholds = with_scatter(thresholds, asked)
-    checks = rows.check(plan, study.tolerance, cases, done) if study.tolerance else ()
+    checks = with_agreement(pd.DataFrame(rows.check(plan, cases, done)), thresholds)
     made = {
         "scenes": asked,
         "single_grain": with_usable(grains, asked, study.tolerance),
@@ -62,11 +63,11 @@ def make(study: Study, plan: Plan, cases: Path, done: Container[str]) -> Tables:
         "flow": pd.DataFrame(rows.flow(pile, cases) for pile in flows.values()),
         "pile_grain": _stacked(map(rows.pile_grain, answers)),
         "pile_curve": _stacked(map(rows.pile_curve, answers)),
-        "pile_threshold": with_usable(thresholds, asked, study.tolerance),
+        "pile_threshold": with_usable(thresholds, asked, study.tolerance, contradictions(checks)),
         "size_class": pd.DataFrame(row for one in answers for row in rows.size_class(one)),
         "bed_change": _stacked(rows.bed_changes(answers)),
         "form": pd.DataFrame(row for one in answers for row in rows.forms(one)),
-        "check": pd.DataFrame(checks),
+        "check": checks,
     }
     return {name: table for name, table in made.items() if not table.empty}
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.errors import InputError
-from orchestrator.fidelity import decision, levels, limits
+from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision
 from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import bubble
@@ -180,7 +180,7 @@ class Answer:
         self.motion, self.speed = pile.motion(cases), pile.speed(cases)
         self.row_hold = pile.row_hold(cases)
         self.first, self.checked = pile.first(self.motion), (np.nan, np.nan)
-        if decision.levels and decision.levels.grains is levels.LOCAL and not decision.is_as_asked:
+        if decision.is_along:
             with suppress(InputError, UnfitError):  # where no grains can lie there is no check
                 around = pile.around(self.first[0])
                 self.checked = around.first(around.motion(cases))
@@ -402,22 +402,26 @@ def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
         }
 
 
-def check(plan: Plan, tolerance: float, cases: Path, done: Container[str]) -> Iterator[Row]:
-    """The piles that DEM checked in a study with a tolerance: both answers at each fraction."""
-    both = plan.piles, plan.checks
-    for asked, cheap, dem, agree in decision.compare(*both, tolerance, cases, done):
-        scene, pile = plan.piles[asked].scene, plan.checks[asked]
-        yield {
-            "scene_id": asked,
-            **point(scene),
-            "packing": pile.bed.packing,
-            "fraction": cheap.fraction,
-            **_levels(plan.decisions[asked]),
-            "shields": shields(scene, cheap.tau),
-            "shields_dem": shields(scene, dem.tau),
-            "shields_dem_low": shields(scene, dem.tau_low),
-            "shields_dem_high": shields(scene, dem.tau_high),
-            "difference": cheap.tau / dem.tau - 1,
-            "agree": agree,
-            "case": pile.case.name,
-        }
+def check(plan: Plan, cases: Path, done: Container[str]) -> Iterator[Row]:
+    """The piles that DEM checks, where both answers are run: both at each fraction."""
+    for asked, dem in plan.checks.items():
+        pile = plan.piles[asked]
+        if not (pile.is_run(done) and dem.is_run(done)):
+            continue
+        scene, fractions = pile.scene, pile.scene.protocol.fractions
+        answers = pile.thresholds(cases, fractions)
+        by_dem = dem.thresholds(cases, fractions)
+        for ours, theirs in zip(answers, by_dem, strict=True):
+            yield {
+                "scene_id": asked,
+                **point(scene),
+                "packing": dem.bed.packing,
+                "fraction": ours.fraction,
+                **_levels(plan.decisions[asked]),
+                "shields": shields(scene, ours.tau),
+                "shields_dem": shields(scene, theirs.tau),
+                "shields_dem_low": shields(scene, theirs.tau_low),
+                "shields_dem_high": shields(scene, theirs.tau_high),
+                "difference": ours.tau / theirs.tau - 1,
+                "case": dem.case.name,
+            }

@@ -12,6 +12,7 @@ from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
 from orchestrator.physics.velocity import depth_mean_speed
 from orchestrator.study import fields
+from orchestrator.tables.check import Contradictions
 
 # speed times depth over nu: of a channel its mean speed, of a boundary layer U_e at 10 h
 TURBULENT_FROM = 2000.0
@@ -48,12 +49,17 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     return table.drop(columns=["level", "lifted", "replicas"])
 
 
-def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | None) -> pd.DataFrame:
+def with_usable(
+    table: pd.DataFrame,
+    scenes: pd.DataFrame,
+    tolerance: float | None,
+    contradicted: Contradictions | None = None,
+) -> pd.DataFrame:
     """Add to thresholds of piles or of single grains whether to use them, and what was measured.
 
     The columns are ``usable``, ``why_not`` and those of `beside`. Thresholds are judged at their
     own Re*, by the columns of their `scenes`, and by the tolerance against which the known errors
-    are held.
+    are held, and by what DEM says against them, if it has `contradicted` them.
     """
     if table.empty:
         return table
@@ -72,7 +78,13 @@ def with_usable(table: pd.DataFrame, scenes: pd.DataFrame, tolerance: float | No
         mean = depth_mean_speed(ustar, depth, rows["z0_over_d"] * rows["d_m"], closed=closed)
         layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
         rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
-    texts = ["; ".join(_reasons(row, tolerance)) for row in rows.to_dict("records")]
+    against = contradicted or {}
+    texts = []
+    for row in rows.to_dict("records"):
+        reasons = [*_reasons(row, tolerance)]
+        if said := against.get((row["scene_id"], row.get("fraction", np.nan))):
+            reasons.append(said)
+        texts.append("; ".join(reasons))
     rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
     made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)

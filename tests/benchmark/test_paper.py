@@ -59,7 +59,10 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
     assert len(planned.piles) >= 2
     for pile in planned.piles.values():
         flow, bed = (names[name] for name in (pile.flow.id[:12], pile.scene.id))
-        pair = scenes.flow(flow, pile, results), scenes.bed(bed, "pile", pile, results, tmp_path)
+        pair = (
+            scenes.flow(flow, pile, results),
+            scenes.bed(bed, "pile", pile.scene.id, pile, results, tmp_path),
+        )
         for problem in pair:
             fresh = problem.expected
             stated = expected[expected["scene"] == problem.scene].set_index(fresh.index)

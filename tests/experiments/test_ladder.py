@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator import plan
 from orchestrator.experiments import ladder
-from orchestrator.experiments.experiment import Runs
+from orchestrator.experiments.experiment import Runs, piles
 from orchestrator.experiments.ladder import REFERENCES
 from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
 from orchestrator.study import study
@@ -26,7 +26,7 @@ def test_every_level_is_run_and_each_pile_beside_its_reference() -> None:
     made = [(one.asked, one.levels) for one in ladder.decisions(asked).values() if one.levels]
     for part, levels in enumerate(LEVELS.values()):
         assert {pair[part] for _, pair in made} == set(levels)
-    for scene in asked.scenes:
+    for scene in piles(asked):
         run = {(pair.flow.name, pair.grains.name) for whose, pair in made if whose == scene}
         assert isinstance(scene.bed, PileBed)
         if scene.bed.is_level:  # no flow is solved over it

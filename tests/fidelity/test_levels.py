@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.fidelity import levels
+from orchestrator.fidelity.decision import written
 from orchestrator.fidelity.levels import (
     AS_ASKED,
     FLAT,
@@ -118,14 +119,14 @@ def test_grains_that_lift_takes_off_have_a_class_of_their_own(pile: MakePile) ->
 def test_the_protocol_of_a_study_file_has_the_error_of_a_coarser_level(pile: MakePile) -> None:
     """Poured beds by the default protocol were off by up to 40 %, with an interval of 2 %."""
     bed = {"packing": "poured", "shape": "flat", "slope_deg": 0.0}
-    scene = pile({"flow.model": "flat"}, **bed)
+    scene = written(pile({"flow.model": "flat"}, **bed))
     assert pair_of(scene) == (FLAT, AS_ASKED)
     known = levels.known(pair_of(scene), scene)
     assert known == levels.known(Pair(FLAT, level("grains", "2 layers, fast")), scene)
     assert 0.4 < known.total < 2.0
     # four layers are the default, and of a pile on no level a coarser one was measured
     text = 'grain.diameter = 1e-3\nbed = { kind = "pile", slope_deg = 15.0, packing = "poured" }'
-    (mound,) = study.parse(text, name="mound", where="test").scenes
+    mound = written(study.parse(text, name="mound", where="test").scenes[0])
     assert value_of(mound, "bed.mobile_layers") == 4
     assert levels.known(pair_of(mound), mound).total < 0.5
     finer = changed(scene, {"bed.mobile_layers": 4})

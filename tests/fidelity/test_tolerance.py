@@ -1,4 +1,4 @@
-"""A study with a tolerance on the real solvers: cheap answers, checked by DEM, overruled by it."""
+"""A study with a tolerance on the real solvers: cheap answers, and what DEM says against them."""
 
 from pathlib import Path
 
@@ -54,7 +54,7 @@ def test_cheap_answers_are_checked_by_one_pile_by_dem(tmp_path: Path) -> None:
     assert (answers["shields_low"] <= value / factor).all()
 
 
-def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
+def test_an_answer_that_its_check_contradicts_is_not_usable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # data that call the pivot of each grain good for level rows, which it is not
@@ -66,17 +66,27 @@ def test_a_check_that_disagrees_sends_its_kind_to_a_dearer_level(
     }
     wrong |= {(part, name, f"{like}, limiting slope"): v for (part, name, like), v in wrong.items()}
     monkeypatch.setattr(levels, "measured", lambda: wrong)
-    for cached in (levels.known_of_classes, decision._good_enough):
+    for cached in (levels.known_of_classes, decision._cheapest):
         monkeypatch.setattr(cached.__module__ + "." + cached.__name__, cached.__wrapped__)
     tables = _run("horizontal", tmp_path, BY_HAND)
     answers = tables["pile_threshold"].merge(tables["scenes"][["scene_id", "group", "why"]])
-    by_hand = answers["group"] == "asked for by the pivot"
-    assert "pivot" not in set(answers[~by_hand]["grain_level"])
-    assert answers["shields"].notna().any()
-    assert answers[~by_hand]["why"].str.contains("DEM overruled coarse | pivot", regex=False).all()
-    # what the study itself wants without DEM stays, and is not checked
-    assert set(answers[by_hand]["grain_level"]) == {"pivot"}
-    assert not set(answers[by_hand]["scene_id"]) & set(tables["check"]["scene_id"])
+    check = tables["check"]
+    small = answers[answers["group"] == "small"]
+    # the smaller of the two piles is checked, and every pile keeps its answer
+    assert set(check["scene_id"]) == set(small["scene_id"])
+    assert set(answers["grain_level"]) == {"pivot"}
+    beyond = check["shields_high"] < check["shields_dem_low"]
+    assert beyond.any()
+    assert (check["agree"] != beyond).all()
+    contradicted = small["why_not"].str.contains("DEM of this bed contradicts it")
+    assert contradicted.tolist() == beyond.tolist()
+    assert not small["usable"][contradicted].any()
+    worst = check[beyond].iloc[0]
+    (said,) = small[small["fraction"] == worst["fraction"]]["why_not"]
+    for name in ("shields", "shields_dem"):
+        assert f"{worst[name]:.3g} (" in said
+    others = answers[answers["group"] != "small"]
+    assert not others["why_not"].fillna("").str.contains("contradicts").any()
 
 
 def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
@@ -97,3 +107,16 @@ def test_a_tolerance_out_of_range_is_refused(capsys: pytest.CaptureFixture[str])
     for value in ("1", "-0.1", "nan"):
         assert cli.main(["study", "first-look", "--tolerance", value]) == 2
         assert "tolerance: " in capsys.readouterr().err
+
+
+def test_a_tolerance_of_zero_is_refused_with_what_to_write(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It once meant the opposite of none: every scene by DEM."""
+    file = tmp_path / "one.toml"
+    file.write_text("tolerance = 0\ngrain = { diameter = 1e-3 }\n")
+    for command in (["study", str(file)], ["study", "first-look", "--tolerance", "0"]):
+        assert cli.main(command) == 2
+        said = capsys.readouterr().err
+        assert "tolerance: " in said
+        assert 'protocol.method = "dem"' in said

@@ -15,6 +15,7 @@ import pytest
 from orchestrator import pipeline
 from orchestrator.bed.deck import GrainTable, read_table
 from orchestrator.errors import Exploded, Noisy, SolverError
+from orchestrator.fidelity.decision import written
 from orchestrator.fidelity.levels import changed
 from orchestrator.grains import motion, threshold
 from orchestrator.grains.loads import forces
@@ -79,7 +80,7 @@ def test_a_pile_that_lifts_off_has_moved_and_says_so(tmp_path: Path) -> None:
     assert (thresholds["share_carried_off"] > 0.9).all()
     assert (grains.loc[grains["carried_off"] == 1, "mode"] == "lifted").all()
     # by geometry lift bears the weight normal to the bed before any grain rolls
-    pile, cases = Pile(asked.scenes[0]), tmp_path / "cases"
+    pile, cases = Pile(written(asked.scenes[0])), tmp_path / "cases"
     loads, scene = pile.loads(cases), pile.scene
     lifting, ratio = loads.lifting(loads.alone()), loads.ratio[pile.packing.windward]
     assert (np.isinf(lifting) == (ratio == 0)).all()

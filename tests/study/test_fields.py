@@ -132,7 +132,7 @@ def test_a_row_has_the_scene_that_was_asked_and_the_one_that_answered_it() -> No
     (row,), (scene,) = rows.scenes(asked, planned), asked.scenes
     answer = fields.answered(planned.decisions[scene.id].scene)
     assert {"scene_id": scene.id, **fields.asked(scene), **answer}.items() <= row.items()
-    assert (row["method"], row["answered_method"] == "dem") == ("dem", False)
+    assert (row["method"], row["answered_method"]) == ("auto", "pivot")
     assert {*fields.COLUMNS, *fields.ANSWERS} <= set(COLUMNS)
 
 

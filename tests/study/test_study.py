@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator import plan
 from orchestrator.errors import InputError
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
@@ -80,6 +81,27 @@ AXES = (
     "'bed.slope_deg' = [0, 0.0]\n'grain.diameter' = [1e-3]",
     "'bed.roughness' = ['d/10', 1e-4]\n'grain.diameter' = [1e-3]",
 )
+TURNING = [name for name, law in LAWS.items() if law.turns]
+TURNED = "forces.law = '%s'\n"
+D, BY_DEM = "grain.diameter = 1e-3\n", "protocol.method = 'dem'\n"
+BED = "bed = { kind = 'pile', slope_deg = 15.0 }\n"
+POURED = "bed = { kind = 'pile', slope_deg = 15.0, packing = 'poured' }\n"
+GUSTS = "flow.gusts = { intensity = 0.4, events = 9 }\n"
+COHESION = "grain.cohesion = 1e-3\n"
+TURNS_NOT = [
+    (BY_DEM + D, "forces.law"),
+    ("protocol.method = 'peeling'\n" + D + BED, "forces.law"),
+    (D + POURED, "forces.law"),
+    (D + BED + "protocol.update = 0.1\n", "protocol.update"),
+]
+"""Beginnings of files in which no law may turn the grain, and the field that is refused."""
+DEM_KNOWS_NOT = [
+    (D + GUSTS, "flow.gusts"),
+    (D + COHESION, "grain.cohesion"),
+    (D + BED + COHESION, "grain.cohesion"),
+    *((D + TURNED % law, "forces.law") for law in TURNING),
+]
+"""Files that are refused by DEM alone, and the field."""
 BAD = [
     ("[grain\n", "", "TOML"),
     ("grain = 3\n", "grain", "table"),
@@ -95,7 +117,7 @@ BAD = [
     ("fluid = { kind = 'air', temperature_deg_c = 288 }\n", "fluid.temperature_deg_c", "-80"),
     (GRAIN + "[bed]\nheight = 0.02\n", "bed.height", 'kind = "pile"'),
     (GRAIN + "[forces]\nlaw = 'bridge'\n", "forces.law", "'bridged', "),
-    *((f"{GRAIN}[forces]\nlaw = '{n}'\n", "forces.law", "turns") for n in LAWS if LAWS[n].turns),
+    *((text + TURNED % law, where, "turns") for law in TURNING for text, where in TURNS_NOT),
     ("[protocol]\ngravity = 3.7\n", "protocol.gravity", "did you mean fluid.gravity?"),
     (f"name = 'one'\n{GRAIN}", "name", "known keys"),
     ("gravity = 3.7\n", "gravity", "did you mean fluid.gravity?"),
@@ -109,7 +131,7 @@ BAD = [
     (PILE + FENCE % 1.0, "flow.lid", "2 m is less than 3 heights of the forms or obstacles"),
     (GRAIN + "[flow]\ngusts = { intensity = 0.4 }\n", "flow.gusts.events", "missing"),
     (GRAIN + "[flow]\ngusts = { intensity = 2.0, events = 9 }\n", "flow.gusts.intensity", "1"),
-    (GRAIN + "[flow]\ngusts = { intensity = 0.4, events = 9 }\n", "flow.gusts", "DEM of single"),
+    *((BY_DEM + text, where, 'protocol.method = "auto"') for text, where in DEM_KNOWS_NOT),
     (GRAIN + "[forces]\nsheltering = 'balanced'\n", "forces.sheltering", "no neighbours"),
     (GRAIN + "sizes = { sigma_g = 1.3 }\n", "grain.sizes", "it is of poured beds"),
     ("[axes]\ndiameter = [1e-3]\n", "axes.diameter", "grain.diameter"),
@@ -130,6 +152,22 @@ def test_bad_files_are_refused_with_place_and_reason(text: str, where: str, word
     assert caught.value.where == (f"test.toml: {where}" if where else "test.toml")
     assert word in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("text", "where"), DEM_KNOWS_NOT)
+def test_what_dem_does_not_know_needs_no_method(text: str, where: str) -> None:
+    """The remedy of the refusal works, and so does a file that leaves the method open."""
+    for more in ("", "protocol.method = 'auto'\n"):
+        (decision,) = plan.make(_parse(text + more)).decisions.values()
+        assert decision.scene.protocol.method in ("pivot", "peeling")
+
+
+def test_a_law_that_turns_the_grain_is_answered_on_a_long_bed() -> None:
+    """A dune of 200,000 grains: neither DEM nor pivots could answer it."""
+    text = "grain.diameter = 3e-4\nbed = { kind = 'dune', slope_deg = 5.0, height = 2.0 }\n"
+    for law in TURNING:
+        (decision,) = plan.make(_parse(text + TURNED % law)).decisions.values()
+        assert decision.scene.protocol.method == "local"
 
 
 def test_the_scenes_of_all_groups_together_are_limited() -> None:

@@ -1,0 +1,62 @@
+"""Answers without DEM beside those of DEM: where the two contradict each other."""
+
+import math
+
+import pandas as pd
+
+KEYS = ["scene_id", "fraction"]
+Contradictions = dict[tuple[str, float], str]
+"""By the scene and the fraction, what DEM says against an answer."""
+
+
+def with_agreement(checks: pd.DataFrame, thresholds: pd.DataFrame) -> pd.DataFrame:
+    """Add to the checks by DEM the intervals of the answers, and whether the two overlap.
+
+    Parameters
+    ----------
+    checks
+        A row for each pile and fraction that DEM checks, with ``shields_dem_low`` and
+        ``shields_dem_high``.
+    thresholds
+        The answers, with ``shields_low`` and ``shields_high``. They hold the known error of the
+        levels.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The checks with these two columns and with ``agree``. An end that is not known is open. Two
+        answers agree also where neither reaches the fraction.
+    """
+    if checks.empty:
+        return checks
+    ends = ["shields_low", "shields_high"]
+    answers = thresholds[[*KEYS, *ends]].drop_duplicates(KEYS)
+    table = checks.merge(answers, on=KEYS, how="left", validate="many_to_one")
+    lower = table[["shields_low", "shields_dem_low"]].fillna(0.0).max(axis=1)
+    upper = table[["shields_high", "shields_dem_high"]].fillna(float("inf")).min(axis=1)
+    reached, reached_by_dem = table["shields"].notna(), table["shields_dem"].notna()
+    overlap = (lower <= upper) & reached & reached_by_dem
+    neither = ~reached & ~reached_by_dem
+    return table.assign(agree=overlap | neither)
+
+
+def contradictions(checks: pd.DataFrame) -> Contradictions:
+    """What DEM says against each answer that it contradicts."""
+    if checks.empty:
+        return {}
+    found: Contradictions = {}
+    for row in checks[~checks["agree"]].to_dict("records"):
+        here = _told(row["shields"], row["shields_low"], row["shields_high"])
+        dem = _told(row["shields_dem"], row["shields_dem_low"], row["shields_dem_high"])
+        found[row["scene_id"], row["fraction"]] = (
+            f"DEM of this bed contradicts it: it has {dem}, this has {here}"
+        )
+    return found
+
+
+def _told(value: float, low: float, high: float) -> str:
+    """A Shields number with its interval, in words."""
+    if math.isnan(value):
+        return "not reached the fraction"
+    ends = ["open" if math.isnan(end) else f"{end:.3g}" for end in (low, high)]
+    return f"{value:.3g} ({ends[0]} … {ends[1]})"
