@@ -129,21 +129,23 @@ function set_velocity_on(patch,    values, i, face) {
 }
 
 # Find the ends of a face in x and z, and its centre.
-function measure_face(face,    at, one, other, i) {
+function measure_face(face,    at, one, other, i, away, farthest) {
     split(corners[face], at, between)
     split(points[at[2]], one, between)
-    # of the other corners one has the same x and z
-    for (i = 3; i <= 5; i++) {
-        split(points[at[i]], other, between)
-        if (other[2] != one[2] || other[4] != one[4])
-            break
-    }
     x1[face] = one[2]
     z1[face] = one[4]
-    x2[face] = other[2]
-    z2[face] = other[4]
-    face_x[face] = (one[2] + other[2]) / 2
-    face_z[face] = (one[4] + other[4]) / 2
+    # of the other corners one is beside the first, and two are at the other end
+    for (i = 3; i <= 5; i++) {
+        split(points[at[i]], other, between)
+        away = (other[2] - one[2]) ^ 2 + (other[4] - one[4]) ^ 2
+        if (away > farthest) {
+            farthest = away
+            x2[face] = other[2]
+            z2[face] = other[4]
+        }
+    }
+    face_x[face] = (x1[face] + x2[face]) / 2
+    face_z[face] = (z1[face] + z2[face]) / 2
 }
 
 # Find the area of a cell and its centre, from triangles about the mean of its sides.
