@@ -373,12 +373,17 @@ def forms(answer: Answer) -> Iterator[Row]:
 
 
 def bed_changes(answers: Sequence[Answer]) -> Iterator[Row]:
-    """Columns of thresholds, by grain, of the piles asked for on a changing and a frozen bed."""
-    frozen = {each.scene_id: each for each in answers if not each.pile.scene.protocol.update}
+    """Columns of thresholds, by grain, of the piles answered on a changing and a frozen bed.
+
+    The two are answered alike in all else, by one method on one mesh.
+    """
+    frozen = {each.pile.scene.id: each for each in answers}
     for answer in answers:
         scene, count = answer.pile.scene, answer.motion.count
-        twin = frozen.get(changed(answer.decision.asked, {"protocol.update": 0.0}).id)
-        if not scene.protocol.update or twin is None:
+        if not scene.protocol.update:
+            continue
+        twin = frozen.get(changed(scene, {"protocol.update": 0.0}).id)
+        if twin is None:
             continue
         moved = np.arange(1, ceil(max(scene.protocol.fractions) * count - 1e-9) + 1)
         at = ([each.at(n / count) for n in moved.tolist()] for each in (answer, twin))

@@ -110,6 +110,8 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if row["standing_out"] < EXPOSED_FROM:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
     if "share_carried_off" not in row:
+        if isinstance(row.get("gusts"), str):
+            yield "the error of the closed form under gusts is not known"
         return
     flow, error = row["flow_reynolds"], row["error_estimate"]
     if flow < TURBULENT_FROM:

@@ -89,6 +89,43 @@ def test_an_answer_that_its_check_contradicts_is_not_usable(
     assert not others["why_not"].fillna("").str.contains("contradicts").any()
 
 
+def test_a_run_on_chosen_levels_that_fails_names_the_next_step(tmp_path: Path) -> None:
+    """No solver ends within a hundredth of a second; nothing else is run in its place."""
+    text = """
+        time_limit = 0.01
+        grain = { diameter = 1e-3 }
+        bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
+    """
+    for method, is_advised in (("auto", True), ("dem", False)):
+        asked = study.parse(f'{text}protocol.method = "{method}"', name="slow", where="slow")
+        finished = pipeline.run(asked, tmp_path / method, workers=1)
+        (flow,) = (name for name in finished.failures if name.startswith("flow-"))
+        said = str(finished.failures[flow])
+        assert ("did not end within 0.01 s" in said, "time_limit" in said) == (True, True)
+        assert ('protocol.method = "dem"' in said) == is_advised
+        assert len(list((tmp_path / method / "cases").glob("flow-*"))) == 1
+
+
+def test_gusts_have_no_known_error(tmp_path: Path) -> None:
+    text = """
+        grain = { diameter = 1e-3 }
+        flow.gusts = { intensity = 0.4, events = 100 }
+        [[group]]
+        [[group]]
+        bed = { kind = "pile", slope_deg = 15.0, height = 0.01 }
+        flow = { model = "waves", gusts = { intensity = 0.4, events = 100 } }
+        protocol.method = "pivot"
+    """
+    asked = study.parse(text, name="gusts", where="gusts")
+    pipeline.run(asked, tmp_path, workers=1)
+    for name in ("single_grain", "pile_threshold"):
+        rows = pd.read_csv(tmp_path / "tables" / f"{name}.csv")
+        assert not rows["usable"].any()
+        assert rows["why_not"].str.contains("the error of .* is not known").all()
+        if name == "pile_threshold":
+            assert rows[["shields_low", "shields_high"]].isna().all(axis=None)
+
+
 def test_a_tolerance_of_the_command_line_is_kept_for_the_next_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
