@@ -52,8 +52,8 @@ def intervals(rows: pd.DataFrame, strip: Scene) -> pd.DataFrame:
         gusts = {"intensity": INTENSITY, "events": EVENTS} if model.gust > 1 else None
         scene = changed(strip, {**model.fields, "forces.law": law, "flow.gusts": gusts})
         part = flumes[flumes["model"] == model.name]
-        asked = {**columns.asked(scene), "answered_method": "pivot", "fraction": MOVED}
-        answers[kind_of(asked)] = part["value"].to_numpy(float)
+        row = {**columns.asked(scene), **columns.answered(scene), "fraction": MOVED}
+        answers[kind_of(row)] = part["value"].to_numpy(float)
     made = []
     for kind, value in answers.items():
         over_model = beds["measured"] / value

@@ -14,6 +14,7 @@ from orchestrator.grains import cells
 from orchestrator.grains.cells import DENSITY, DIAMETER, GRAVITY
 from orchestrator.grains.loads import forces
 from orchestrator.grains.pile import MARGIN, Pile
+from orchestrator.grains.threshold import PileThreshold
 from orchestrator.study import closed_form as study_form
 from orchestrator.study import fields
 from orchestrator.study.parts import Grain
@@ -289,7 +290,13 @@ def _threshold(
     slowest, fastest = ustar0[max(step - 2, 0)], ustar0[min(step + 1, len(ustar0) - 1)]
     (ours,) = pile.thresholds(cases, [fraction])
     unit, seeds = shields / ours.tau, np.nan_to_num(row["scatter"])
-    low, high = ours.tau_low * unit * (1 - seeds), ours.tau_high * unit * (1 + seeds)
+    last = float(curve["shields"].iloc[-1])
+
+    def upper(at: PileThreshold) -> float:
+        """The upper end of an interval; the load steps of the pack end where it is open."""
+        return last if np.isnan(at.tau_high) else at.tau_high * unit
+
+    low, high = ours.tau_low * unit * (1 - seeds), upper(ours) * (1 + seeds)
     if not pile.bed.is_triangle or pile.pouring:
         # Grains of a poured bed go by chance, and those of a train by turns: n/N stands still for
         # some load steps and leaps in the next. The interval also holds the thresholds of our run
@@ -297,7 +304,7 @@ def _threshold(
         most = float(curve["moved"].iloc[-1] / curve["count"].iloc[-1])
         places = max(fraction - part, 1e-9), min(fraction + part, most)
         fewer, more = pile.thresholds(cases, places)
-        low, high = min(low, fewer.tau_low * unit), max(high, more.tau_high * unit)
+        low, high = min(low, fewer.tau_low * unit), max(high, upper(more))
         slowest, fastest = min(slowest, fewer.ustar0), max(fastest, more.ustar0)
     return [
         expectation("shields", shields, tolerance, fraction, low, high),

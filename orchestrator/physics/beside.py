@@ -27,10 +27,15 @@ TESTED = tuple(f"tested_{name}" for name in ("low", "high", "rows", "held"))
 """Columns of what was measured at the Re*, and of the interval; `tables/columns.csv` tells them."""
 OF_KIND = (
     *("alpha_s", "cohesion_n_m", "alpha_deg", "relative_size", "rho_f_kg_m3", "force_law", "d_m"),
-    *("z0_m", "bed", "beta_deg", "bed_shape", "profile", "obstacles", "width", "answered_method"),
-    *("sizes", "exposure", "sheltering", "fraction", "gusts"),
+    *("z0_m", "bed", "beta_deg", "bed_shape", "profile", "obstacles", "answered_width", "sizes"),
+    *("answered_method", "exposure", "sheltering", "fraction", "gusts", "phi_deg", "poured_depth"),
+    *("answered_mobile_layers", "counted", "loaded_grains", "length", "h_m"),
 )
 """Columns that the kind of a threshold follows from."""
+LENGTHS = ("d_m", "length", "h_m")
+"""Those of them that are lengths, of which the ratios to z0 alone matter."""
+LEAST_LENGTH = 20.0
+"""Length of the strips whose intervals were found, d: shorter ones have too few grains."""
 
 
 def beside(table: Any) -> dict[str, FloatArray]:
@@ -48,15 +53,26 @@ def beside(table: Any) -> dict[str, FloatArray]:
     near = (re > 4.4) & (re < 27) & (rho_s / rho > 1085) & (rho_s / rho < 4580)
     ends = (float(np.median(FIELD)), min(FIELD), max(FIELD), float(len(FIELD)))
     rows = np.where(is_gas[..., None], np.where(near[..., None], ends, none), flumes)
-    given = {name: np.asarray(table[name]).tolist() for name in OF_KIND if name in table}
-    # rows of one kind are alike but for d, of which it has three digits of d/z0
-    parts = (d / np.asarray(table["z0_m"], float)).tolist()
-    given |= {"d_m": [float(f"{part:.3g}") for part in parts], "z0_m": [1.0] * len(parts)}
-    keys = [*zip(*([x if x == x else np.nan for x in c] for c in given.values()), strict=True)]
-    kinds = {key: kind_of(dict(zip(given, key, strict=True))) for key in {*keys}}
-    held = np.array(list(map(interval, map(kinds.__getitem__, keys), re.tolist())), float).T
+    kinds = _kinds(table)
+    held = np.array(list(map(interval, kinds, re.tolist())), float).T
     held[:2] *= theta
     return dict(zip((*MEASURED, *TESTED), [curve, *rows.T, *held], strict=True))
+
+
+def _kinds(table: Any) -> list[str]:
+    """The kind of each row of a table; thousands of rows have few."""
+    given = {name: np.asarray(table[name]).tolist() for name in OF_KIND if name in table}
+    z0 = np.asarray(table["z0_m"], float)
+    for name in LENGTHS:
+        if name in table:
+            ratio = (np.asarray(table[name], float) / z0).tolist()
+            given[name] = [float(f"{value:.3g}") for value in ratio]
+    given["z0_m"] = [1.0] * len(z0)
+    # one NaN for all: others are not equal to each other
+    columns = ([x if x == x else None for x in column] for column in given.values())
+    keys = [*zip(*columns, strict=True)]
+    kinds = {key: kind_of(dict(zip(given, key, strict=True))) for key in {*keys}}
+    return [kinds[key] for key in keys]
 
 
 def kind_of(row: Mapping[str, Any]) -> str:
@@ -65,24 +81,39 @@ def kind_of(row: Mapping[str, Any]) -> str:
     Of single grains, and of strips of sand by the pivots at a fraction of their grains; there are
     none on slopes, and in a gas three, too few.
     """
-    unusual = row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"] or row["alpha_deg"] > 1
-    unusual = unusual or str(row.get("relative_size")) not in ("1.0", "nan", "None")
-    if unusual or row["rho_f_kg_m3"] < GAS_BELOW:
+    if row["alpha_s"] != LIFT_COEFFICIENT or row["cohesion_n_m"] or row["alpha_deg"] > 1:
+        return ""
+    if row["rho_f_kg_m3"] < GAS_BELOW or row.get("relative_size") not in (1.0, None):
         return ""
     words = [row["force_law"], f"z0 d/{row['d_m'] / row['z0_m']:.3g}"]
     if row.get("bed", "grain") == "grain":
         words += ["grain", f"beta {row['beta_deg']:g}"]
-    else:
-        # a profile or obstacles have a text
-        is_level = row["bed_shape"] == "flat" and str not in map(
-            type, (row["profile"], row["obstacles"])
-        )
-        if not (is_level and (row["width"] or 0) > 0 and row["answered_method"] == "pivot"):
-            return ""
-        words += ["strip", str(row["sizes"]), row["exposure"], row["sheltering"]]
+    elif _is_strip(row):
+        words += ["strip", f"phi {row['phi_deg']:g}", f"{row['poured_depth']:g} d deep"]
+        words += [f"{row['answered_width']:g} d wide", f"{row['answered_mobile_layers']:g} layers"]
+        words += [str(row["sizes"]), row["exposure"], row["sheltering"]]
         words += [f"n/N {row['fraction']:g}"]
+    else:
+        return ""
     gusts = row.get("gusts")
-    return ", ".join([*words, f"gusts {gusts}"] if isinstance(gusts, str) else words)
+    if isinstance(gusts, str):
+        words.append(f"gusts {gusts}")
+    return ", ".join(words)
+
+
+def _is_strip(row: Mapping[str, Any]) -> bool:
+    """Whether a bed is a level strip as those that were tested, all of whose grains count."""
+    # a profile and obstacles have a text
+    if row["bed_shape"] != "flat" or row["profile"] or row["obstacles"]:
+        return False
+    if row["counted"] not in (None, "all"):
+        return False
+    if not row["answered_width"] or row["answered_method"] != "pivot":
+        return False
+    if row["loaded_grains"] != "exposed":
+        return False
+    length = row["length"] or 4 * row["h_m"]
+    return bool(length / row["d_m"] > LEAST_LENGTH * (1 - 1e-2))
 
 
 def interval(kind: str, reynolds: float) -> list[float]:

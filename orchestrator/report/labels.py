@@ -5,6 +5,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from orchestrator.study import fields
@@ -71,6 +72,18 @@ def amount(value: float, unit: str) -> str:
         return f"{value:.4g} m"
     factor, written = {"m": (1e3, " mm"), "%": (100.0, " %"), "°": (1.0, "°")}.get(unit, (0.0, ""))
     return f"{factor * value:.4g}{written}" if factor else f"{value:g} {unit}".rstrip()
+
+
+def interval(low: float, high: float, form: str = "#.3g") -> str:
+    """An interval as a text; one with an end that is not known (NaN, infinite) is open there."""
+    ends = [format(float(end), form) for end in (low, high) if np.isfinite(end)]
+    if len(ends) == 2:
+        return " … ".join(dict.fromkeys(ends))
+    if np.isfinite(low):
+        return f"above {ends[0]}"
+    if np.isfinite(high):
+        return f"below {ends[0]}"
+    return "—"
 
 
 def ratio_of(ratio: float, length: str) -> str:

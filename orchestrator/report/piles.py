@@ -177,6 +177,8 @@ def _hiding(rows: pd.DataFrame) -> Figure:
     axes = "dᵢ/d₅₀", "$τ_c$ of the size over that of d₅₀"
     (sheet,) = shields.sheets(rows, ["answered_method"], 2.7, *axes, columns=3)
     colours = style.palette("fraction", sorted(set(rows["fraction"])))
+    known = rows[["hiding", "hiding_low", "hiding_high"]].to_numpy(float)
+    known = known[np.isfinite(known) & (known > 0)]
     for ax, part in zip(sheet.panels()[1], sheet.parts, strict=True):
         part = part[part["hiding"] > 0]
         sizes = part["size_over_d"]
@@ -184,7 +186,9 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         for (fraction,), group in split(part, "fraction"):
             logs = group[["size_over_d", "hiding"]].map(np.log).groupby(number[group.index])
             mean, ends = np.exp(logs.mean()), group.groupby(number[group.index])
-            low, high = ends["hiding_low"].min(), ends["hiding_high"].max()
+            # an end that is not known is beyond the frame
+            low = ends["hiding_low"].min(skipna=False).fillna(0.0)
+            high = ends["hiding_high"].max(skipna=False).fillna(shields.BEYOND)
             reach = [mean["hiding"] - low, high - mean["hiding"]]
             look: Look = {"marker": "o", "ms": 4, "lw": 0.8, "capsize": 2}
             look["color"] = colours[float(str(fraction))]
@@ -194,7 +198,7 @@ def _hiding(rows: pd.DataFrame) -> Figure:
         ratio = np.geomspace(min(sizes.min(), 0.5), max(sizes.max(), 2), 99)
         for label, formula, dash in HIDING:
             ax.plot(ratio, formula(ratio), color="0.3", ls=dash, lw=1, label=label)
-        ax.set(xscale="log", yscale="log")
+        ax.set(xscale="log", yscale="log", ylim=(known.min() / 1.5, 1.5 * known.max()))
         style.plain_ticks(ax.xaxis)
         style.plain_ticks(ax.yaxis)
     canvas = shields.legends(sheet, "fraction", colours)

@@ -55,6 +55,7 @@ SHOWN = ("alpha_deg", "z0_over_d", "d_m", "nu_m2_s", "force_law")
 SERIES = ("nu_m2_s", "force_law", "regime", SHAPE)
 """Columns in which piles agree that a line joins."""
 GAP = np.full((1, 2), np.nan)
+BEYOND = 1e6  # a place above every frame, over the lower end of a bar
 """A point that interrupts a line."""
 AXES = labels.RE_AXIS, labels.TAU_AXIS
 DEM = ("reynolds", "shields_dem", "shields_dem_low", "shields_dem_high")
@@ -295,7 +296,11 @@ def draw_points(
 
 
 def _draw_intervals(ax: Axes, x: Any, low: Any, high: Any, colour: str, size: float) -> None:
-    """Bars with caps, as one line with gaps: by themselves they take three times as long."""
+    """Bars with caps, as one line with gaps: by themselves they take three times as long.
+
+    A bar without an upper end leaves the frame.
+    """
+    high = np.where(np.isnan(high), BEYOND * low, high)
     ends = np.column_stack([low, high, np.full_like(low, np.nan)]).ravel()
     bar: Look = {"color": colour, "lw": 0.8, "solid_capstyle": "butt", "alpha": 0.5}
     caps: Look = {"marker": "_", "ms": size + 0.8, "mew": 0.7}
@@ -477,8 +482,8 @@ def _texts(row: pd.Series, columns: Sequence[str], telling: Sequence[str]) -> li
     """What the page says of a point: its scene, its threshold, why it is not usable, its case."""
     value, low, high = (row[name] for name in columns[1:])
     threshold = f"τ_c = {value:.4g}"
-    if pd.notna(low):
-        threshold += f" ({low:.4g} … {high:.4g})"
+    if pd.notna(low) or pd.notna(high):
+        threshold += f" ({labels.interval(low, high, '.4g')})"
     if "fraction" in row:
         threshold += f" at n/N = {row['fraction']:.0%}"
     ustar = row["ustar0_m_s"] if "ustar0_m_s" in row else row["ustar_m_s"]

@@ -203,6 +203,7 @@ def sizes(results: Results) -> pd.DataFrame | None:
     number = np.rint(np.log(size) / np.log(STEP))
     stress = rows[["hiding", "hiding_wilcock_crowe"]].mul(size, axis=0)
     rows = rows.assign(size=1e3 * size * rows["d_m"], **stress)
+    rows = _open_ended(rows, "shields_own_low", "shields_own_high")
     groups = rows.groupby([*(rows[key] for key in keys), number], dropna=False, sort=False)
     low, high = groups.min(numeric_only=True), groups.max(numeric_only=True)
     spans = {
@@ -213,14 +214,30 @@ def sizes(results: Results) -> pd.DataFrame | None:
         "interval of θ": ["shields_own_low", "shields_own_high"],
     }
     told = pd.DataFrame(labels.cells(groups.first()[[]].reset_index(), keys))
+    moved = [
+        labels.interval(100 * least, 100 * most, ".0f")
+        for least, most in zip(low["class_moved_low"], high["class_moved_high"], strict=True)
+    ]
     table = {
         **told.mask(told.eq(told.shift()).all(axis=1), ""),  # a bed is named once
         "size, mm": [f"{size:.3g}" for size in groups["size"].mean()],
         **_spans(low, high, spans),
+        "part that had moved, %": moved,
     }
     counts = zip(_ranges(low["count"], high["count"], "g"), groups["few"].any(), strict=True)
     grains = [f"{n}: under ten" if few else n for n, few in counts]
     return pd.DataFrame({**table, "exposed grains of a bed": grains})
+
+
+def _open_ended(rows: pd.DataFrame, low: str, high: str) -> pd.DataFrame:
+    """Rows in which an end that only the other column of an interval has is infinite.
+
+    The least and the largest end of several intervals, of which one is open, are then open as well.
+    """
+    is_open = rows[low].isna() != rows[high].isna()
+    ends = {low: rows[low].mask(is_open & rows[low].isna(), -np.inf)}
+    ends[high] = rows[high].mask(is_open & rows[high].isna(), np.inf)
+    return rows.assign(**ends)
 
 
 def piles(results: Results) -> pd.DataFrame | None:
@@ -255,6 +272,7 @@ def _thresholds(
     if ranges:  # fluids are never merged
         keys = [*(name for name in ("rho_f_kg_m3", "nu_m2_s") if rows[name].nunique() > 1), *keys]
     rows = rows.sort_values(keys if ranges else ["alpha_deg", "d_m"], kind="stable")
+    rows = _open_ended(rows, "shields_low", "shields_high")
     number = rows.groupby(list(keys), dropna=False, sort=False).ngroup()
     usable, d = (rows[name].groupby(number) for name in ("usable", "d_m"))
     shown = rows[rows["usable"] | ~usable.transform("any")].groupby(number)
@@ -288,8 +306,18 @@ def _thresholds(
 def _spans(
     low: pd.DataFrame, high: pd.DataFrame, spans: Mapping[str, Sequence[str]]
 ) -> dict[str, list[str]]:
-    """Columns of ranges by their heads: from the least of the first to the largest of the last."""
-    return {head: _ranges(low[names[0]], high[names[-1]]) for head, names in spans.items()}
+    """Columns of ranges by their heads: of one column from its least to its largest value.
+
+    Of the two columns of an interval from the least of the first to the largest of the second.
+    """
+    columns = {}
+    for head, names in spans.items():
+        if len(names) == 1:
+            columns[head] = _ranges(low[names[0]], high[names[0]])
+            continue
+        ends = zip(low[names[0]], high[names[1]], strict=True)
+        columns[head] = [labels.interval(least, most) for least, most in ends]
+    return columns
 
 
 def _ranges(low: pd.Series, high: pd.Series, form: str = "#.3g") -> list[str]:

@@ -254,17 +254,16 @@ def pile_curve(answer: Answer) -> Row:
 def pile_threshold(answer: Answer) -> Iterator[Row]:
     """The threshold of a pile at each fraction that its scene asks for.
 
-    The interval holds load steps and count, and at least the known error as a factor both ways, and
-    how far the z0 of the flow is from that of a bed that is not rough; it is empty where no error
-    is known. The model's interval is of the choices that all levels share.
+    The model's interval is of the choices that all levels share.
     """
     pile, motion, asked = answer.pile, answer.motion, answer.decision.asked
     scene, error = pile.scene, answer.decision.error_estimate
     place, pivot = point(scene), pile.pivot_thresholds(answer.speed)
     for fraction in scene.protocol.fractions:
         found, model = answer.at(fraction), levels.spread(asked, fraction)
-        value, factor = shields(scene, found.tau), np.nan if error is None else 1 + error
+        value = shields(scene, found.tau)
         smooth = _smooth_bed(scene, found.ustar0)
+        low, high = _interval(scene, found, error, smooth)
         yield {
             "scene_id": answer.scene_id,
             **place,
@@ -272,10 +271,8 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
             "stress": scene.forces.stress,
             "fraction": fraction,
             "shields": value,
-            "shields_low": np.minimum(shields(scene, found.tau_low), value / factor)
-            * (1 + min(smooth, 0.0)),
-            "shields_high": np.maximum(shields(scene, found.tau_high), value * factor)
-            * (1 + max(smooth, 0.0)),
+            "shields_low": low,
+            "shields_high": high,
             "smooth_bed": smooth,
             "shields_model_low": value * (1 - model.low),
             "shields_model_high": value * (1 + model.high),
@@ -299,6 +296,27 @@ def pile_threshold(answer: Answer) -> Iterator[Row]:
         }
 
 
+def _interval(
+    scene: Scene, found: PileThreshold, error: float | None, smooth: float
+) -> tuple[float, float]:
+    """Ends of the interval of a Shields number; an end that is not known is NaN.
+
+    It holds load steps and count, at least what is within the known error of the level, and how far
+    the z0 of the flow is from that of a bed that is not rough (`smooth`). It is not known without
+    a known error.
+    """
+    if error is None:
+        return np.nan, np.nan
+    least, most = threshold.within(found.tau, error)
+    if np.isnan(found.tau):  # it was not reached: more than the last flow is needed
+        least = found.tau_low / (1 + error)
+    low = float(np.fmin(found.tau_low, least))
+    high = float(np.maximum(found.tau_high, most))
+    low *= 1 + min(smooth, 0.0)
+    high *= 1 + max(smooth, 0.0)
+    return shields(scene, low), shields(scene, high)
+
+
 def _smooth_bed(scene: Scene, ustar0: float) -> float:
     """How far at most tau_c moves, relative, if the flow has the z0 of its bed at the threshold."""
     if scene.flow.model == "flat":
@@ -313,33 +331,40 @@ def _levels(answer: Decision) -> Row:
 
 
 def size_class(answer: Answer) -> Iterator[Row]:
-    """The threshold of each size class of a mixture, where a fraction of its grains has moved."""
+    """The threshold of each size class of a mixture, where a fraction of its grains has moved.
+
+    The stress at d50, over which those of the classes are, lies between the two classes beside it.
+    """
     pile, scene, motion = answer.pile, answer.pile.scene, answer.motion
     if not pile.pouring:
         return
     classes = list(threshold.classes(pile.packing.sizes[pile.packing.windward]))
+    sizes = np.array([each.size for each in classes])
     for fraction in scene.protocol.fractions:
         level = threshold.first_level(motion, fraction)
-        each = {number: answer.at(fraction, chosen) for number, _, chosen in classes}
-        sizes = {number: size for number, size, _ in classes}
-        # the grains of the middle class may lie loose: no ratio to a threshold of zero
-        middle = shields(scene, each[0].tau) / sizes[0] if 0 in each else np.nan
-        for number, size, chosen in classes:
-            at = each[number]
-            own = shields(scene, np.array([at.tau, at.tau_low, at.tau_high])) / size
-            hiding = own / middle if middle > 0 else own * np.nan
+        found = [answer.at(fraction, each.chosen) for each in classes]
+        median = threshold.at_size(1.0, sizes, np.array([at.tau for at in found]))
+        for each, at in zip(classes, found, strict=True):
+            count = int(each.chosen.sum())
+            moved = (np.nan, np.nan, np.nan)
+            if level is not None:
+                of_class = int(motion.moved_by(level)[each.chosen].sum())
+                moved = (of_class / count, *threshold.of_all(of_class, count))
+            taus = np.array([at.tau, at.tau_low, at.tau_high])
+            own = shields(scene, taus) / each.size
+            hiding = taus / median / each.size
             yield {
                 "scene_id": answer.scene_id,
                 "fraction": fraction,
-                "size_over_d": size,
-                "count": int(chosen.sum()),
-                "few": bool(chosen.sum() < FEW),
-                "class_moved": motion.moved_by(level)[chosen].mean() if level else np.nan,
+                "size_over_d": each.size,
+                "count": count,
+                "few": count < FEW,
+                **{f"class_moved{end}": part for end, part in zip(ENDS, moved, strict=True)},
                 "ustar0_m_s": at.ustar0,
                 **{f"shields_own{end}": value for end, value in zip(ENDS, own, strict=True)},
                 **{f"hiding{end}": value for end, value in zip(ENDS, hiding, strict=True)},
-                "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(size) / size),
-                "hiding_egiazaroff": float(measured.egiazaroff_hiding(size)),
+                "hiding_wilcock_crowe": float(measured.wilcock_crowe_hiding(each.size) / each.size),
+                "hiding_egiazaroff": float(measured.egiazaroff_hiding(each.size)),
             }
 
 

@@ -7,21 +7,24 @@ import numpy as np
 import pandas as pd
 
 from orchestrator.flow.case import SPEED_HEIGHT
+from orchestrator.grains.threshold import within
 from orchestrator.physics.beside import beside
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import standing_out, why_not
-from orchestrator.physics.velocity import depth_mean_speed
+from orchestrator.physics.velocity import LAMINAR_BELOW, depth_mean_speed, outer_roughness
 from orchestrator.study import fields
 from orchestrator.tables.check import Contradictions
 
-# speed times depth over nu: of a channel its mean speed, of a boundary layer U_e at 10 h
-TURBULENT_FROM = 2000.0
 EXPOSED_FROM = 0.25  # part of a grain over the tops of its neighbours
 CARRIED_OFF = 0.1  # share of the moved grains from which a threshold is one of lift-off
 ROW_HOLD = 1.05  # u*_0 of the first grain in its row, over that of the grain alone
 KEPT_TO = 0.1  # n/N to which a balance of the whole bed does; at 0.3 theta is 2 to 3.5 times that
-SIMILAR = ["level", "lifted", "alpha_deg", "force_law", "fraction"]
-"""Piles that agree in these scatter alike: level rows or not; lifted grains collide or do not."""
+SIMILAR = ["layout", "lifted", "alpha_deg", "force_law", "fraction"]
+"""Piles that agree in these scatter alike: how their grains lie; whether lifted ones collide."""
+LAYOUTS = {"aligned": "rows along the bed", "disordered": "rows along the bed"}
+"""Packings whose grains lie alike: a lattice scatters as one with small random gaps does."""
+POURED = ["answered_width", "sizes", "poured_depth"]
+"""Columns in which poured beds agree whose grains lie alike."""
 
 
 def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame:
@@ -30,23 +33,38 @@ def with_scatter(thresholds: pd.DataFrame, scenes: pd.DataFrame) -> pd.DataFrame
     Half the range over the seeds, relative to their mean, is computed for each set of piles that
     differ in the seed alone: random gaps, or perturbed replicas of a lattice. A pile gets the
     largest of those that are `SIMILAR`; where the study ran no seeds, none, and its interval stays.
+    The interval then holds the mean, from which a pile may be off by that much; it is open above
+    from 100 %.
     """
     if thresholds.empty:
         return thresholds
     of_scene = scenes.drop_duplicates("scene_id").set_index("scene_id")
     replicas = of_scene.groupby(fields.others(of_scene, "seed"), dropna=False).ngroup()
-    ids, lifted = thresholds["scene_id"], thresholds["share_carried_off"] > 0
-    level = ids.map(of_scene["packing"]) == "horizontal"
-    table = thresholds.assign(level=level, lifted=lifted, replicas=ids.map(replicas))
+    ids = thresholds["scene_id"]
+    table = thresholds.assign(
+        layout=ids.map(_layouts(of_scene)),
+        lifted=thresholds["share_carried_off"] > 0,
+        replicas=ids.map(replicas),
+    )
     groups = table.dropna(subset=["shields"]).groupby([*SIMILAR, "replicas"])["shields"]
     spread = (groups.max() - groups.min()) / 2 / groups.mean()
     # one seed has no range
     largest = spread[groups.count() > 1].rename("scatter").groupby(level=SIMILAR).max()
     table = table.merge(largest.reset_index(), on=SIMILAR, how="left", validate="many_to_one")
-    wider = table["scatter"].fillna(0.0)
-    low, high = table["shields_low"] * (1 - wider).clip(lower=0.0), table["shields_high"]
-    table = table.assign(shields_low=low, shields_high=high * (1 + wider))
-    return table.drop(columns=["level", "lifted", "replicas"])
+    wider = table["scatter"].fillna(0.0).to_numpy()
+    low, _ = within(table["shields_low"].to_numpy(), wider)
+    _, high = within(table["shields_high"].to_numpy(), wider)
+    table = table.assign(shields_low=low, shields_high=high)
+    return table.drop(columns=["layout", "lifted", "replicas"])
+
+
+def _layouts(scenes: pd.DataFrame) -> "pd.Series[str]":
+    """How the grains of each scene lie, by its id: a text that alike scenes share."""
+    layout = scenes["packing"].replace(LAYOUTS)
+    for column in POURED:
+        if column in scenes:
+            layout = layout + ", " + scenes[column].astype(object).astype(str)
+    return layout
 
 
 def with_usable(
@@ -73,11 +91,7 @@ def with_usable(
     for name, part in rows.groupby("force_law"):
         rows.loc[part.index, "law"] = _beyond_law(str(name), part, ustar[part.index])
     rows["standing_out"] = standing_out(rows["relative_size"], rows["beta_deg"])
-    if "u_e_m_s" in rows:
-        depth, closed = rows["depth_m"].astype(float), rows["flow_top"] == "closed channel"
-        mean = depth_mean_speed(ustar, depth, rows["z0_over_d"] * rows["d_m"], closed=closed)
-        layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
-        rows["flow_reynolds"] = (depth * mean).fillna(layer) / rows["nu_m2_s"]
+    rows["flow_reynolds"] = _flow_reynolds(rows)
     against = contradicted or {}
     texts = []
     for row in rows.to_dict("records"):
@@ -88,6 +102,26 @@ def with_usable(
     rows["shields"] = rows.get("shields", rows.get("shields_closed_form"))
     made = {"usable": [not text for text in texts], "why_not": texts, **beside(rows)}
     return pd.concat([table, pd.DataFrame(made, index=table.index)], axis=1)
+
+
+def _flow_reynolds(rows: pd.DataFrame) -> "pd.Series[float]":
+    """Speed times depth over nu of the undisturbed flow at the threshold of each row.
+
+    Of a channel its mean speed over its depth, of a boundary layer over a pile the speed at 10 h.
+    NaN for a single grain in a boundary layer, which has no depth.
+    """
+    nu, depth = rows["nu_m2_s"], rows["depth_m"].astype(float)
+    layer: Any = np.nan
+    if "ustar0_m_s" in rows:
+        ustar0 = rows["ustar0_m_s"]
+        layer = rows["u_e_m_s"] * SPEED_HEIGHT * rows["h_m"]
+    else:
+        by_dem = rows["answered_method"] == "dem"
+        ustar0 = rows["ustar_m_s"].where(by_dem, rows["ustar_closed_form_m_s"])
+    z0 = outer_roughness(rows["z0_over_d"] * rows["d_m"], ustar0, nu)
+    closed = rows["flow_top"] == "closed channel"
+    channel = depth * depth_mean_speed(ustar0, depth, z0, closed=closed)
+    return channel.fillna(layer) / nu
 
 
 def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> list[str]:
@@ -103,19 +137,18 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
     if np.isnan(row["reynolds"]):
-        highest = f"at most {row.get('highest_fraction', 0):.0%} of {row.get('count')} grains"
-        yield f"not reached: {highest if 'count' in row else 'the grain has not'} moved"
+        yield f"not reached: {_reached(row)}"
     elif row["law"]:
         yield row["law"]
     if row["standing_out"] < EXPOSED_FROM:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
+    if (flow := row["flow_reynolds"]) < LAMINAR_BELOW:
+        yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {LAMINAR_BELOW:g}"
     if "share_carried_off" not in row:
         if isinstance(row.get("gusts"), str):
             yield "the error of the closed form under gusts is not known"
         return
-    flow, error = row["flow_reynolds"], row["error_estimate"]
-    if flow < TURBULENT_FROM:
-        yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {TURBULENT_FROM:g}"
+    error = row["error_estimate"]
     if row["share_carried_off"] > CARRIED_OFF:
         yield f"lift carried off {row['share_carried_off']:.0%} of the moved grains"
     is_plane = row.get("packing") == "poured" and not (row.get("answered_width") or 0) > 0
@@ -130,6 +163,32 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"known error {error:.1%} is above the tolerance of {tolerance:.3g}"
     if row["fraction"] * row["count"] < 1 - 1e-9:
         yield f"{row['fraction']:.3g} of {row['count']:.0f} grains is less than one"
+    yield from _open_ends(row)
     if row.get("row_hold", 0.0) > ROW_HOLD:
         times = f"{row['row_hold']:.2g} times the u* of a single one"
         yield f"the row has no end: its neighbours hold the first grain up to {times}"
+
+
+def _reached(row: Mapping[Any, Any]) -> str:
+    """How many grains of a pile have moved by the end, and whether the run was to end there."""
+    if "count" not in row:
+        return "the grain has not moved"
+    highest = row.get("highest_fraction", 0.0)
+    said = f"at most {highest:.0%} of {row['count']} grains moved"
+    last = row.get("answered_final_fraction")
+    if last is not None and highest >= last - 1e-9:
+        said += f", since the run ends at protocol.final_fraction = {last:g} (raise it)"
+    return said
+
+
+def _open_ends(row: Mapping[Any, Any]) -> Iterator[str]:
+    """Why the interval of a threshold that was reached has no upper end; empty if it has one."""
+    low, high = row.get("shields_low", np.nan), row.get("shields_high", np.nan)
+    if np.isnan(low) or not np.isnan(high) or np.isnan(row["shields"]):
+        return
+    if row["error_estimate"] >= 1:
+        yield f"interval open above: the known error is {row['error_estimate']:.0%}"
+    elif row.get("scatter", 0.0) >= 1:
+        yield f"interval open above: the scatter over seeds is {row['scatter']:.0%}"
+    else:
+        yield f"interval open above: {_reached(row)}"

@@ -3,15 +3,20 @@
 import math
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from orchestrator.bed.packing import Packing
+from orchestrator.errors import InputError
 from orchestrator.experiments import validate
+from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics import beside
+from orchestrator.study import fields, study
+from orchestrator.study.scene import Scene
 
 TOOL = Path(__file__).parents[2] / "tools" / "tested.py"
 FLUMES = ("flumes, visual", "flumes, fixed intensity", "flumes, reference transport")
@@ -62,6 +67,60 @@ def test_the_interval_of_a_kind_holds_its_rows_in_flumes() -> None:
     # nothing was measured on slopes, of another angle or with cohesion
     for other in ({"alpha_deg": 5.0}, {"beta_deg": 52.0}, {"cohesion_n_m": 1e-4}):
         assert not beside.interval(beside.kind_of({**grain, **other}), 5.0)[2]
+
+
+SPANNED = {
+    **{"fluid.density": 1025.0, "fluid.viscosity": 2e-6, "fluid.gravity": 3.7},
+    **{"grain.density": 2000.0, "bed.height": 0.5, "bed.length": 0.8},
+    # over a level bed u* is u*_0, whatever is above it; pivots of poured grains know no beta
+    **{"flow.top": "open water", "forces.stress": "eq10", "forces.averaging_length": 0.1},
+    "bed.entrainment_angle_deg": 59.5,
+}
+"""Fields of a strip, and other values of them, that its tested interval spans: its threshold is a
+function of the Galileo number."""
+UNTESTED: dict[str, Any] = {
+    **{"fluid.density": 1.2, "grain.diameter": 0.022, "grain.friction_angle_deg": 10.0},
+    **{"grain.cohesion": 1e-3, "grain.sizes": {"sigma_g": 1.4}, "bed.roughness": 1e-3},
+    **{"bed.poured_depth": 8.0, "bed.width": 12.0, "bed.mobile_layers": 6, "bed.length": 0.2},
+    **{"bed.counted": (0.1, 0.3), "bed.packing": "aligned", "bed.shape": "step down"},
+    **{"bed.slope_deg": 5.0, "flow.gusts": {"intensity": 0.2, "events": 50}, "flow.model": "x"},
+    **{"forces.law": "profile", "forces.lift_coefficient": 1.0},
+    **{"forces.loaded_grains": "all but crest", "forces.sheltering": "balanced"},
+    **{"protocol.method": "dem", "protocol.fractions": (0.3,)},
+}
+"""Other values of the fields of a strip for which none was tested."""
+
+
+def test_an_interval_is_of_strips_that_differ_in_nothing_else_than_the_tested() -> None:
+    (strip, *_) = (scene for scene in study.load("validate").scenes if scene.is_poured)
+
+    def rows(scene: Scene) -> float:
+        row = {**fields.asked(scene), **fields.answered(scene)}
+        row |= {"fraction": scene.protocol.fractions[0]}
+        return beside.interval(beside.kind_of(row), 30.0)[2]
+
+    assert rows(strip) == 80
+    for name, value in SPANNED.items():
+        depth = {"flow.depth": 2.0} if name == "flow.top" else {}
+        assert rows(changed(strip, {name: value, **depth})) == 80, name
+    for name, value in UNTESTED.items():
+        try:
+            other = changed(strip, {name: value})
+        except InputError:  # no strip has such a value
+            continue
+        assert rows(other) == 0, name
+    asked = {
+        field.name
+        for field in fields.FIELDS
+        if field.info.about == "question" and fields.APPLIES[field.info.scope](strip)
+    }
+    # forms of a train, profiles and obstacles are no level beds, depth and lee side are not set
+    others = {f"bed.{name}" for name in ("kind", "forms", "spacing", "profile", "obstacles")}
+    others |= {"bed.lee_slope_deg", "flow.depth", "bed.disorder"}
+    # strips with grains that stand out were tested by themselves
+    others.add("forces.exposure")
+    assert rows(changed(strip, {"forces.exposure": "protrusion"})) == 97
+    assert asked - others <= SPANNED.keys() | UNTESTED.keys()
 
 
 def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> None:

@@ -1,5 +1,6 @@
 """The counting rule on known tracks, thresholds of a known motion, whether a bed rests."""
 
+import itertools
 import math
 import re
 import shutil
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import bdtr
 
 from orchestrator import pipeline
 from orchestrator.bed.deck import GrainTable, read_table
@@ -214,6 +216,68 @@ def test_threshold_of_a_pile_at_a_fraction() -> None:
         assert at.ustar0 == pytest.approx(math.sqrt(1.1))
         taus = np.array([at.tau, at.tau_low, at.tau_high]) / DENSITY
         np.testing.assert_allclose(taus, [1.1 * 2.95, 2.95, high])
+
+
+def test_an_interval_is_open_where_half_a_grain_more_or_less_was_not_reached() -> None:
+    def interval(fraction: float, ends: tuple[float, float] | None = None) -> list[float]:
+        at = threshold.of_pile(MOTION, SPEED, fraction, DENSITY, ends)
+        return [at.tau / DENSITY, at.tau_low / DENSITY, at.tau_high / DENSITY]
+
+    nan = math.nan
+    last = 18.75 / 9
+    # nine of ten have moved by the last flow, 1.3: what half a grain more needs is not known
+    np.testing.assert_allclose(interval(0.9), [1.2 * 1.3 * last, 1.44 * last, nan])
+    # a fraction that was not reached takes more than the last flow
+    np.testing.assert_allclose(interval(1.0), [nan, 1.69 * last, nan])
+    # a sample of which none need have moved has no lower end
+    np.testing.assert_allclose(interval(0.4, (0.0, 0.5)), [1.1 * 2.95, nan, 1.21 * 2.95])
+    # of grains that never move only the highest flow is known, at the mean stress on all of them
+    still = MOTION.of(LEVEL == 0)
+    at = threshold.of_pile(still, SPEED[LEVEL == 0], 0.3, DENSITY, threshold.sampled(0.3, 1))
+    assert math.isnan(at.tau)
+    assert math.isnan(at.tau_high)
+    at = threshold.of_pile(still, SPEED[LEVEL == 0], 0.9, DENSITY, (0.9, 1.0))
+    assert at.tau_low == pytest.approx(DENSITY * 1.69 * 0.25)
+
+
+def test_a_reference_is_within_a_relative_error_of_itself() -> None:
+    for reference, error in itertools.product((0.01, 3.0), (0.0, 0.05, 0.35, 0.67, 0.99)):
+        for value in (reference * (1 - error), reference, reference * (1 + error)):
+            low, high = threshold.within(value, error)
+            assert low * (1 - 1e-12) <= reference <= high * (1 + 1e-12)
+    # a value that is a third too low is two thirds of the reference
+    assert threshold.within(2.0, 1 / 3) == pytest.approx((1.5, 3.0))
+    for error in (1.0, 3.75):
+        low, high = threshold.within(2.0, error)
+        assert low == pytest.approx(2.0 / (1 + error))
+        assert math.isnan(high)
+    assert np.isnan(threshold.within(2.0, math.nan)).all()
+
+
+def test_the_stress_at_the_median_size_lies_between_those_of_the_classes_beside_it() -> None:
+    sizes = np.array([0.4, 0.8, 1.15, 2.3])
+    for power in (-0.5, 0.0, 0.7):
+        assert threshold.at_size(1.0, sizes, 3.0 * sizes**power) == pytest.approx(3.0)
+    # a class as large as the median is its own; the other sizes have no say
+    nan = math.nan
+    exact = threshold.at_size(0.8, sizes, np.array([nan, 5.0, nan, nan]))
+    assert exact == pytest.approx(5.0)
+    assert threshold.at_size(1.0, sizes, np.array([nan, 2.0, 2.0, nan])) == pytest.approx(2.0)
+    # no class beside it, one that has not moved, or one that lies loose
+    assert math.isnan(threshold.at_size(0.3, sizes, sizes))
+    assert math.isnan(threshold.at_size(3.0, sizes, sizes))
+    for unknown in (nan, 0.0):
+        assert math.isnan(threshold.at_size(1.0, sizes, np.array([1.0, unknown, 2.0, 3.0])))
+
+
+def test_a_sample_bounds_the_fraction_that_has_moved() -> None:
+    """The ends of the binomial interval are those at which as much is as unlikely as 10 %."""
+    assert threshold.of_all(0, 2) == pytest.approx((0.0, 1 - math.sqrt(0.1)))
+    assert threshold.of_all(2, 2) == pytest.approx((math.sqrt(0.1), 1.0))
+    for moved, count in ((1, 5), (3, 7), (40, 100)):
+        low, high = threshold.of_all(moved, count)
+        assert 1 - bdtr(moved - 1, count, low) == pytest.approx(0.1)
+        assert bdtr(moved, count, high) == pytest.approx(0.1)
 
 
 def test_grains_that_a_reversed_flow_drives_upstream_count_with_the_size_of_their_stress() -> None:

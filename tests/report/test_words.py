@@ -120,6 +120,41 @@ def test_a_threshold_that_is_not_usable_says_so(results: Results) -> None:
     assert set(sheet["usable"]) == {"no: Re* 2 is below 30"}
 
 
+def test_an_interval_without_an_end_is_written_so(results: Results) -> None:
+    thresholds = results.tables["pile_threshold"]
+    study = changed(results, pile_threshold=thresholds.assign(shields_high=np.nan))
+    sheet = words.short(study)
+    assert sheet is not None
+    lows = [f"above {low:#.3g}" for low in thresholds["shields_low"]]
+    assert sheet["interval"].tolist() == lows
+    (figure,) = shields.draw(study)
+    said = " ".join(text[1] for group in figure.data.values() for text in group)
+    assert all(f"(above {low:.4g})" in said for low in thresholds["shields_low"])
+    # a range of several is open as the widest of them
+    half = thresholds.assign(
+        shields_high=thresholds["shields_high"].where(np.array([True, False] * 2))
+    )
+    ranges = words.short(
+        copies(changed(results, pile_threshold=half), *({"seed": n} for n in (0, 1)))
+    )
+    assert ranges is not None
+    assert [text.startswith("above") for text in ranges["interval"]] == [False, True] * 2
+    # where no error is known neither end is
+    none = thresholds.assign(shields_low=np.nan, shields_high=np.nan)
+    sheet = words.short(changed(results, pile_threshold=none))
+    assert sheet is not None
+    assert set(sheet["interval"]) == {"—"}
+
+
+def test_sizes_of_a_mixture_say_what_so_few_grains_leave_open() -> None:
+    ends = {"shields_own_low": [0.02, np.nan, np.nan], "shields_own_high": [0.04, 0.05, np.nan]}
+    assert [
+        labels.interval(low, high, ".2g") for low, high in zip(*ends.values(), strict=True)
+    ] == ["0.02 … 0.04", "below 0.05", "—"]
+    assert labels.interval(0.02, np.inf, ".2g") == "above 0.02"
+    assert labels.interval(0.0391, 0.0392, ".2g") == "0.039"
+
+
 def test_every_point_says_its_scene_interval_and_case(results: Results) -> None:
     (figure,) = shields.draw(results)
     assert figure.canvas is not None

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
+from orchestrator.physics.velocity import measurable_speeds
 from orchestrator.study import study
 from orchestrator.tables.usable import with_scatter, with_usable
 
@@ -16,12 +17,14 @@ SOUND = {
     **{"scene_id": "a", "alpha_deg": 15.0, "d_m": 1e-3, "z0_over_d": 1 / 30, "nu_m2_s": 1e-5},
     **{"force_law": "bridged", "reynolds": 60.0, "shields": 0.05, "fraction": 0.3, "count": 65},
     **{"highest_fraction": 0.8, "share_carried_off": 0.0, "error_estimate": 0.03, "u_e_m_s": 10.0},
+    **{"shields_low": 0.048, "shields_high": 0.052, "ustar0_m_s": 0.6},
 }
 SCENE = {
     **{"scene_id": "a", "rho_f_kg_m3": 1.0, "alpha_s": 1.0, "h_m": 0.02},
     **{"flow_top": "boundary layer", "depth_m": None, "relative_size": 1.0, "beta_deg": 60.0},
     **{"rho_sol_kg_m3": 2500.0, "g_m_s2": 9.81, "z0_m": 3e-5},
 }
+STOPPED = {"answered_final_fraction": 0.8}
 UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
 
 
@@ -42,6 +45,11 @@ UNREACHED = {"reynolds": NAN, "shields": NAN, "share_carried_off": NAN}
         (None, {"error_estimate": NAN}, ["is not known"]),
         (0.02, {}, ["known error 3.0% is above the tolerance of 0.02"]),
         (None, UNREACHED, ["not reached: at most 80% of 65 grains moved"]),
+        (None, {**UNREACHED, **STOPPED}, ["moved, since the run ends at protocol.final_fraction"]),
+        (None, {"shields_high": NAN}, ["interval open above: at most 80% of 65 grains moved"]),
+        (None, {"shields_high": NAN, **STOPPED}, ["final_fraction = 0.8 (raise it)"]),
+        (None, {"shields_high": NAN, "error_estimate": 3.75}, ["above: the known error is 375%"]),
+        (None, {"shields_high": NAN, "scatter": 1.2}, ["above: the scatter over seeds is 120%"]),
     ],
 )
 def test_reasons_against_a_sound_threshold_with_some_changes(
@@ -93,6 +101,29 @@ def test_thresholds_beyond_the_model(tmp_path: Path, text: str, reason: str, app
     assert has_reason.eq(applies).all()
 
 
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_a_channel_is_laminar_by_its_flow_where_it_has_no_mean_velocity(
+    closed: bool, factor: float
+) -> None:
+    """However much larger the stress on the grains that have moved is than that of the flow."""
+    nu, depth, z0 = 1e-5, 0.04, 3e-5
+    ustar0 = np.geomspace(0.005, 0.1, 40)
+    channel = {"flow_top": "closed channel" if closed else "open water", "depth_m": depth}
+    rows = [
+        {**SOUND, "scene_id": str(n), "nu_m2_s": nu, "ustar0_m_s": u, "reynolds": factor * u * 100}
+        for n, u in enumerate(ustar0)
+    ]
+    scenes = [{**SCENE, **channel, "scene_id": str(n), "z0_m": z0} for n in range(len(rows))]
+    made = with_usable(pd.DataFrame(rows), pd.DataFrame(scenes), None)
+    speeds = measurable_speeds(
+        ustar0, roughness=1e-3 / 30, viscosity=nu, density=1.0, depth=depth, closed=closed
+    )
+    has_no_mean = np.isnan(speeds["mean_velocity_m_s"])
+    assert 0 < has_no_mean.sum() < len(rows)
+    assert made["why_not"].str.contains("laminar flow").tolist() == has_no_mean.tolist()
+
+
 def scattered(shields: list[float], chosen: slice = slice(None), **changes: Any) -> pd.DataFrame:
     """Three seeds of one pile, one regular pile of its slope, one of another, two of level rows."""
     names, slope = list("abcdefg"), [15.0, 15.0, 15.0, 15.0, 30.0, 15.0, 15.0]
@@ -122,14 +153,36 @@ def test_half_the_range_over_seeds_widens_the_intervals_of_similar_piles() -> No
     expected = [0.05, 0.05, 0.05, 0.05, NAN, 0.1, 0.1]
     assert table["scatter"].tolist() == pytest.approx(expected, nan_ok=True)
     wider = table["scatter"].fillna(0.0)
-    assert table["shields_low"].tolist() == pytest.approx(table["shields"] * 0.98 * (1 - wider))
-    assert table["shields_high"].tolist() == pytest.approx(table["shields"] * 1.02 * (1 + wider))
+    assert table["shields_low"].tolist() == pytest.approx(table["shields"] * 0.98 / (1 + wider))
+    assert table["shields_high"].tolist() == pytest.approx(table["shields"] * 1.02 / (1 - wider))
     # lift that carries grains off, another parameter that differs, a seed alone: no scatter
     lifted = scattered(SHIELDS, share_carried_off=[1.0] * 3 + [0.0] * 4)
     assert lifted["scatter"].isna()["d"]
     assert scattered(SHIELDS, stiffness=range(7))["scatter"].isna().all()
     assert scattered(SHIELDS, slice(0, 7, 3))["scatter"].isna().all()
-    # the interval of a grain that lies loose begins at zero
+    # the interval of a grain that lies loose begins at zero; seeds further apart than their mean
+    # leave it open above
     loose = scattered([0.0, 0.0, 1.0, 0.0, 3.0, 1.8, 2.2])
     assert (loose["shields_low"] >= 0).all()
-    assert loose["shields_high"].tolist()[2] > 1.0
+    assert loose["scatter"].tolist()[2] == pytest.approx(1.5)
+    assert np.isnan(loose["shields_high"].tolist()[2])
+
+
+def test_the_scatter_of_poured_beds_is_of_beds_that_are_poured_alike() -> None:
+    names = list("abcdefg")
+    columns = {"scene_id": names, "alpha_deg": 15.0, "force_law": "high", "fraction": 0.5}
+    ends = {"shields_low": 0.98, "shields_high": 1.02}
+    shields = [0.9, 1.1, 0.5, 1.5, 1.0, 1.0, 1.0]
+    thresholds = pd.DataFrame({**columns, **ends, "share_carried_off": 0.0, "shields": shields})
+    # strips and beds in one plane with two seeds each; another mixture, a lattice, level rows
+    scenes = pd.DataFrame(
+        {
+            "scene_id": names,
+            "packing": [*["poured"] * 5, "aligned", "horizontal"],
+            "answered_width": [6.0, 6.0, 0.0, 0.0, 0.0, None, None],
+            "sizes": [*["log-normal, sigma_g 1.3"] * 4, "10 mm 100 %", None, None],
+            "seed": [0.0, 1.0, 0.0, 1.0, 0.0, NAN, NAN],
+        }
+    )
+    scatter = with_scatter(thresholds, scenes)["scatter"]
+    assert scatter.tolist() == pytest.approx([0.1, 0.1, 0.5, 0.5, NAN, NAN, NAN], nan_ok=True)
