@@ -15,6 +15,8 @@ from orchestrator import digits
 from orchestrator.bed.line import BedLine, triangle
 from orchestrator.errors import Exploded, InputError, SolverError
 from orchestrator.flow.foam import (
+    BED_FLOW,
+    COLUMN_FLOW,
     INTERPOLATED_DIGITS,
     SolvedFlow,
     start_from,
@@ -81,10 +83,10 @@ class FlowCase(Case):
     kind: ClassVar[str] = "flow"
     template: ClassVar[str] = "openfoam/pile"
     recipe: ClassVar[int] = 9
-    results: ClassVar[tuple[str, ...]] = tuple(f"[1-9]*/{field}" for field in FIELDS)
+    results: ClassVar[tuple[str, ...]] = (BED_FLOW, COLUMN_FLOW)
     derived: ClassVar[tuple[str, ...]] = (WALL_STRESS, DIAGNOSTICS)
     bulky: ClassVar[tuple[str, ...]] = (
-        *results,
+        *(f"[1-9]*/{name}" for name in FIELDS),
         *(f"[1-9]*/uniform/{name}" for name in ("time", "cumulativeContErr")),
         "[1-9]*/uniform/functionObjects/functionObjectProperties",
     )
@@ -263,6 +265,7 @@ class FlowCase(Case):
         """Check the run and write `wall_stress.csv` and `diagnostics.csv`, or say why it failed."""
         openfoam.check_log(directory)
         solved = SolvedFlow(directory)
+        solved.check()
         stress = solved.stress(self.roughness_m)
         self._check_stress(stress, directory)
         stress.to_csv(directory / WALL_STRESS)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.bed.deck import read_texts
 from orchestrator.bed.line import BedLine
 from orchestrator.digits import DIGITS, FORMAT, on_grid
 from orchestrator.errors import SolverError
@@ -17,6 +18,10 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.physics.velocity import log_law_ustar
 from orchestrator.types import FloatArray, IntArray
 
+BED_FLOW, COLUMN_FLOW = "bed_flow.csv", "column_flow.csv"
+"""What is read of a solved flow, as the template's ``wallShearStress.awk`` describes it."""
+READ_ERROR = 1e-5
+"""Most that these tables may be off the fields, of the largest value: they have six digits."""
 SIDES = np.array(
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
 )
@@ -185,9 +190,39 @@ class SolvedFlow:
         return self.field("wallShearStress", "bed")
 
     @cached_property
+    def _on_bed(self) -> tuple[FloatArray, FloatArray]:
+        """Of each face of the bed the stress, m2/s2, and the velocity over it, m/s.
+
+        Both are along the face and positive downstream.
+        """
+        table = read_texts(self.directory / BED_FLOW)
+        stress, speed = (table[name].astype(float) for name in ("tau_m2_s2", "u_m_s"))
+        return stress, speed
+
+    @cached_property
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Upstream and downstream ends of each face of the bed, m, each of shape (n, 3)."""
+        corners = self.mesh[0]
+        across = np.argsort(corners[..., 0], axis=1)[..., None]
+        corners = np.take_along_axis(corners, across, axis=1)
+        return corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
+
+    def check(self) -> None:
+        """See that the tables of the flow are those of its mesh and of its fields."""
+        starts, ends = self._ends
+        tangents = (ends - starts) / np.linalg.norm(ends - starts, axis=1)[:, None]
+        fields = -self.wall_shear, self.velocity[self.mesh[1]]
+        for field, values in zip(fields, self._on_bed, strict=True):
+            expected = (field * tangents).sum(axis=1)
+            most = READ_ERROR * np.abs(expected).max()
+            if len(values) != len(expected) or not np.all(np.abs(values - expected) <= most):
+                what = f"{BED_FLOW} is not of these fields"
+                raise SolverError(what, where=str(self.directory), remedy="run ./Allrun there")
+
+    @cached_property
     def ustar0(self) -> float:
         """Friction velocity in the column before the inlet, m/s."""
-        tau = -float(self.wall_shear[np.argmin(self.mesh[0][..., 0].mean(axis=1)), 0])
+        tau = float(self._on_bed[0][np.argmin(self.mesh[0][..., 0].mean(axis=1))])
         if not tau > 0:
             raise SolverError("no flow in the column before the inlet", where=str(self.directory))
         return float(np.sqrt(tau))
@@ -195,20 +230,18 @@ class SolvedFlow:
     def stress(self, z0: float) -> WallStress:
         """Stress along the bed, of a roughness length z0 (m), over that of the approaching flow."""
         corners, cells, middles = self.mesh
-        # faces in the order of the flow, each with its two upstream corners first; those of the
-        # study begin behind the column before the inlet
+        # faces in the order of the flow; those of the study begin behind the column before the
+        # inlet
         order = np.argsort(corners[..., 0].mean(axis=1))
-        across = np.argsort(corners[order, :, 0], axis=1)[..., None]
-        corners = np.take_along_axis(corners[order], across, axis=1)
-        starts, ends = corners[:, :2].mean(axis=1), corners[:, 2:].mean(axis=1)
+        starts, ends = (places[order] for places in self._ends)
         centres, lengths = (starts + ends) / 2.0, np.linalg.norm(ends - starts, axis=1)
         tangents = (ends - starts) / lengths[:, None]
         toe = int(np.argmin(np.abs(starts[:, 0])))
         s = np.cumsum(lengths) - lengths[:toe].sum() - lengths / 2.0
         normals = np.column_stack([-tangents[:, 2], np.zeros(len(s)), tangents[:, 0]])
-        z_e = np.vecdot(middles[cells[order]] - centres, normals)
-        u_t = np.vecdot(self.velocity[cells[order]], tangents)
-        tau = -np.vecdot(self.wall_shear[order], tangents) / self.ustar0**2
+        z_e = ((middles[cells[order]] - centres) * normals).sum(axis=1)
+        on_wall, u_t = (values[order] for values in self._on_bed)
+        tau = on_wall / self.ustar0**2
         eq10 = [log_law_ustar(u_t, z_e, z0, printed=as_printed) for as_printed in (False, True)]
         ustar = [velocity / self.ustar0 for velocity in eq10]
         columns = (s, centres[:, 0], centres[:, 2], lengths, z_e, tau, *ustar)
@@ -216,9 +249,4 @@ class SolvedFlow:
 
     def column_speed(self) -> float:
         """Mean speed in the column before the inlet, m/s."""
-        x, _, z = self.mesh[2].T
-        column = np.flatnonzero(x < x.min() + 1e-6 * np.ptp(x))
-        column = column[np.argsort(z[column])]
-        points = read_list(self.directory / "constant/polyMesh/points")
-        levels = np.sort(points[points[:, 0] <= points[:, 0].min() + 1e-9, 2])[::2]
-        return float(np.average(self.velocity[column, 0], weights=np.diff(levels)))
+        return float(read_texts(self.directory / COLUMN_FLOW)["mean_velocity_m_s"][0])

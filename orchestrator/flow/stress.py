@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from orchestrator.bed.deck import read_texts
+from orchestrator.digits import FORMAT
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import KARMAN
 from orchestrator.types import FloatArray
@@ -104,14 +105,14 @@ class WallStress:
         return np.asarray(np.nan_to_num(np.sign(slope) * np.minimum(np.abs(slope), most)))
 
     def to_csv(self, path: Path) -> None:
-        """Write a table with all digits: `from_csv` gives the same numbers back."""
+        """Write a table of nine digits, which `from_csv` reads."""
         columns = {one.name: getattr(self, one.name) for one in fields(self)}
         table = pd.DataFrame({**columns, "ustar_over_ustar0_wall": self.ustar_over_ustar0_wall})
-        table.to_csv(path, index=False, lineterminator="\n")
+        table.to_csv(path, index=False, lineterminator="\n", float_format=FORMAT)
 
     @classmethod
     def from_csv(cls, path: Path) -> "WallStress":
-        """Read a table of `to_csv`, to the last digit."""
+        """Read a table of `to_csv`."""
         columns = read_texts(path)
         return cls(**{each.name: columns[each.name].astype(float) for each in fields(cls)})
 

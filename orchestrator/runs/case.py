@@ -28,7 +28,7 @@ STATE = (IDENTITY, DONE, FAILED, CHECKSUMS, LOG)
 GENERATED = (
     *("[1-9]", "[1-9][0-9]", "[1-9][0-9][0-9]", "[1-9][0-9][0-9][0-9]"),
     *("log.*", "postProcessing", "polyMesh", "settling.csv", "samples.csv", "*.dump"),
-    "load_steps.csv",
+    *("load_steps.csv", "bed_flow.csv", "column_flow.csv"),
 )
 """Files that a run by hand leaves in the template's own folder; no part of the template."""
 
@@ -76,7 +76,10 @@ class Case(ABC):
     derived: ClassVar[tuple[str, ...]] = ()
     """Tables that `collect` makes of the results; not the solver's own."""
     bulky: ClassVar[tuple[str, ...]] = ()
-    """Large files that the run leaves and no table is made of: `prune` drops them."""
+    """Large files that the run leaves and no table is made of: `prune` drops them.
+
+    Those that are no results may differ in their last digits from processor to processor.
+    """
     needs_bulky: ClassVar[bool] = False
     """Whether its inputs are made of the bulky files, too, of the cases that it needs."""
     made: ClassVar[tuple[str, ...]] = ()
@@ -180,13 +183,23 @@ def finish(case: Case, directory: Path, **times: float) -> None:
     It alone must survive a crash: what it names is compared with it. The times are `solver_s`,
     `cpu_s` (of a processor) and `wall_s` (with Python's work).
     """
-    *made, bulky = (_matching(directory, p) for p in (case.results, case.derived, case.bulky))
-    results, derived = ({n: files.digest_file(directory / n) for n in names} for names in made)
+    results = _digests(directory, _matching(directory, case.results))
+    derived = _digests(directory, _matching(directory, case.derived))
+    bulky = _matching(directory, case.bulky)
+    others = _digests(directory, [name for name in bulky if name not in results])
     sums = "".join(f"{digest}  {name}\n" for name, digest in results.items())
     (directory / CHECKSUMS).write_text(sums)
-    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *bulky}}
-    digests = {"results_sha256": results, "derived_sha256": derived}
-    marker = {"id": case.id, "ended": "done", **times, **digests, "bulky": bulky, "stamps": stamps}
+    stamps = {name: _stamp(directory / name) for name in {*results, *derived, *others}}
+    marker = {
+        "id": case.id,
+        "ended": "done",
+        **times,
+        "results_sha256": results,
+        "derived_sha256": derived,
+        "others_sha256": others,
+        "bulky": bulky,
+        "stamps": stamps,
+    }
     files.write_durably(directory / DONE, files.text_of(marker))
 
 
@@ -216,7 +229,8 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
     about, state = read_json(directory / IDENTITY), read_json(directory / DONE)
     if not about.get("id") == state.get("id") == identity:
         return None
-    digests, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
+    made, stamps = {**state["results_sha256"], **state["derived_sha256"]}, state["stamps"]
+    digests = {**made, **state.get("others_sha256", {})}
     try:
         marked = (directory / DONE).stat().st_mtime_ns
         for name, digest in digests.items():
@@ -232,7 +246,7 @@ def marker_of(directory: Path, identity: str) -> dict[str, Any] | None:
                 return None
     except OSError:
         return None
-    return state if digests else None
+    return state if made else None
 
 
 def is_whole(case: Case, cases: Path) -> bool:
@@ -263,6 +277,11 @@ def programs(cases: Path, names: Iterable[str]) -> dict[str, str]:
     """The programs, with versions, that some of the cases were made with."""
     given = (read_json(cases / name / IDENTITY).get("programs", {}) for name in sorted(names))
     return {program: version for versions in given for program, version in versions.items()}
+
+
+def _digests(directory: Path, names: Iterable[str]) -> dict[str, str]:
+    """The SHA-256 digest of each of some files of a directory, by their names."""
+    return {name: files.digest_file(directory / name) for name in names}
 
 
 def _stamp(path: Path) -> tuple[int, int]:

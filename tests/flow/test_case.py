@@ -39,12 +39,14 @@ def test_a_case_from_its_inputs_to_its_table(solve: Solve) -> None:
     assert case.done_state(PILE, directory.parent)
     kept = WallStress.from_csv(directory / WALL_STRESS)
     read = SolvedFlow(directory).stress(PILE.roughness_m)
-    for name, values in vars(read).items():  # the table loses nothing
-        np.testing.assert_array_equal(getattr(kept, name), values)
+    for name, values in vars(read).items():  # the table loses nothing but digits beyond nine
+        np.testing.assert_allclose(getattr(kept, name), values, rtol=5e-9)
     assert (directory / "parameters").read_text().count("//") == 13
-    sums = (directory / "results.sha256").read_text()
-    for field in ("U", "epsilon", "k", "nut", "p", "phi", "wallShearStress"):
-        assert f"/{field}\n" in sums
+    sums = (directory / "results.sha256").read_text().splitlines()
+    assert [line.split()[1] for line in sums] == ["bed_flow.csv", "column_flow.csv"]
+    # the fields, whose last digits are those of this processor, are known by their digests, too
+    others = read_json(directory / "done.json")["others_sha256"]
+    assert {Path(name).name for name in others} >= {"U", "epsilon", "k", "nut", "p", "phi"}
 
 
 def test_the_flow_speeds_up_to_the_crest_and_separates_behind_it(solve: Solve) -> None:
@@ -71,11 +73,11 @@ def test_a_copy_run_by_hand_gives_the_same_bytes(solve: Solve, tmp_path: Path) -
     environment = {"PATH": os.environ["PATH"]}
     ended = subprocess.run([copy / "Allrun"], env=environment, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
-    assert ended.stdout.count(": OK\n") == 7
+    assert ended.stdout == "bed_flow.csv: OK\ncolumn_flow.csv: OK\n"
     edit(copy / "parameters", "freeStream       10.0;", "freeStream       10.1;")
     ended = subprocess.run(["./Allrun"], cwd=copy, capture_output=True, text=True)
     assert ended.returncode != 0
-    assert "U: FAILED" in ended.stdout
+    assert "bed_flow.csv: FAILED" in ended.stdout
 
 
 def test_the_template_runs_as_it_lies(template: Path) -> None:

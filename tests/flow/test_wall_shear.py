@@ -95,6 +95,32 @@ def test_the_stress_is_the_recorded_one_on_every_release(template: Path) -> None
     np.testing.assert_allclose(seen, stress, rtol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["kEpsilon", "closed channel", "cylinder"])
+def test_a_study_reads_the_fields_with_six_digits(solve: Solve, tmp_path: Path, name: str) -> None:
+    """So that processors whose fields differ in their last digits read the same."""
+    copy = Path(shutil.copytree(solve(FLOWS[name]), tmp_path / "copy"))
+    solved = SolvedFlow(copy)
+    solved.check()
+    x, _, z = solved.mesh[2].T
+    # the column before the inlet, whose cells stand one on another
+    column = np.flatnonzero(x < x.min() + 1e-9)
+    points = read_list(copy / "constant/polyMesh/points")
+    levels = np.unique(points[points[:, 0] < points[:, 0].min() + 1e-9, 2])
+    speed = solved.velocity[column[np.argsort(z[column])], 0]
+    mean = np.average(speed, weights=np.diff(levels))
+    assert solved.column_speed() == pytest.approx(mean, rel=5e-6)
+    for table in ("bed_flow.csv", "column_flow.csv"):
+        values = np.loadtxt(copy / table, delimiter=",", skiprows=1)
+        assert all(float(f"{value:.6g}") == value for value in values.ravel())
+    # tables of another run are noticed
+    bed_flow = copy / "bed_flow.csv"
+    rows = bed_flow.read_text().splitlines()
+    rows[20:22] = rows[21:19:-1]
+    bed_flow.write_text("\n".join(rows) + "\n")
+    with pytest.raises(SolverError, match=r"bed_flow\.csv is not of these fields"):
+        SolvedFlow(copy).check()
+
+
 def test_the_last_iteration_is_read(template: Path) -> None:
     """Whichever of the directories a listing has first."""
     edit(template / "system/controlDict", "writeInterval       1000;", "writeInterval 7;")

@@ -15,6 +15,11 @@
 # cell with the part along n replaced by snGrad(U): gaussGrad::correctBoundaryConditions.
 # The mesh is one cell thick along y: a cell is a polygon in x and z, and a face is a side
 # of it. Lengths of sides and areas of polygons stand for areas and volumes.
+#
+# Writes besides what a study reads of the flow, with six digits, which the fields of all
+# processors share: bed_flow.csv has for each face of the bed the stress of the flow on it
+# over the density and the velocity in the cell on it, both along the face and positive
+# downstream; column_flow.csv has the mean velocity in the column before the inlet.
 
 BEGIN {
     # the items of the lists are lines such as "4(0 1 23 22)" and "(0.1 0 0.2)"
@@ -38,6 +43,8 @@ BEGIN {
     for (i = 0; i < bed_faces; i++)
         print_stress(start["bed"] + i, nu + nut[i])
     print ")\n;\n    }\n}\n\n// ************************************************ //"
+    write_bed_flow("bed_flow.csv")
+    write_column_flow("column_flow.csv")
 }
 
 # Read the patches: their names in their order, types, first faces and numbers of faces.
@@ -240,6 +247,44 @@ function print_stress(face, nu_eff,
     x = nu_eff * ((2 * g_xx - third) * nx + (g_xz + g_zx) * nz)
     z = nu_eff * ((g_xz + g_zx) * nx + (2 * g_zz - third) * nz)
     printf "(%.10g 0 %.10g)\n", x, z
+    stress_x[face] = x
+    stress_z[face] = z
+}
+
+# Write stress and velocity along the faces of the bed.
+function write_bed_flow(file,    i, face, along_x, along_z, length_, at, stress, speed) {
+    print "tau_m2_s2,u_m_s" >file
+    for (i = 0; i < bed_faces; i++) {
+        face = start["bed"] + i
+        along_x = x2[face] - x1[face]
+        along_z = z2[face] - z1[face]
+        # downstream; the faces of the bed are never upright
+        length_ = sqrt(along_x * along_x + along_z * along_z)
+        if (along_x < 0)
+            length_ = -length_
+        split(velocity[owner[face]], at, between)
+        stress = -(stress_x[face] * along_x + stress_z[face] * along_z) / length_
+        speed = (at[2] * along_x + at[4] * along_z) / length_
+        printf "%.6g,%.6g\n", stress, speed >file
+    }
+    close(file)
+}
+
+# Write the mean velocity in the column before the inlet.
+function write_column_flow(file,    i, face, high, height, flux, at) {
+    for (i = 0; i < size["before"]; i++) {
+        face = start["before"] + i
+        measure_face(face)
+        high = z2[face] - z1[face]
+        if (high < 0)
+            high = -high
+        split(velocity[owner[face]], at, between)
+        height += high
+        flux += high * at[2]
+    }
+    print "mean_velocity_m_s" >file
+    printf "%.6g\n", flux / height >file
+    close(file)
 }
 
 # Print all of the field before the values on the bed, which is the last of its patches.
