@@ -18,6 +18,7 @@ from orchestrator.calculator import cli as calculator
 from orchestrator.errors import Fault, InputError, of_exception
 from orchestrator.runs import terminal
 from orchestrator.runs.cluster import SYSTEMS, Queue
+from orchestrator.study.units import number, whole_number
 
 if TYPE_CHECKING:
     from orchestrator.pipeline import Finished
@@ -104,11 +105,11 @@ def _parser() -> argparse.ArgumentParser:
                 add("source", nargs="?", default=preset, metavar="FILE|PRESET")
             count = os.cpu_count() or 1
             add("--out", type=Path, metavar="DIR", help="default: results/NAME")
-            add("--workers", type=int, default=count, metavar="N", help="cases at a time")
+            add("--workers", type=whole_number, default=count, metavar="N", help="cases at a time")
             add("--plan", action="store_true", help="say what would run, how long, and end")
         if name == "study":
             text = "error that tau_c may have, such as 0.05: the cheapest models known to be within"
-            add("--tolerance", type=float, metavar="X", help=text)
+            add("--tolerance", type=number, metavar="X", help=text)
             text = "run the cases in jobs of a queue: %(choices)s; settings in the file's [cluster]"
             add("--cluster", choices=sorted(SYSTEMS), metavar="QUEUE", help=text)
             calculator.add(commands)

@@ -26,53 +26,102 @@ FIRST = (
 """Columns of `Opened.thresholds` that come before all others, those that it has."""
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
 
 def threshold(
     diameter: "ArrayLike",
     *,
-    law: str | None = "bridged",
+    law: str | None = "auto",
     fluid: str | None = None,
     temperature: float | None = None,
     **parameters: "ArrayLike",
 ) -> pd.DataFrame:
     """Thresholds of motion of single grains by the closed form.
 
-    Arguments are numbers or arrays that broadcast together: `diameter`, m; `density` (2500) and
-    `fluid_density` (1), kg/m3; kinematic `viscosity` (1e-5), m2/s; `slope_deg` (0), which the flow
-    goes up, and `entrainment_angle_deg` (60) of the contact that a grain rolls over; `roughness`,
-    the length z0, m, or a part of the diameter ("d/30"); Saffman's `lift_coefficient` (1.615);
-    `gravity` (9.81), m/s2; `depth` of a liquid, m, for its mean velocity. `law` is a force law,
-    ``paper`` for the paper's rule, or None: every law. `fluid` is "water", "seawater" or "air" at a
-    `temperature` (15), deg C, in place of density and viscosity; the defaults are the paper's.
+    All parameters but `law`, `fluid` and `temperature` are numbers or arrays that broadcast
+    together.
 
-    The table has a row for each point of the raveled arrays, or for each point and law, with units
-    in the columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is usual in
-    another unit is asked about in a warning. An `InputError` refuses a point that is no scene, a
-    law that is none, or if no law holds at any point.
+    Parameters
+    ----------
+    diameter
+        Grain diameter, m.
+    law
+        A force law, ``auto`` for `bridged`, or `bridged-gravel` where its drag law ends,
+        ``paper`` for the paper's rule, or None for every law.
+    fluid
+        "water", "seawater" or "air", in place of density and viscosity; the default is the
+        paper's fluid.
+    temperature
+        Of that fluid, deg C, by default 15.
+    density, fluid_density
+        Densities of the grains (2500) and of the fluid (1), kg/m3.
+    viscosity
+        Kinematic viscosity (1e-5), m2/s.
+    slope_deg
+        Slope of the bed (0), which the flow goes up, degrees.
+    entrainment_angle_deg
+        Angle (60) of the contact that a grain rolls over, degrees.
+    roughness
+        Roughness length z0, m, or a part of the diameter ("d/30").
+    lift_coefficient
+        Saffman's (1.615).
+    gravity
+        Acceleration of gravity (9.81), m/s2.
+    cohesion
+        Pull of a contact over the diameter (0), N/m.
+    depth
+        Depth of a liquid, m, for its mean velocity.
+
+    Returns
+    -------
+    A row for each point of the raveled arrays, or for each point and law, with units in the
+    columns' names; ``valid`` and ``why_not`` say where a law ends. A number that is usual in
+    another unit is asked about in a warning.
+
+    Raises
+    ------
+    InputError
+        For a point that is no scene, a law that is none, or if no law holds at any point.
     """
     given: dict[str, Any] = {"diameter": diameter, **parameters}
     for name, values in given.items():
         if name not in PARAMETERS:
-            raise InputError("no such parameter", name, f"there are {', '.join(PARAMETERS)}")
-        try:  # a roughness may have texts such as d/30
-            given[name] = np.asarray(values, object if name == "roughness" else float)
-        except (TypeError, ValueError):
-            what = f"{values!r} is neither a number nor an array of numbers"
-            raise InputError(what, where=name) from None
+            what = f"there are {', '.join(PARAMETERS)}"
+            raise InputError("no such parameter", name, what)
+        given[name] = _column(name, values)
     try:
         arrays = np.broadcast_arrays(*given.values())
     except ValueError as error:
         raise InputError(str(error), where="threshold") from None
-    points = {name: each.ravel().tolist() for name, each in zip(given, arrays, strict=True)}
-    names = dict(zip(OPTIONS, OPTIONS, strict=True))
-    table, asked = answered(points, law or "bridged", fluid, temperature, names)
+    points = {}
+    for name, array in zip(given, arrays, strict=True):
+        points[name] = array.ravel().tolist()
+    if not points["diameter"]:
+        remedy = "give one diameter at least"
+        raise InputError("the arrays have no point", "threshold", remedy)
+    names = {name: name for name in OPTIONS}
+    form = "{} {:.4g}"
+    table, asked = answered(points, law or "auto", fluid, temperature, names, form)
     if asked:
         warnings.warn("; ".join(asked), stacklevel=2)
     rows = pd.DataFrame(table)
     chosen = rows if law is None else rows[rows["answer"]]
     return chosen.drop(columns="answer").reset_index(drop=True)
+
+
+def _column(name: str, values: Any) -> "NDArray[Any]":
+    """The values of a parameter as an array: numbers, of a roughness also texts as d/30."""
+    refusal = InputError(f"{values!r} is neither a number nor an array of numbers", name)
+    try:
+        array = np.asarray(values)
+        if name == "roughness" and array.dtype.kind in "UO":
+            return np.asarray(values, object)
+        if array.dtype.kind not in "iufO":  # Python makes numbers of texts and of truths
+            raise refusal
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise refusal from None
 
 
 def run(

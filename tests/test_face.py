@@ -39,6 +39,9 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
     [
         ({"law": "nonsense"}, "nonsense"),
         ({"depth": "x"}, "depth"),
+        ({"density": "2650"}, "density"),
+        ({"density": True}, "density"),
+        ({"density": []}, "the arrays have no point"),
         ({"depth": [[1.0], [1.0, 2.0]]}, "depth"),
         ({"density": [2e3, 3e3], "slope_deg": [0, 1, 2]}, "broadcast"),
     ],
@@ -46,8 +49,8 @@ def test_thresholds_of_arrays_have_a_row_for_each_point() -> None:
 def test_a_bad_argument_gets_one_clear_error(arguments: dict[str, Any], name: str) -> None:
     with pytest.raises(InputError, match=name):
         orchestrator.threshold(1e-3, **arguments)
-    with pytest.warns(UserWarning, match="did you mean 0.35 mm, diameter 0.00035"):
-        orchestrator.threshold(0.35)
+    with pytest.warns(UserWarning, match="did you mean 0.06 mm, diameter 6e-05"):
+        orchestrator.threshold(0.06, fluid="water", density=2650.0)
 
 
 def test_a_study_from_its_file_to_a_figure(tmp_path: Path) -> None:

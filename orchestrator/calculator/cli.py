@@ -13,7 +13,14 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.calculator import GEOMETRIC, MOST_POINTS, PARAMETERS, QUANTITIES
 from orchestrator.errors import InputError
 from orchestrator.physics.constants import GAS_BELOW
-from orchestrator.physics.fluids import FLUIDS, PAPER, STANDARD_DEG_C, TEMPERATURE, numbers_of
+from orchestrator.physics.fluids import (
+    FLUIDS,
+    PAPER,
+    STANDARD_DEG_C,
+    TEMPERATURE,
+    numbers_of,
+)
+from orchestrator.study.units import first, meant, number, questions
 
 if TYPE_CHECKING:  # these load numpy
     from orchestrator.calculator.table import Table
@@ -32,19 +39,6 @@ RANGES = (
     "several ranges give every combination. Diameter, viscosity, roughness and depth are spaced "
     "geometrically, all others evenly. A fluid below 100 kg/m3 is a gas."
 )
-UNITS = (
-    ("diameter", 0.05, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
-    ("diameter", 20.0, math.inf, "{0:g} m: did you mean {0:g} um", 1e-6),
-    ("density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
-    ("slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", 180 / math.pi),
-    ("entrainment_angle_deg", 1e-300, 1.571, "{0:g} deg: did you mean {0:g} rad", 180 / math.pi),
-    ("lift_coefficient", 6.0, 7.0, "{0:g}: did you mean Saffman's for the radius", 0.25),
-    ("gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
-)
-"""Ranges in which a number is likelier in another unit, the question, and the factor to SI."""
-COHESIVE_BELOW = (6e-5, 1e-4)
-"""Diameter below which cohesion is no longer small against the weight, in liquids and gases, m."""
-USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))  # usual dynamic viscosities of liquids and gases, Pa s
 
 
 def add(commands: Any) -> None:
@@ -61,9 +55,12 @@ def add(commands: Any) -> None:
     text = f"{', '.join(FLUIDS)}: its density and viscosity at --temperature; default the paper's"
     command.add_argument("--fluid", metavar="NAME", help=text)
     text = f"of that fluid, deg C, one number; default {STANDARD_DEG_C:g}"
-    command.add_argument("--temperature", type=float, metavar="T", help=text)
-    text = "force law of the answer; default %(default)s; paper: Eq. 2 or 4 where each holds"
-    command.add_argument("--law", default="bridged", metavar="NAME", help=text)
+    command.add_argument("--temperature", type=number, metavar="T", help=text)
+    text = (
+        "force law of the answer; default: bridged, or bridged-gravel where the drag law "
+        "of bridged ends; paper: Eq. 2 or 4 where each holds"
+    )
+    command.add_argument("--law", default="auto", metavar="NAME", help=text)
     form = command.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="an object for each law by its name")
     form.add_argument("--csv", action="store_true", help="a row for each point and law")
@@ -71,53 +68,93 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    texts = {name: text for name in PARAMETERS if (text := getattr(options, name)) is not None}
-    axes = {name: values(name, text) for name, text in texts.items()}
-    if (count := math.prod(map(len, axes.values()))) > MOST_POINTS:
+    axes: dict[str, list[Value]] = {}
+    for name in PARAMETERS:
+        text = getattr(options, name)
+        if text is not None:
+            axes[name] = values(name, text)
+    count = math.prod(map(len, axes.values()))
+    if count > MOST_POINTS:
         what = f"the ranges have {count} points together, more than {MOST_POINTS}"
         raise InputError(what, "threshold", "lower a COUNT")
-    points = dict(zip(axes, zip(*itertools.product(*axes.values()), strict=True), strict=True))
-    table, asked = answered(points, options.law, options.fluid, options.temperature, OPTIONS)
+    columns = zip(*itertools.product(*axes.values()), strict=True)
+    points = dict(zip(axes, columns, strict=True))
+    table, asked = answered(
+        points, options.law, options.fluid, options.temperature, OPTIONS, "{} {:.4g}"
+    )
     if asked:
         print(f"orchestrator: {'; '.join(asked)}", file=sys.stderr)
-    columns = [column.tolist() for column in table.values()]
+    rows_of_values = zip(*(column.tolist() for column in table.values()), strict=True)
     if options.csv:
-        cells = ([x if x == x else None for x in column] for column in columns)  # NaN: no text
-        csv.writer(sys.stdout, lineterminator="\n").writerows([table, *zip(*cells, strict=True)])
+        writer = csv.writer(sys.stdout, lineterminator="\n")
+        writer.writerow(table)
+        for row in rows_of_values:
+            writer.writerow([None if _is_nan(value) else value for value in row])
         return 0
-    rows = [dict(zip(table, row, strict=True)) for row in zip(*columns, strict=True)]
+    rows = [dict(zip(table, row, strict=True)) for row in rows_of_values]
     if options.json:
         print(as_json(rows))
-    else:
-        varied = [name for name, axis in axes.items() if len(axis) > 1]
-        print("\n".join(as_text(rows, options.law, varied, options.fluid)))
+        return 0
+    varied = [name for name, axis in axes.items() if len(axis) > 1]
+    print("\n".join(as_text(rows, options.law, varied, options.fluid)))
     return 0
 
 
 def values(name: str, text: str) -> list[Value]:
     """The values that a text gives to a parameter.
 
-    The text is a number, or a range ``FIRST:LAST:COUNT``, both ends included; of a roughness both
-    may be parts of the diameter. An `InputError` refuses all else.
+    Parameters
+    ----------
+    name
+        Of the parameter, a key of `PARAMETERS`.
+    text
+        A number, or a range ``FIRST:LAST:COUNT``, both ends included; of a roughness both
+        may be parts of the diameter.
+
+    Raises
+    ------
+    InputError
+        For any other text.
+
+    Examples
+    --------
+    >>> values("slope_deg", "0:30:4")
+    [0.0, 10.0, 20.0, 30.0]
+    >>> values("roughness", "d/30")
+    ['d/30']
     """
-    ends, of_diameter = text.split(":"), name == "roughness" and "/" in text
-    if of_diameter and len(ends) == 1:
+    is_part = name == "roughness" and "/" in text
+    ends = text.split(":")
+    if is_part and len(ends) == 1:
         return [text]
     try:
-        numbers = [1 / float(end.split("d/")[1]) if of_diameter else float(end) for end in ends[:2]]
-        count = float(ends[2]) if len(ends) == 3 else 0.0
+        numbers = [_end(end, is_part) for end in ends[:2]]
+        count = number(ends[2]) if len(ends) == 3 else 0.0
     except (ValueError, IndexError, ZeroDivisionError):
-        raise InputError(f"{text!r} is neither a number nor a range", OPTIONS[name], FORM) from None
+        hint = meant(text) or FORM
+        what = f"{text!r} is neither a number nor a range"
+        raise InputError(what, OPTIONS[name], hint) from None
     if len(ends) == 1:
         return [*numbers]
     first, last = numbers
-    if not (first < last < math.inf and 2 <= count <= MOST_POINTS and count % 1 == 0):
-        raise InputError(f"{text!r} is not a range of values that rise", OPTIONS[name], FORM)
+    is_count = 2 <= count <= MOST_POINTS and count % 1 == 0
+    if not (first < last < math.inf and is_count):
+        what = f"{text!r} is not a range of values that rise"
+        raise InputError(what, OPTIONS[name], FORM)
     import numpy as np
 
-    space = np.geomspace if name in GEOMETRIC and first > 0 else np.linspace
-    spaced = space(first, last, int(count)).tolist()
-    return [f"d/{1 / part:.12g}" for part in spaced] if of_diameter else spaced
+    if name in GEOMETRIC and first > 0:
+        spaced = np.geomspace(first, last, int(count)).tolist()
+    else:
+        spaced = np.linspace(first, last, int(count)).tolist()
+    if is_part:
+        return [f"d/{1 / part:.12g}" for part in spaced]
+    return [*spaced]
+
+
+def _end(text: str, is_part: bool) -> float:
+    """A number, or the part of the diameter that a text such as ``d/30`` is."""
+    return 1 / number(text.split("d/")[1]) if is_part else number(text)
 
 
 def answered(
@@ -126,53 +163,74 @@ def answered(
     fluid: str | None,
     degrees: float | None,
     names: Mapping[str, str],
+    form: str,
 ) -> tuple["Table", list[str]]:
-    """`table.thresholds` of points, in a fluid by its name (at deg C), and questions on them.
+    """The thresholds of some points, and questions on their numbers.
 
-    `names` are those that refusals and questions have for the parameters.
+    Parameters
+    ----------
+    points
+        Columns of one length, by keys of `PARAMETERS`.
+    law
+        The force law of the answer, ``auto`` or ``paper``.
+    fluid, degrees
+        Name of the fluid and its temperature, deg C, in place of density and viscosity.
+    names
+        What refusals and questions call the parameters, ``fluid``, ``temperature`` and
+        ``law``.
+    form
+        How a parameter is given a value: a format of its name and the value.
+
+    Returns
+    -------
+    The table of `table.thresholds`, and the questions of `units.questions`.
+
+    Raises
+    ------
+    InputError
+        What is asked first, then what is wrong.
     """
     from orchestrator.calculator.table import thresholds
 
+    fields = {each.field: names[name] for name, each in PARAMETERS.items()}
+    fields |= {"fluid.kind": names["fluid"], f"fluid.{TEMPERATURE}": names["temperature"]}
+    fields["law"] = names["law"]
     asked: list[str] = []
     try:
-        asks: dict[str, Any] = {"kind": fluid, TEMPERATURE: degrees}
-        asks |= {field: points.get(name) for name, field in OF_FLUID.items()}
-        table = numbers_of({field: value for field, value in asks.items() if value is not None})
+        given: dict[str, Any] = {"kind": fluid, TEMPERATURE: degrees}
+        given |= {field: points.get(name) for name, field in OF_FLUID.items()}
+        given = {field: value for field, value in given.items() if value is not None}
+        table = numbers_of(given)
         if fluid is not None:
             count = len(points["diameter"])
-            points = {**points, **{n: [table[k]] * count for n, k in OF_FLUID.items()}}
-        asked = questions(points, names)
+            of_fluid = {name: [table[field]] * count for name, field in OF_FLUID.items()}
+            points = {**points, **of_fluid}
+        asked = questions(_numbers(points), fields, form)
         return thresholds(points, law), asked
     except InputError as error:
-        fields = {each.field: names[name] for name, each in PARAMETERS.items()}
-        fields |= {"fluid.kind": names["fluid"], f"fluid.{TEMPERATURE}": names["temperature"]}
-        fields["law"] = names["law"]
-        texts = error.what, error.where, "; ".join(filter(None, [error.remedy, *asked]))
-        written = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
-        named = [re.sub(written, lambda at: fields.get(at[0], at[0]), text) for text in texts]
-        raise InputError(*named) from None
+        named = InputError(
+            _named(error.what, fields),
+            _named(error.where, fields),
+            _named(error.remedy, fields),
+        )
+        raise first(asked, named, "threshold", fields.values()) from None
 
 
-def questions(points: Mapping[str, Sequence[Value]], names: Mapping[str, str]) -> list[str]:
-    """Questions on parameters whose largest value, or smallest diameter, looks wrong."""
-    given = {name: points.get(name, (each.default,)) for name, each in PARAMETERS.items()}
-    numbers = {n: [x for x in xs if isinstance(x, int | float)] for n, xs in given.items()}
-    top = {name: max(values, default=0.0) for name, values in numbers.items()}
-    asked = [
-        f"{question.format(top[name])}, {names[name]} {top[name] * factor:.4g}?"
-        for name, low, high, question, factor in UNITS
-        if low <= top[name] < high
-    ]
-    smallest, rho, nu = min(numbers["diameter"]), top["fluid_density"], top["viscosity"]
-    low, high = USUAL_PA_S[rho < GAS_BELOW]
-    if 0 < smallest < COHESIVE_BELOW[rho < GAS_BELOW]:
-        cohesion = "cohesion, which the force laws leave out, holds grains this small"
-        asked.append(f"{smallest:g} m: {cohesion}; they need a stronger flow")
-    is_of_air = rho >= GAS_BELOW and nu == PARAMETERS["viscosity"].default
-    if rho > 0 and nu > 0 and (is_of_air or not low <= rho * nu <= high):
-        unusual = f"{nu:g} m2/s, or {rho * nu:.3g} Pa s, is unusual for {rho:g} kg/m3"
-        asked.append(f"{unusual}: is it right? {names['fluid']} names water, seawater, air")
-    return asked
+def _numbers(points: Mapping[str, Sequence[Value]]) -> dict[str, list[float]]:
+    """The numbers of some points, by the fields of a study file; what is open is default."""
+    count = len(points["diameter"])
+    found = {}
+    for name, parameter in PARAMETERS.items():
+        column = points.get(name, [parameter.default] * count)
+        numbers = [value for value in column if isinstance(value, int | float)]
+        found[parameter.field] = numbers
+    return found
+
+
+def _named(text: str, fields: Mapping[str, str]) -> str:
+    """A message about fields of a study file with the names that these have here."""
+    written = r"\b([a-z]+\.[a-z_]+|(?<=threshold: )(depth|law))\b"
+    return re.sub(written, lambda at: fields.get(at[0], at[0]), text)
 
 
 def _is_nan(value: object) -> bool:
@@ -180,7 +238,10 @@ def _is_nan(value: object) -> bool:
 
 
 def as_json(rows: Sequence["Row"]) -> str:
-    """A record for one point, or a list of records: parameters, rules, an object for each law."""
+    """A record for one point, or a list of records, as JSON.
+
+    A record has the parameters, the laws of the rules, and an object for each law.
+    """
     from orchestrator.physics.beside import MEASURED, TESTED
     from orchestrator.physics.threshold import LAWS_OF
 
@@ -189,10 +250,13 @@ def as_json(rows: Sequence["Row"]) -> str:
     count = len({row["law"] for row in rows})
     records = []
     for start in range(0, len(rows), count):
-        of_laws, first = rows[start : start + count], rows[start]
-        record: Row = {"input": {name: first[each.column] for name, each in PARAMETERS.items()}}
-        record |= {"regime": first["regime"], "paper": [*LAWS_OF[first["regime"]]]}
-        record |= {"answer": [row["law"] for row in of_laws if row["answer"]]}
+        of_laws = rows[start : start + count]
+        regime = of_laws[0]["regime"]
+        record: Row = {}
+        record["input"] = {n: of_laws[0][each.column] for n, each in PARAMETERS.items()}
+        record["regime"] = regime
+        record["paper"] = [*LAWS_OF[regime]]
+        record["answer"] = [row["law"] for row in of_laws if row["answer"]]
         for row in of_laws:
             record[row["law"]] = {name: row[column] for column, name in names.items()}
         records.append(record)
@@ -204,50 +268,32 @@ def as_json(rows: Sequence["Row"]) -> str:
 def as_text(
     rows: Sequence["Row"], answer: str, varied: Sequence[str], fluid: str | None
 ) -> Iterator[str]:
-    """Lines for people: of one point the answer and every law, of many points the answer's rows."""
-    from orchestrator.physics.beside import sentences
-    from orchestrator.physics.threshold import LAWS_OF
+    """Lines for people.
 
-    chosen = [row for row in rows if row["answer"]]
-    name = "The paper's rule" if answer == "paper" else f"Force law {answer}"
-    quantities = {column: label for column, (_, label) in QUANTITIES.items()}
-    shown = {c: text for c, text in quantities.items() if not all(_is_nan(row[c]) for row in rows)}
-    if "mean_velocity_m_s" in shown:
-        shown.pop("current_1m_m_s", None)
-    first = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
+    Parameters
+    ----------
+    rows
+        A row for each point and law, as `table.thresholds` has them.
+    answer
+        The force law of the answer, ``auto`` or ``paper``.
+    varied
+        The parameters that are ranges, keys of `PARAMETERS`.
+    fluid
+        Name of the fluid, if one was given.
+
+    Yields
+    ------
+    Of one point the answer and every law, of many points the rows of the answer.
+    """
     if varied:
-        yield name
-        rows = chosen
+        yield from _of_many(rows, answer, varied)
     else:
-        yield f"{name}: a grain of {rows[0]['d_m'] * 1000:.4g} mm starts to move at"
-        width = max(map(len, shown.values()))
-        for column, label in (shown if len(chosen) == 1 else {"law": "", **shown}).items():
-            numbers = (f"{_text(row[column]):10}" for row in chosen)
-            yield f"  {'  '.join([label.ljust(width), *numbers])}".rstrip()
-        yield ""
-        for row in chosen:
-            of_law = f"{row['law']}: " if len(chosen) > 1 else ""
-            yield from (of_law + said for said in sentences(row))
-        yield ""
-        rows = sorted(rows, key=lambda row: not row["answer"])
-        shown.pop("wind_1m_m_s", None)
-    if not varied or answer == "paper":
-        first["law"] = "force law"
-    first |= {c: label for c, label in shown.items() if c not in ("drag_n", "lift_n")}
-    if varied:
-        first |= {"measured_median": "measured", "measured_curve": "curve"}
-    holds = ["holds", *(f"no: {row['why_not']}" if row["why_not"] else "yes" for row in rows)]
-    columns = [[label, *(_text(row[c]) for row in rows)] for c, label in first.items()]
-    widths = [max(map(len, column)) for column in columns]
-    for *cells, last in zip(*columns, holds, strict=True):
-        yield "  ".join([*(f"{c:<{w}}" for c, w in zip(cells, widths, strict=True)), last])
-    if not varied:
-        yield f"\nlaws of the paper's rule: {' and '.join(LAWS_OF[rows[0]['regime']])}"
+        yield from _of_one(rows, answer)
     fluids = {(row["rho_f_kg_m3"], row["nu_m2_s"]) for row in rows}
     if fluid or fluids == {PAPER}:
-        ((rho, nu),) = fluids
+        ((density, viscosity),) = fluids
         name = fluid or "the paper's fluid (real air: --fluid air)"
-        yield f"{name}: {rho:g} kg/m3, {nu:.5g} m2/s"
+        yield f"{name}: {density:g} kg/m3, {viscosity:.5g} m2/s"
     liquid = [row for row in rows if row["rho_f_kg_m3"] >= GAS_BELOW]
     if any(_is_nan(row["depth_m"]) for row in liquid):
         yield "for the mean velocity of the liquid give its depth, --depth in m"
@@ -255,5 +301,81 @@ def as_text(
         yield "no mean velocity: U D/nu is below 2000, where the flow may be laminar"
 
 
+def _of_one(rows: Sequence["Row"], answer: str) -> Iterator[str]:
+    """The answer for one point, what was measured beside it, and a table of every law."""
+    from orchestrator.physics.beside import sentences
+    from orchestrator.physics.threshold import LAWS_OF
+
+    shown = _shown(rows)
+    chosen = [row for row in rows if row["answer"]]
+    name = f"Force law {chosen[0]['law']}: a grain"
+    if answer == "paper":  # which gives both of its laws where neither holds
+        name = "The paper's rule: a grain"
+    elif not chosen[0]["valid"]:
+        holding = ", ".join(f"--law {row['law']}" for row in rows if row["valid"])
+        name = f"Force law {chosen[0]['law']} does not hold here: {chosen[0]['why_not']}"
+        name = f"{name} (choose {holding}). By it a grain"
+    yield f"{name} of {rows[0]['d_m'] * 1000:.4g} mm starts to move at"
+    width = max(map(len, shown.values()))
+    listed = shown if len(chosen) == 1 else {"law": "", **shown}
+    for column, label in listed.items():
+        numbers = [f"{_text(row[column]):10}" for row in chosen]
+        yield f"  {'  '.join([label.ljust(width), *numbers])}".rstrip()
+    yield ""
+    for row in chosen:
+        of_law = f"{row['law']}: " if len(chosen) > 1 else ""
+        for said in sentences(row):
+            yield of_law + said
+    yield ""
+    shown.pop("wind_1m_m_s", None)
+    ordered = sorted(rows, key=lambda row: not row["answer"])
+    yield from _as_table(ordered, {"law": "force law", **shown})
+    yield f"\nlaws of the paper's rule: {' and '.join(LAWS_OF[rows[0]['regime']])}"
+
+
+def _of_many(rows: Sequence["Row"], answer: str, varied: Sequence[str]) -> Iterator[str]:
+    """The rows of the answer for many points."""
+    chosen = [row for row in rows if row["answer"]]
+    laws = [*dict.fromkeys(row["law"] for row in chosen)]
+    name = f"Force law {' and '.join(sorted(laws, key=len))}"
+    if answer == "paper":
+        name = "The paper's rule"
+    yield name
+    heads = {PARAMETERS[key].column: PARAMETERS[key].label for key in varied}
+    if answer == "paper" or len(laws) > 1:
+        heads["law"] = "force law"
+    measured = {"measured_median": "measured", "measured_curve": "curve"}
+    yield from _as_table(chosen, heads | _shown(rows) | measured)
+
+
+def _shown(rows: Sequence["Row"]) -> dict[str, str]:
+    """The quantities that some row has, by column, with their labels."""
+    shown = {}
+    for column, (_, label) in QUANTITIES.items():
+        if not all(_is_nan(row[column]) for row in rows):
+            shown[column] = label
+    if "mean_velocity_m_s" in shown:
+        shown.pop("current_1m_m_s", None)
+    return shown
+
+
+def _as_table(rows: Sequence["Row"], heads: Mapping[str, str]) -> Iterator[str]:
+    """Lines of a table, with a last column that says whether the law holds."""
+    holds = ["holds"]
+    for row in rows:
+        holds.append(f"no: {row['why_not']}" if row["why_not"] else "yes")
+    columns = []
+    for column, head in heads.items():
+        if column in ("drag_n", "lift_n"):
+            continue
+        cells = [head, *(_text(row[column]) for row in rows)]
+        width = max(map(len, cells))
+        columns.append([cell.ljust(width) for cell in cells])
+    for *cells, last in zip(*columns, holds, strict=True):
+        yield "  ".join([*cells, last])
+
+
 def _text(value: Value) -> str:
-    return value if isinstance(value, str) else "-" if _is_nan(value) else f"{value:.4g}"
+    if isinstance(value, str):
+        return value
+    return "-" if _is_nan(value) else f"{value:.4g}"

@@ -13,74 +13,124 @@ from orchestrator.errors import InputError
 from orchestrator.physics.beside import beside
 from orchestrator.physics.constants import GAS_BELOW
 from orchestrator.physics.laws import LAWS, Exposure, law
-from orchestrator.physics.threshold import LAWS_OF, PAPER, regime, threshold, why_not
+from orchestrator.physics.threshold import (
+    AUTO,
+    LAWS_OF,
+    PAPER,
+    default_laws,
+    regime,
+    threshold,
+    why_not,
+)
 from orchestrator.physics.velocity import measurable_speeds
-from orchestrator.types import Row
+from orchestrator.types import FloatArray, Row
 
 Table = dict[str, NDArray[Any]]  # columns of equal length by name
 
 
-def thresholds(points: Mapping[str, Any], answer: str = "bridged") -> Table:
-    """Thresholds of single grains under every force law; `answer` is one, or the paper's rule.
+def thresholds(points: Mapping[str, Any], answer: str = AUTO) -> Table:
+    """Thresholds of single grains under every force law.
 
-    `points` has sequences of equal length by keys of `PARAMETERS`; a parameter that is left out has
-    its default, and the depth none. The table has a row for each point and law, point by point.
-    A gas has winds, a liquid of a given depth a mean velocity where its flow is turbulent; the
-    others are NaN. ``answer`` is whether the law is one of those asked for.
+    Parameters
+    ----------
+    points
+        Sequences of equal length by keys of `PARAMETERS`. A parameter that is left out has
+        its default, and the depth none.
+    answer
+        The law that is asked for, ``auto`` for the default law, or the paper's rule.
+
+    Returns
+    -------
+    A row for each point and law, point by point. A gas has winds, a liquid of a given depth
+    a mean velocity where its flow is turbulent; the others are NaN. ``answer`` is whether
+    the law is one of those asked for.
 
     Raises
     ------
     InputError
-        For a law or a depth that is none, a point that is no scene, or if no law holds anywhere.
+        For a law or a depth that is none, a point that is no scene, or if no law holds
+        anywhere.
     """
-    try:
-        _ = answer == PAPER or law(answer)
-    except InputError as error:
-        raise InputError(error.what, "threshold: law", f"{error.remedy}, {PAPER}") from None
-    grains = _grains(points, count := len(points["diameter"]))
-    depth, d, rho = grains["depth"], grains["diameter"], grains["fluid_density"]
-    if "depth" in points and not ((depth > d).all() and (rho >= GAS_BELOW).any()):
-        what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
-        what = what if not (depth > d).all() else f"{rho[0]:g} kg/m3 is a gas"
-        remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
-        raise InputError(what, "threshold: depth", remedy)
+    if answer not in (AUTO, PAPER):
+        try:
+            law(answer)
+        except InputError as error:
+            remedy = f"{error.remedy}, {AUTO}, {PAPER}"
+            raise InputError(error.what, "threshold: law", remedy) from None
+    count = len(points["diameter"])
+    grains = _grains(points, count)
+    d, density = grains["diameter"], grains["fluid_density"]
+    depth = grains["depth"]
+    if "depth" in points:
+        _check_depth(depth, d, density)
     exposure = Exposure(
-        d, grains["roughness"], rho, grains["viscosity"], grains["lift_coefficient"]
+        d,
+        grains["roughness"],
+        density,
+        grains["viscosity"],
+        grains["lift_coefficient"],
     )
     rest = {name: grains[name] for name in ("density", "slope_deg", "gravity")}
+    pivot = {
+        "entrainment_angle_deg": grains["entrainment_angle_deg"],
+        "cohesion": grains["cohesion"],
+    }
     known = {each.column: grains[name] for name, each in PARAMETERS.items()}
-    beta, blocks = grains["entrainment_angle_deg"], []
-    liquid_depth = np.where(rho < GAS_BELOW, np.nan, depth)
+    liquid_depth = np.where(density < GAS_BELOW, np.nan, depth)
+    blocks = []
     with np.errstate(all="ignore"):  # numbers beyond all floats end as laws that do not hold
-        by_law = {
-            name: threshold(
-                each, exposure, entrainment_angle_deg=beta, cohesion=grains["cohesion"], **rest
-            )
-            for name, each in LAWS.items()
-        }
+        by_law = {n: threshold(each, exposure, **rest, **pivot) for n, each in LAWS.items()}
         regimes = regime(by_law["low"], by_law["high"]).astype(object)
-        picked = [LAWS_OF[each] if answer == PAPER else (answer,) for each in regimes]
+        picked = _picked(answer, regimes, by_law["bridged"].friction_velocity, exposure)
         for name, at in by_law.items():
-            numbers: Table = {c: getattr(at, key, rho) for c, (key, _) in QUANTITIES.items()}
-            numbers |= measurable_speeds(
-                at.friction_velocity,
+            ustar = at.friction_velocity
+            block: Table = {"law": np.full(count, name, object)}
+            # columns that are no attribute of a threshold follow below
+            block |= {c: getattr(at, key, density) for c, (key, _) in QUANTITIES.items()}
+            block |= measurable_speeds(
+                ustar,
                 roughness=grains["roughness"],
-                density=rho,
+                density=density,
                 viscosity=grains["viscosity"],
                 depth=liquid_depth,
             )
-            numbers |= {"stress_pa": rho * at.friction_velocity**2}
-            reasons = why_not(LAWS[name], at.friction_velocity, exposure, **rest)
-            block: Table = {"law": np.full(count, name, object), **numbers}
-            block |= {"valid": at.valid, "why_not": np.array(reasons, object), "regime": regimes}
+            block["stress_pa"] = density * ustar**2
+            block["valid"] = at.valid
+            reasons = why_not(LAWS[name], ustar, exposure, **rest)
+            block["why_not"] = np.array(reasons, object)
+            block["regime"] = regimes
             block |= beside({**known, **block, "force_law": block["law"]})
-            blocks.append({**block, "answer": np.array([name in laws for laws in picked])})
-    table = {each.column: np.repeat(grains[name], len(LAWS)) for name, each in PARAMETERS.items()}
+            block["answer"] = np.array([name in laws for laws in picked])
+            blocks.append(block)
+    table = {column: np.repeat(values, len(LAWS)) for column, values in known.items()}
     for column in blocks[0]:
         table[column] = np.stack([block[column] for block in blocks], axis=1).ravel()
     if not table["valid"].any():
-        raise InputError("no force law holds", "threshold", "are all numbers in SI units?")
+        remedy = "are all numbers in SI units?"
+        raise InputError("no force law holds", "threshold", remedy)
     return table
+
+
+def _check_depth(depth: FloatArray, d: FloatArray, density: FloatArray) -> None:
+    """Refuse a depth that does not cover the grains, or that of a gas."""
+    remedy = "give the depth of a liquid, in m; of water: fluid.kind water"
+    if not (depth > d).all():
+        what = f"a depth of {depth.min():g} m does not cover a grain of {d.max():g} m"
+        raise InputError(what, "threshold: depth", remedy)
+    if (density < GAS_BELOW).all():
+        raise InputError(f"{density[0]:g} kg/m3 is a gas", "threshold: depth", remedy)
+
+
+def _picked(
+    answer: str, regimes: NDArray[Any], ustar: FloatArray, exposure: Exposure
+) -> list[tuple[str, ...]]:
+    """The laws that answer each point; `ustar` is that of its threshold under `bridged`."""
+    if answer == PAPER:
+        return [LAWS_OF[regime] for regime in regimes]
+    if answer == AUTO:
+        names = default_laws(ustar, exposure)
+        return [(name,) for name in np.broadcast_to(names, len(regimes)).tolist()]
+    return [(answer,)] * len(regimes)
 
 
 def _grains(points: Mapping[str, Any], count: int) -> Table:
@@ -118,5 +168,5 @@ def _length(z0: Any, diameter: float) -> float:
     """A roughness length, m, of a number or a text such as ``d/30``; NaN of any other text."""
     if not isinstance(z0, str):
         return float(z0)
-    part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0)
+    part = re.fullmatch(r"d/([1-9]\d*(?:\.\d+)?)", z0, re.ASCII)
     return float(f"{diameter / float(part[1]):.12g}") if part else np.nan  # digits as in a scene

@@ -20,9 +20,10 @@ from orchestrator.flow.theory import seen_by_the_flow
 from orchestrator.grains.loads import Geometry
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.velocity import log_law_ustar
+from orchestrator.study import units
 from orchestrator.study.parts import PileBed, UnfitError
 from orchestrator.study.scene import Scene
-from orchestrator.study.study import Study
+from orchestrator.study.study import ASKED, Study
 
 MOST_GRAINS = 1e5  # largest length of a bed with grains, diameters
 FROZEN_BED = 0.05  # relative change of a threshold up to which the flow of the whole pile acts on
@@ -50,7 +51,12 @@ def check_study(study: Study) -> None:
     """Check every scene of a study as `check` does; messages name the file and the group."""
     for group in study.groups:
         for scene in group.scenes:
-            check(scene, group.where)
+            try:
+                check(scene, group.where)
+            except InputError as error:
+                # a number in another unit breaks many rules
+                asked = study.questions
+                raise units.first(asked, error, group.where, ASKED) from None
 
 
 def check(scene: Scene, where: str, *, grains: bool = True) -> None:
@@ -130,8 +136,8 @@ def _for_long(scene: Scene) -> str:
     if scene.is_poured:
         return "a shorter bed"
     if is_along(scene):
-        return 'protocol.method = "local", or a range of bed.counted; is a profile in mm?'
-    return "a range of bed.counted, or a shorter bed; is a profile in mm?"
+        return 'protocol.method = "local", or a range of bed.counted'
+    return "a range of bed.counted, or a shorter bed"
 
 
 def _unfit(scene: Scene, bed: PileBed, line: BedLine) -> str:

@@ -125,7 +125,8 @@ class Evidence:
                 table = table.merge(self.scenes[extra], on="scene_id", validate="many_to_one")
                 by_dem = table["answered_method"] == "dem"
                 table = table if name in ANSWERS else table[by_dem]
-            self._joined[name] = table
+            # one block: columns are added to more than a hundred others
+            self._joined[name] = table.copy()
         return self._joined[name]
 
     @cached_property

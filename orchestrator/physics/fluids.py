@@ -51,27 +51,55 @@ FLUIDS = {"water": (water, 0.0, 100.0), "seawater": (sea_water, 0.0, 40.0), "air
 
 
 def numbers_of(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table ``[fluid]`` with density (kg/m3) and viscosity (m2/s) in place of its kind.
+    """A table ``[fluid]`` with numbers in place of the kind of its fluid.
 
-    They have five digits, so that who writes them by hand asks for the same scene. An `InputError`
-    refuses a kind that has no formulas, a temperature beyond them, and what is given twice.
+    Parameters
+    ----------
+    table
+        A `kind` with its temperature, deg C, or a density (kg/m3) and a viscosity (m2/s).
+
+    Returns
+    -------
+    The table with density and viscosity. Those of a kind have five digits, so that who
+    writes them by hand asks for the same scene.
+
+    Raises
+    ------
+    InputError
+        For a kind that has no formulas, a temperature beyond them, and for what is given
+        twice.
+
+    Examples
+    --------
+    >>> numbers_of({"kind": "water"})
+    {'density': 999.1, 'viscosity': 1.1386e-06}
     """
-    rest = {name: value for name, value in table.items() if name not in ("kind", TEMPERATURE)}
+    rest = {key: value for key, value in table.items() if key not in ("kind", TEMPERATURE)}
     if len(rest) == len(table):
         return rest
-    kind, t = table.get("kind"), table.get(TEMPERATURE, STANDARD_DEG_C)
+    kind = table.get("kind")
     if kind not in [*FLUIDS]:
-        what = "a temperature needs it" if kind is None else f"no formulas of {kind!r} are here"
+        what = f"no formulas of {kind!r} are here"
+        if kind is None:
+            what = "a temperature needs it"
         near = difflib.get_close_matches(str(kind), FLUIDS, 1)
         names = f"did you mean {near[0]}?" if near else f"choose {', '.join(FLUIDS)}"
-        raise InputError(what, "fluid.kind", f"{names}; of others give density and viscosity")
+        remedy = f"{names}; of others give density and viscosity"
+        raise InputError(what, "fluid.kind", remedy)
     properties, low, high = FLUIDS[kind]
-    if not (isinstance(t, int | float) and low <= t <= high):
-        what = f"{t!r} is no temperature at which the formulas of {kind} hold"
-        raise InputError(what, f"fluid.{TEMPERATURE}", f"{low:g} ... {high:g} deg C")
+    temperature = table.get(TEMPERATURE, STANDARD_DEG_C)
+    # to Python a truth is a number
+    is_number = isinstance(temperature, int | float) and not isinstance(temperature, bool)
+    if not is_number or not low <= temperature <= high:
+        what = f"{temperature!r} is no temperature at which the formulas of {kind} hold"
+        remedy = f"{low:g} ... {high:g} deg C"
+        if is_number and low <= temperature - ZERO_C <= high:
+            celsius = f"{temperature - ZERO_C:.4g} deg C"
+            remedy = f"did you mean {temperature:g} K, {celsius}? There is {remedy}"
+        raise InputError(what, f"fluid.{TEMPERATURE}", remedy)
     for name in ("density", "viscosity"):
         if name in rest:
             raise InputError(f"{kind} has its own", f"fluid.{name}", "leave out one of the two")
-    density, viscosity = properties(float(t))
+    density, viscosity = properties(float(temperature))
     numbers = {"density": density, "viscosity": viscosity / density}
-    return rest | {name: float(f"{number:.5g}") for name, number in numbers.items()}
+    return rest | {name: float(f"{value:.5g}") for name, value in numbers.items()}

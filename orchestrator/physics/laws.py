@@ -321,6 +321,8 @@ class ForceLaw(ABC):
         Name of the drag law, for messages.
     drag_end
         Particle Reynolds number at which the drag law ends.
+    goes_on
+        Name of the law of the same flow whose drag law goes on there; empty for none.
     turns
         Whether the flow also turns the grain about its centre.
     protrudes
@@ -339,6 +341,7 @@ class ForceLaw(ABC):
     reynolds: ClassVar[tuple[float, float]] = (0.0, np.inf)
     drag_law: ClassVar[str] = "the drag law"
     drag_end: ClassVar[float] = np.inf
+    goes_on: ClassVar[str] = ""
     turns: ClassVar[bool] = False
     protrudes: ClassVar[bool] = False
 
@@ -612,6 +615,7 @@ class Bridged(DragAndSaffman):
 
     name = "bridged"
     label = "bridged"
+    goes_on = "bridged-gravel"
     reference = MODEL
     protrudes = True
     sphere = SCHILLER_NAUMANN
@@ -637,6 +641,7 @@ class BridgedGravel(Bridged):
     """
 
     name = "bridged-gravel"
+    goes_on = ""
     label = "bridged, drag of Clift & Gauvin"
     reference = (
         f"{MODEL}; drag: R. Clift and W. H. Gauvin, Can. J. Chem. Eng. 49, 1971, "

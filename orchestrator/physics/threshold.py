@@ -18,6 +18,8 @@ LAWS_OF: dict[Regime, tuple[str, ...]] = {
     "transition": ("low", "high"),
 }
 """Names of the laws that the paper's rule picks in each regime."""
+AUTO = "auto"
+"""The default force law: `bridged`, or `bridged-gravel` where the drag law of that ends."""
 PAPER = "paper"
 """The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, else both."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
@@ -585,6 +587,34 @@ def shields_at(
     moment = of_drag + of_lift + 2 * law.torque(ustar, unit)
     resistance = np.pi / 6 * pivot_resistance(slope_deg, entrainment_angle_deg)
     return np.asarray(resistance * ustar**2 / moment)
+
+
+def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
+    """Which law answers a grain for which none is asked.
+
+    Parameters
+    ----------
+    ustar
+        Friction velocity of its threshold under the law `bridged`, m/s.
+    exposure
+        The grain and its fluid.
+
+    Returns
+    -------
+    ``bridged``, or ``bridged-gravel`` where the particle Reynolds number is not below the
+    end of the drag law of `bridged`. The two differ by 5 % in the drag there.
+
+    Examples
+    --------
+    >>> sizes = Exposure([1e-3, 3e-2], [1e-3 / 30, 1e-3], 1000.0, 1e-6)
+    >>> default_laws([0.018, 0.25], sizes).tolist()
+    ['bridged', 'bridged-gravel']
+    """
+    bridged = LAWS["bridged"]
+    with np.errstate(invalid="ignore"):  # no flow moves the grain: its u* is infinite
+        reynolds = bridged.particle_reynolds(ustar, exposure)
+    has_ended = reynolds >= bridged.drag_end
+    return np.where(has_ended, bridged.goes_on, bridged.name)
 
 
 def regime(low: Threshold, high: Threshold) -> NDArray[np.str_]:

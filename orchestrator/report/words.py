@@ -88,7 +88,7 @@ def _pile(row: pd.Series, results: Results, telling: Sequence[str]) -> str:
     line = results.plan.piles[str(row["scene_id"])].model.line
     x, z = line.crest
     told = labels.told(row, ["alpha_deg", "d_m", *telling])
-    facts = {"name": ", ".join(told if z > 0 else ["level bed", *told[1:]])}
+    facts = {"name": ", ".join(told if z > 0 else ["Level bed", *told[1:]])}
     if row["first_ustar0_m_s"] > 0 and z > 0:  # a level bed has no place that goes first
         facts |= {"x": labels.amount(row["first_x_m"], "m"), "crest": labels.amount(float(x), "m")}
         facts["top"] = "obstacle" if any(a <= x <= b for a, b in line.bare) else "bed"
@@ -114,8 +114,14 @@ def _grains(results: Results) -> list[str]:
 
 def _measured(row: pd.Series) -> str:
     """What was measured beside a threshold."""
-    said = sentences(row.to_dict())[: 1 + (row["tested_rows"] > 0)]
-    return " ".join(f"{one[0].upper()}{one[1:]}." for one in said)
+    measured, tested = sentences(row.to_dict())
+    said = [measured, tested] if row["tested_rows"] > 0 else [measured]
+    return " ".join(f"{_capital(one)}." for one in said)
+
+
+def _capital(text: str) -> str:
+    """A sentence with a capital at its beginning; a symbol such as θ stays as it is."""
+    return f"{text[0].upper()}{text[1:]}" if text[0].isascii() else text
 
 
 def flow_at(row: pd.Series, ustar: float) -> str:
@@ -151,6 +157,8 @@ def doubts(results: Results) -> list[str]:
     table = piles if len(piles) else _single(results)
     count, usable = len(table), table["usable"].sum() if len(table) else 0
     said = [f"Usable: {usable} of {count} thresholds."] if usable < count else []
+    for question in results.study.questions:
+        said.append(question if question.endswith("?") else f"{question}.")
     if PAPER in zip(results.scenes["rho_f_kg_m3"], results.scenes["nu_m2_s"], strict=True):
         said.append("The fluid is the paper's, 1 kg/m³, 1e-5 m²/s; real air: fluid.kind = 'air'.")
     if piles.empty:

@@ -8,12 +8,15 @@ from dataclasses import replace
 from typing import cast
 
 from orchestrator.physics import velocity
+from orchestrator.physics.laws import Exposure
 from orchestrator.physics.threshold import (
+    AUTO,
     LAWS_OF,
     PAPER,
     Regime,
     SingleGrain,
     Threshold,
+    default_laws,
     regime,
     thresholds_of,
 )
@@ -36,7 +39,7 @@ def closed_form(scene: Scene, name: str | None = None) -> Threshold:
     Under gusts u*, Re* and the Shields number are those of the mean flow, the forces those of the
     gust.
     """
-    at = thresholds_of(name or scene.forces.law, [single_grain(scene)])[0]
+    at = thresholds_of(name or law_of(scene), [single_grain(scene)])[0]
     if scene.gust == 1:
         return at
     root = scene.gust**0.5
@@ -67,16 +70,47 @@ def law_holds(scene: Scene) -> bool:
     return bool(closed_form(scene).valid)
 
 
+def law_of(scene: Scene) -> str:
+    """The force law that answers a scene: where none is asked for, one that holds."""
+    if scene.forces.law != AUTO:
+        return scene.forces.law
+    grain = single_grain(scene)
+    (at,) = thresholds_of("bridged", [grain])
+    return str(default_laws(at.friction_velocity, Exposure(*grain[:5])))
+
+
 def resolved(scenes: Sequence[Scene]) -> Iterator[tuple[Scene, ...]]:
-    """Each scene with one force law; by the paper's rule a scene becomes two in the transition."""
-    # many thresholds at once take a hundredth of the time that they take one after the other
+    """Each scene with one force law.
+
+    Where a scene leaves the law open, it is one that holds for its single grain. By the
+    paper's rule a scene becomes two in the transition.
+    """
+    # many thresholds at once take a hundredth of the time that they take one after another
     grains = {scene.id: single_grain(scene) for scene in scenes}
-    for name in {scene.forces.law for scene in scenes} - {PAPER}:
-        thresholds_of(name, [grains[each.id] for each in scenes if each.forces.law == name])
-    for name in ("low", "high"):  # the tables have the regime of each scene, whatever its law
-        thresholds_of(name, [*grains.values()])
+    asked: dict[str, list[SingleGrain]] = {"low": [], "high": []}
     for scene in scenes:
-        parts = {part: getattr(scene, part) for part in Scene.model_fields}
-        laws = LAWS_OF[regime_of(scene)] if scene.forces.law == PAPER else ()
-        forces = (scene.forces.model_copy(update={"law": law}) for law in laws)
-        yield tuple(Scene(**{**parts, "forces": each}) for each in forces) or (scene,)
+        grain = grains[scene.id]
+        # the tables have the regime of each scene, whatever its law
+        asked["low"].append(grain)
+        asked["high"].append(grain)
+        name = "bridged" if scene.forces.law == AUTO else scene.forces.law
+        if name != PAPER:
+            asked.setdefault(name, []).append(grain)
+    for name, of_law in asked.items():
+        thresholds_of(name, of_law)
+    for scene in scenes:
+        laws: tuple[str, ...] = (scene.forces.law,)
+        if scene.forces.law == AUTO:
+            laws = (law_of(scene),)
+        elif scene.forces.law == PAPER:
+            laws = LAWS_OF[regime_of(scene)]
+        yield tuple(_under(scene, law) for law in laws)
+
+
+def _under(scene: Scene, law: str) -> Scene:
+    """A scene under another force law."""
+    if law == scene.forces.law:
+        return scene
+    parts = {part: getattr(scene, part) for part in Scene.model_fields}
+    parts["forces"] = scene.forces.model_copy(update={"law": law})
+    return Scene(**parts)

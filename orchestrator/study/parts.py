@@ -26,8 +26,11 @@ from orchestrator.study.profile import Profile
 from orchestrator.study.shapes import SHAPES, Shape
 from orchestrator.types import FloatArray
 
-LAW_LABELS = {"paper": "Eq. 2 or Eq. 4 where each holds, both in the transition"}
-LAW_LABELS |= {name: law.label for name, law in LAWS.items()}
+LAW_LABELS = {
+    "auto": "bridged, or bridged-gravel where the drag law of bridged ends",
+    "paper": "Eq. 2 or Eq. 4 where each holds, both in the transition",
+    **{name: law.label for name, law in LAWS.items()},
+}
 SHAPE_MEANINGS = {name: shape.meaning for name, shape in SHAPES.items()}
 Turbulence = Literal["kEpsilon", "RNGkEpsilon", "realizableKE", "kOmegaSST"]
 Packing = Literal["aligned", "horizontal", "disordered", "poured"]
@@ -189,7 +192,7 @@ class Grain(Part):
 class Forces(Part):
     """How the grains feel the flow."""
 
-    law: LawName = field("bridged", label="force law", column="force_law", choices=LAW_LABELS)
+    law: LawName = field("auto", label="force law", column="force_law", choices=LAW_LABELS)
     """drag and lift on an exposed grain"""
     lift_coefficient: float = field(LIFT_COEFFICIENT, "α_s", "", "alpha_s", ge=0, le=100)
     """lift coefficient"""

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from hashlib import sha256
@@ -16,6 +17,7 @@ from orchestrator.digits import on_grid
 from orchestrator.errors import InputError
 from orchestrator.runs.files import digest_text, opened
 from orchestrator.study.shapes import SHAPES
+from orchestrator.study.units import number
 from orchestrator.types import FloatArray
 
 LARGEST, LARGEST_NUMBER = 20 * 2**20, 1e5  # bytes of a file, and largest coordinate, m
@@ -178,25 +180,69 @@ def read_columns(
 ) -> tuple[list[int], list[list[float]]]:
     """Two columns of a CSV file with a header; blank lines and other columns are left out.
 
-    Returned are the number of each line and its two values. An `InputError` names the line.
+    Parameters
+    ----------
+    text
+        The file.
+    names
+        The names of the columns, in metres or without a unit.
+    where
+        The file, for messages.
+
+    Returns
+    -------
+    The number of each line, and its two values.
+
+    Raises
+    ------
+    InputError
+        With the line and the remedy.
     """
     reader = csv.DictReader(io.StringIO(text))
     lines, values = [], []
     try:
-        header = reader.fieldnames = [name.strip() for name in reader.fieldnames or ()]
-        if any(header.count(name) != 1 for name in names):
-            raise ValueError(f"not one column {names[0]} and one {names[1]}")
+        reader.fieldnames = _header(reader.fieldnames or (), names)
         for row in reader:
-            pair = [float(row[name] or "") for name in names]
-            is_number = all(abs(value) <= LARGEST_NUMBER for value in pair)
-            if None in row or None in row.values() or not is_number:
-                raise ValueError(f"not a number up to {LARGEST_NUMBER:g} for each column")
+            pair = [_cell(row, name) for name in names]
+            if None in row:
+                count = len(reader.fieldnames)
+                more = len(row[None])
+                what = f"{count + more} cells, the header has {count}"
+                raise ValueError(f"{what}: a decimal comma? Write a decimal point")
             lines.append(reader.line_num)
             values.append(pair)
     except (ValueError, csv.Error) as error:
-        remedy = f"the first line is {','.join(names)}: metres, decimal points, commas between"
-        raise InputError(str(error), f"{where}: line {reader.line_num or 1}", remedy) from None
+        remedy = f"the first line must be {','.join(names)}, then numbers"
+        if names[0].endswith("_m"):
+            remedy = f"{remedy} in m"
+        place = f"{where}: line {reader.line_num or 1}"
+        raise InputError(str(error), place, remedy) from None
     return lines, values
+
+
+def _header(cells: Sequence[str], names: tuple[str, str]) -> list[str]:
+    """The names of the columns in the header; a ValueError unless each is there once."""
+    header = [cell.strip() for cell in cells]
+    if all(header.count(name) == 1 for name in names):
+        return header
+    what = f"not one column {names[0]} and one {names[1]} in {','.join(header)!r}"
+    if len(header) == 1 and ";" in header[0]:
+        what = f"{what}: commas between the cells, no semicolons"
+    raise ValueError(what)
+
+
+def _cell(row: Mapping[str | None, Any], name: str) -> float:
+    """The number in a cell; a ValueError for any other text."""
+    text = row[name]
+    if text is None or not text.strip():
+        raise ValueError(f"the cell of {name} is empty")
+    try:
+        value = number(text)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if not abs(value) <= LARGEST_NUMBER:
+        raise ValueError(f"{name}: {text.strip()} is not a number up to {LARGEST_NUMBER:g}")
+    return value
 
 
 @cache

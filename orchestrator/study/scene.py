@@ -130,9 +130,13 @@ class Scene(parts.Part):
         d, slack = self.grain.diameter, OFF_MEDIAN
         if isinstance(mixture, tuple):
             (diameters, fractions), slack = np.array(mixture).T, 1e-9
-            wrong = np.any(np.diff(diameters) <= 0) or abs(fractions.sum() - 1) > 1e-6
-            what = f"diameters do not rise, or fractions add up to {fractions.sum():.6g}, not 1"
-            yield wrong, "grain.sizes", what, "look at the rows"
+            for one, other in pairwise(diameters.tolist()):
+                what = f"diameters do not rise: {other:g} m comes behind {one:g} m"
+                yield other <= one, "grain.sizes", what, "sort the rows, each size once"
+            total = float(fractions.sum())
+            what = f"fractions add up to {total:.6g}, not 1"
+            remedy = f"divide each by {total:.6g}"
+            yield abs(total - 1) > 1e-6, "grain.sizes", what, remedy
         median, (low, high) = parts.percentile(mixture, d, 0.5), parts.extremes(mixture, d)
         off, what = abs(median / d - 1) > slack, f"the d50 of grain.sizes is {median:.6g} m"
         yield off, "grain.diameter", what, "write that, or change the cut-offs"
@@ -302,7 +306,8 @@ def roughness_length(text: str, diameter: float, mixture: parts.Sizes | None = N
     In a mixture d is the median; ``"d84/30"`` is a part of the diameter that 84 % of the mass are
     finer than.
     """
-    match = re.fullmatch(r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*", text)
+    form = r"\s*d([1-9]\d)?\s*/\s*(\d+(?:\.\d+)?)\s*"
+    match = re.fullmatch(form, text, re.ASCII)
     if not match or float(match[2]) == 0:
         raise parts.UnfitError(
             "bed.roughness", f"{text!r} is not a length", 'write metres, or "d/30"'

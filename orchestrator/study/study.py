@@ -8,12 +8,15 @@ import difflib
 import itertools
 import math
 import os
+import re
 import tomllib
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,13 +24,14 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
 from orchestrator.physics import fluids
+from orchestrator.study import units
 from orchestrator.study.closed_form import resolved
 from orchestrator.study.fields import PARTS
 from orchestrator.study.parts import List, Part, PileBed, Sizes, UnfitError, percentile
-from orchestrator.study.profile import Files, decoded, read_bytes
+from orchestrator.study.profile import LARGEST_NUMBER, Files, decoded, read_bytes
 from orchestrator.study.scene import Scene, roughness_length
 from orchestrator.study.shapes import SHAPES
-from orchestrator.study.source import Source, find
+from orchestrator.study.source import Source, find, presets
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
@@ -47,6 +51,7 @@ GONE_VALUES = {
     ),
 }
 """Values that keys of study files had before: what became of them, and what to write now."""
+UNKNOWN, MISSING = "unknown key", "is missing"
 Table = dict[str, Any]
 Wind = Annotated[float, Field(gt=0, le=150)]
 MIXTURE: TypeAdapter[Sizes | None] = TypeAdapter(Sizes | None)
@@ -130,6 +135,75 @@ class Study:
         """Every scene once, in the file's order."""
         return tuple({scene.id: scene for group in self.groups for scene in group.scenes}.values())
 
+    @cached_property
+    def questions(self) -> tuple[str, ...]:
+        """Questions on numbers that are usual in another unit; of a preset none."""
+        asked = units.questions(_values_of(self.scenes), {})
+        profiles = {}
+        for scene in self.scenes:
+            if isinstance(scene.bed, PileBed) and scene.bed.profile:
+                profiles[scene.bed.profile] = scene.bed.height
+        for profile, height in profiles.items():
+            asked += units.of_profile(profile.name, profile.x[-1], height)
+        for sizes in dict.fromkeys(scene.grain.sizes for scene in self.scenes):
+            if isinstance(sizes, tuple):
+                asked += units.of_sieve([diameter for diameter, _ in sizes])
+        if not asked:
+            return ()
+        texts = [path.read_text(encoding="utf-8") for path in presets().values()]
+        return () if self.text in texts else tuple(asked)
+
+
+ASKED = (
+    "grain.diameter",
+    "grain.density",
+    "grain.cohesion",
+    "fluid.density",
+    "fluid.viscosity",
+    "fluid.gravity",
+    "bed.slope_deg",
+    "bed.entrainment_angle_deg",
+    "forces.lift_coefficient",
+)
+"""The fields that are asked about where their numbers are usual in another unit."""
+
+
+def _values_of(scenes: Sequence[Scene]) -> dict[str, list[float]]:
+    """The values of the fields `ASKED` in some scenes."""
+    values = {name: [*map(attrgetter(name), scenes)] for name in ASKED}
+    # the diameter of a sieve table follows from its rows, the slope of a profile from its points
+    single = [scene.grain for scene in scenes if not isinstance(scene.grain.sizes, tuple)]
+    values["grain.diameter"] = [grain.diameter for grain in single]
+    beds = [scene.bed for scene in scenes]
+    given = [bed for bed in beds if not (isinstance(bed, PileBed) and bed.profile)]
+    values["bed.slope_deg"] = [bed.slope_deg for bed in given]
+    return values
+
+
+def _values_in(parts: Mapping[str, Table]) -> dict[str, list[float]]:
+    """The values of the fields `ASKED` in the tables of one scene, which may be wrong."""
+    given = {name: dict(parts.get(name, {})) for name in PARTS}
+    with suppress(InputError):
+        given["fluid"] = fluids.numbers_of(given["fluid"])
+    values = {}
+    for field in ASKED:
+        part, _, name = field.partition(".")
+        value = given[part].get(name, PARTS[part].model_fields[name].default)
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        values[field] = [value] if is_number and abs(value) < LARGEST_NUMBER else []
+    return values
+
+
+def _sieve_in(parts: Mapping[str, Table], files: Files, where: str) -> list[float]:
+    """The diameters of a sieve table in the tables of one scene, which may be wrong."""
+    sizes = parts.get("grain", {}).get("sizes")
+    with suppress(InputError):
+        if isinstance(sizes, str):
+            sizes = files.sieve(sizes, where)
+    rows = sizes if isinstance(sizes, list) else []
+    firsts = [row[0] for row in rows if isinstance(row, list) and row]
+    return [value for value in firsts if isinstance(value, int | float)]
+
 
 def load(source: str | Path, tolerance: float | None = None) -> Study:
     """Read a study file by its path, or a preset by its name.
@@ -161,6 +235,8 @@ def load(source: str | Path, tolerance: float | None = None) -> Study:
     study = replace(study, source=origin)
     if tolerance is not None:
         study = replace(study, tolerance=tolerance)
+    if study.questions:
+        warnings.warn("; ".join(study.questions), stacklevel=2)
     return study
 
 
@@ -191,7 +267,7 @@ def parse(text: str, *, name: str, where: str, files: Files | None = None) -> St
     except ValidationError as error:
         raise _explained(error, where) from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"not TOML: {error}", where) from None
+        raise _not_toml(str(error), text, where) from None
     if files is None:
         files = Files(Path(where).parent)
     files.carried = dict(file.profiles)
@@ -251,7 +327,16 @@ def _scenes(
         parts = {part: dict(tables[part]) for part in PARTS}
         for (part, _, name), value in zip(keys, point, strict=True):
             parts[part][name] = value
-        scene = make_scene(parts, where, files)
+        try:
+            scene = make_scene(parts, where, files)
+        except InputError as error:
+            if error.what in (UNKNOWN, MISSING):
+                raise
+            asked = units.of_sieve(_sieve_in(parts, files, where))
+            if asked:  # the diameter and all that depends on it follow from the table
+                raise units.first(asked, error, where, ()) from None
+            asked = units.questions(_values_in(parts), {})
+            raise units.first(asked, error, where, ASKED) from None
         if (same := points.setdefault(scene.id, point)) is not point:
             what = f"{', '.join(map(str, same))} and {', '.join(map(str, point))} are one scene"
             raise InputError(what, f"{where}: axes", "list each value once")
@@ -303,6 +388,17 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
         raise _explained(error, where) from None
 
 
+def _not_toml(error: str, text: str, where: str) -> InputError:
+    """The refusal of a file that is no TOML, with how to write the number in its line."""
+    remedy = ""
+    place = re.search(r"\(at line (\d+), column \d+\)", error)
+    if place:
+        line = text.splitlines()[int(place[1]) - 1]
+        value = line.partition("=")[2].partition("#")[0]
+        remedy = units.meant(value)
+    return InputError(f"not TOML: {error}", where, remedy)
+
+
 def _explained(error: ValidationError, where: str) -> InputError:
     """The refusal of a file's tables, for the first thing that is wrong in them."""
     # a misspelt key says more than the field that is missing because of it
@@ -325,9 +421,11 @@ def _explained(error: ValidationError, where: str) -> InputError:
         what, remedy = GONE_VALUES[name, value]
         return InputError(f"{value!r}: {what}", place, remedy)
     if first["type"] == "missing":
-        return InputError("is missing", place, "add it to the file")
+        return InputError(MISSING, place, "add it to the file")
     if first["type"] != "extra_forbidden":
         remedy = first["msg"].lower().replace("dictionary", "table").replace("tuple", "list")
+        if isinstance(value, str):
+            remedy = units.meant(value) or remedy
         return InputError(f"{value!r} is not accepted", place, remedy)
     if branch == "grain" and key in PileBed.model_fields:
         return InputError("a bed of one grain has none", place, 'a pile has it: kind = "pile"')
@@ -338,6 +436,4 @@ def _explained(error: ValidationError, where: str) -> InputError:
     written |= {name: name for name in (tables[here].model_fields if here else keys)}
     close = difflib.get_close_matches(key, written, n=1)
     listed = "known keys: docs/study-file.md"
-    return InputError(
-        "unknown key", place, f"did you mean {written[close[0]]}?" if close else listed
-    )
+    return InputError(UNKNOWN, place, f"did you mean {written[close[0]]}?" if close else listed)

@@ -35,8 +35,9 @@ COLUMNS: dict[str, str] = {
     **{column: f"{one.phrase}: as it was run" for column, one in fields.ANSWERS.items()},
 }
 """Every column of every table, with its meaning; units are in the names."""
-FORMULA = r"^(?=[=@\t\n]|[+-](?![\d.]+(e[+-]?\d+)?$|inf$))"
-"""Beginning of a text that spreadsheets run as a formula; no number is one."""
+FORMULA = r"(?='*(?:[=@\t\n]|[+-](?![\d.]+(?:e[+-]?\d+)?$|inf$)))"
+"""What follows the beginning of a text that spreadsheets run as a formula; no number is one. Such a
+text is written behind one more apostrophe."""
 NAMES = ("scene_id", "group", "profile", "case", "flow_case", "why_not")
 """Columns of texts that may look like numbers, or be empty."""
 
@@ -139,7 +140,15 @@ def _text(value: Any, form: str) -> str:
 @cache
 def _harmless(text: str) -> str:
     # a reader takes \r without quotes for the end of the row
-    return re.sub(FORMULA, "'", re.sub(r"\r\n?", "\n", text))
+    lines = re.sub(r"\r\n?", "\n", text)
+    return f"'{lines}" if re.match(FORMULA, lines) else lines
+
+
+def _as_it_was(text: Any) -> Any:
+    """A text of a table without the apostrophe that it was written behind, if it was."""
+    if isinstance(text, str) and re.match(f"'{FORMULA}", text):
+        return text[1:]
+    return text
 
 
 def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> None:
@@ -152,16 +161,32 @@ def write(tables: Mapping[str, pd.DataFrame], folder: Folder, place: str) -> Non
 
 
 def read(folder: Folder, place: str) -> Tables:
-    """Read the tables that `write` wrote; an OrchestratorError if none, or if one has changed."""
-    files = [name for name in folder.written() if fnmatchcase(name, f"{place}/*.csv")]
-    names = {PurePath(file).stem: file for file in files if PurePath(file).stem != "columns"}
-    if not names:
+    """Read the tables that `write` wrote.
+
+    Raises
+    ------
+    OrchestratorError
+        If there are none, or if one has changed.
+    """
+    tables = {}
+    for file in folder.written():
+        name = PurePath(file).stem
+        if fnmatchcase(file, f"{place}/*.csv") and name != "columns":
+            tables[name] = _table(folder.read(file))
+    if not tables:
         where = str(folder.root / place)
         raise OrchestratorError("there are no tables", where, "run the study first")
-    texts: dict[Any, Any] = dict.fromkeys(NAMES, "str")
-    how: dict[str, Any] = {"dtype": texts, "keep_default_na": False, "na_values": [""]}
-    tables = {name: pd.read_csv(BytesIO(folder.read(file)), **how) for name, file in names.items()}
-    for table in tables.values():
-        if "why_not" in table:
-            table["why_not"] = table["why_not"].fillna("")
     return tables
+
+
+def _table(content: bytes) -> pd.DataFrame:
+    """A table from its file."""
+    texts: dict[Any, Any] = dict.fromkeys(NAMES, "str")
+    table = pd.read_csv(BytesIO(content), dtype=texts, keep_default_na=False, na_values=[""])
+    for column in table.select_dtypes(["object", "string"]):
+        if table[column].str.startswith("'").any():
+            table[column] = table[column].map(_as_it_was)
+    if "why_not" in table:
+        table["why_not"] = table["why_not"].fillna("")
+    # one block: columns may be added to more than a hundred others
+    return table.copy()

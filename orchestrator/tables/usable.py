@@ -132,7 +132,14 @@ def _beyond_law(name: str, rows: pd.DataFrame, ustar: "pd.Series[float]") -> lis
     grain = {"density": "rho_sol_kg_m3", "slope_deg": "alpha_deg", "gravity": "g_m_s2"}
     # a pile has the share of grains that lift carried off
     weights = {} if "share_carried_off" in rows else {k: number[c] for k, c in grain.items()}
-    return why_not(law, np.asarray(ustar, float), exposure, **weights)
+    speeds = np.asarray(ustar, float)
+    texts = why_not(law, speeds, exposure, **weights)
+    if law.goes_on:
+        holds = LAWS[law.goes_on].valid(speeds, exposure)
+        remedy = f'; choose forces.law = "{law.goes_on}"'
+        for row in np.flatnonzero(holds).tolist():
+            texts[row] += remedy if texts[row] else ""
+    return texts
 
 
 def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
@@ -140,7 +147,9 @@ def _reasons(row: Mapping[Any, Any], tolerance: float | None) -> Iterator[str]:
         yield f"not reached: {_reached(row)}"
     elif row["law"]:
         yield row["law"]
-    if row["standing_out"] < EXPOSED_FROM:
+    if row["standing_out"] <= 0:
+        yield "hidden grain: it lies below the tops of its neighbours"
+    elif row["standing_out"] < EXPOSED_FROM:
         yield f"hidden grain: {row['standing_out']:.0%} of it stands out of its neighbours"
     if (flow := row["flow_reynolds"]) < LAMINAR_BELOW:
         yield f"laminar flow: speed times depth over nu, {flow:.0f}, is below {LAMINAR_BELOW:g}"

@@ -157,13 +157,23 @@ def test_a_number_that_is_usual_in_another_unit_is_asked_about_and_answered(
         ([*D, "--roughness", "d/30:1e-4:3"], ["--roughness: 'd/30:1e-4:3' is neither"]),
         ([*D, "--slope", "0:31:5"], ["--slope: 31 deg"]),
         (["--diameter", "1e-4:1e-3:400", "--slope", "0:30:400"], ["160000 points", "COUNT"]),
-        ([*D, "--density", "2.65", *WATER], ["--density 2650?"]),
+        ([*D, "--density", "2.65", *WATER], ["--density: 2.65 kg/m3: did you", "--density 2650?"]),
         ([*D, "--density", "900", *WATER], ["--density", "lower --fluid-density"]),
         ([*D, "--depth", "1"], ["--depth", "gas", "--fluid water"]),
         ([*QUARTZ_IN_WATER, "--depth", "1e-4"], ["--depth", "does not cover"]),
         ([*D, "--law", "bridge"], ["--law", "did you mean bridged?", "paper"]),
         (["--diameter", "0.2"], ["no force law holds", "0.2 mm, --diameter 0.0002?"]),
-        (["--diameter", "200"], ["--diameter", "equal to 10; 200 m", "200 um, --diameter 0.0002?"]),
+        (
+            ["--diameter", "200"],
+            ["--diameter: 200 m: did you mean", "--diameter 0.0002? (else"],
+        ),
+        ([*D, "--diameter", "0,25"], ["--diameter", "write 0.25"]),
+        ([*D, "--diameter", "0.25 mm"], ["--diameter", "write 0.00025, without a unit"]),
+        ([*D, "--diameter", "1_0e-4"], ["--diameter: '1_0e-4' is neither"]),
+        ([*D, "--diameter", "١e-3"], ["--diameter: '١e-3' is neither"]),
+        ([*D, "--roughness", "d/٣٠"], ["--roughness: 'd/٣٠' is not a length"]),
+        ([*D, "--fluid", "air", "--temperature", "١"], ["invalid number value: '١'"]),
+        ([*D, "--fluid", "air", "--temperature", "288"], ["288 K, 14.85 deg C?"]),
         ([*D, "--fluid", "air", "--viscosity", "1"], ["--viscosity: air has its own"]),
         (["--diam", "1e-3"], ["there is no option --diam: did you mean --diameter?"]),
         ([*D, "--csv", "--json"], ["--json", "not allowed with"]),
@@ -178,3 +188,22 @@ def test_refusals_are_one_line_that_names_the_option(
     assert len(lines) == 1, err
     for word in words:
         assert word in lines[0]
+
+
+def test_gravel_is_answered_by_a_law_that_holds(run: Run) -> None:
+    """The drag law of the law bridged ends at a particle Reynolds number of 1000."""
+    gravel = ["--diameter", "0.03", "--density", "2650", "--fluid", "water"]
+    code, out, _ = run(*gravel)
+    assert code == 0
+    assert out.startswith("Force law bridged-gravel: a grain of 30 mm starts to move at")
+    assert "stress, Pa           19.21" in out
+    asked = run(*gravel, "--law", "bridged")[1].splitlines()[0]
+    assert asked.startswith("Force law bridged does not hold here: particle Reynolds number")
+    assert "(choose --law bridged-gravel)" in asked
+    sizes = ["--diameter", "1e-3:0.03:3", "--density", "2650", *WATER]
+    rows = csv.DictReader(io.StringIO(run(*sizes, "--csv")[1]))
+    answers = [row["law"] for row in rows if row["answer"] == "True"]
+    assert answers == ["bridged", "bridged-gravel", "bridged-gravel"]
+    lines = run(*sizes)[1].splitlines()
+    assert lines[0] == "Force law bridged and bridged-gravel"
+    assert all(line.endswith("yes") for line in lines[2:5])

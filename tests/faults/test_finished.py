@@ -132,7 +132,7 @@ def test_a_finished_study_is_answered_without_any_library(
 
 
 EDITED = """title = "first"
-tolerance = 0.0
+tolerance = 0.3
 grain = { diameter = 1e-3 }
 protocol = { method = "pivot", fractions = [0.1] }
 [fluid]
@@ -229,7 +229,7 @@ def test_a_file_that_a_study_names_is_a_part_of_it(name: str, edited: Path) -> N
 def test_tolerance_and_place_are_parts_of_the_question(edited: Path, tmp_path: Path) -> None:
     file, out = edited / "edited.toml", edited / "out"
     assert _is_finished(file, out)
-    for tolerance in (0.05, 0.0, float("nan")):
+    for tolerance in (0.05, 0.3, float("nan")):
         assert not _is_finished(file, out, tolerance)
     # a copy of file and directory together is finished, another file is not
     copy = tmp_path / "copy"

@@ -43,11 +43,23 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "two columns of a name": ("x_m,z_m,x_m\n0,0,0\n", "line 1: not one column x_m"),
     "unsorted": (points("0,0", "2,0.1", "1,0.2", "3,0"), "line 4: x does not rise to 1 m"),
     "overhang": (long((30, "0.14,0.02")), "line 32: x does not rise to 0.14 m"),
-    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: not a number"),
+    "decimal commas": (points("0,0", "0,1,0,2", "2,0"), "line 3: 4 cells, .*decimal comma"),
+    "semicolons": ("x_m;z_m\n0;0\n", "line 1: .*no semicolons .the first line must be x_m,z_m"),
     **{
-        f"not a number: {cell}": (points("0,0", f"1{cell}", "2,0"), "line 3: (not a|could not)")
-        for cell in (",nan", ",inf", ",1e6", ",high", ",", "")
+        f"not a number: {cell}": (points("0,0", f"1,{cell}", "2,0"), f"line 3: {message}")
+        for cell, message in {
+            "nan": "z_m: nan is not a number up to",
+            "inf": "z_m: inf is not a number up to",
+            "1e6": "z_m: 1e6 is not a number up to",
+            "high": "z_m: 'high' is no number",
+            "1_0": "z_m: '1_0' is no number",
+            "٣": "z_m: '٣' is no number",
+            "20 mm": "z_m: '20 mm' is no number: write 0.02, without a unit",
+            '"0,1"': "z_m: '0,1' is no number: write 0.1",
+            "": "the cell of z_m is empty",
+        }.items()
     },
+    "a missing cell": (points("0,0", "1", "2,0"), "line 3: the cell of z_m is empty"),
     "a gap": (long((30, "0.9,0.0"), *((i, f"{0.9 + i / 200},0") for i in range(31, 60))), "a gap"),
     "too steep": (points("0,0", "1,0.1", "1.01,0.9", "3,0"), "line 4: 89 deg at x = 1 m, above"),
     "level": (points("0,0.3", "1,0.3", "2,0.3"), "level: it has no height"),

@@ -88,7 +88,7 @@ FILES = {
     "diameter_m,fraction\n1e-3;1\n": "sieve.csv: line 2",
     "diameter_m,fraction\n1e-3,0.5\nsand,0.5\n": "sieve.csv: line 3",
     "diameter_m,fraction\n": "grain.sizes: .* at least 1",
-    "diameter_m,fraction\n1,0.5\n2,0.4\n": "grain.sizes: .* fractions add up to 0.9",
+    "diameter_m,fraction\n1e-3,0.5\n2e-3,0.4\n": "grain.sizes: fractions add up to 0.9, not",
 }
 
 

@@ -11,7 +11,7 @@ from orchestrator.errors import InputError
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
 from orchestrator.study import closed_form, study
-from orchestrator.study.parts import Grain, GrainBed
+from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
 
 GRAIN = "[grain]\ndiameter = 1e-3\n"
@@ -57,8 +57,10 @@ def test_the_papers_rule_takes_the_laws_that_hold() -> None:
 
 
 def test_the_id_follows_the_content_alone() -> None:
-    one = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4))
-    same = Scene(grain=Grain(diameter=1e-3, density=2500.0), bed=GrainBed(roughness=1e-4))
+    law = Forces(law="bridged")  # which the default comes to
+    one = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1e-4), forces=law)
+    dense = Grain(diameter=1e-3, density=2500.0)
+    same = Scene(grain=dense, bed=GrainBed(roughness=1e-4), forces=law)
     other = Scene(grain=Grain(diameter=1e-3), bed=GrainBed(roughness=1.1e-4))
     assert one.id == same.id != other.id
     copy = Scene.model_validate_json(canonical_json(one.model_dump(mode="json")), strict=False)

@@ -28,7 +28,9 @@ def test_tables_come_back(tmp_path: Path) -> None:
         {
             # ids and names that look like numbers or like none
             "scene_id": ["0195b034e2ac", "123456789012", "12345e678901"],
-            "group": ["NA", "007", "nan"],
+            "group": ["NA", "007", "-15 deg"],
+            "flow_case": ["=1", "'=1", "''+a"],
+            "bed": ["'x", "@", np.nan],
             "reynolds": np.random.default_rng(0).normal(size=3),
             "shields": [0.0, np.nan, np.inf],
             "count": [1, 2, 3],
@@ -40,8 +42,17 @@ def test_tables_come_back(tmp_path: Path) -> None:
     with folder.renewed():
         tables.write({"single_grain": table}, folder, "tables")
     assert list(tables.read(folder, "tables")) == ["single_grain"]
-    pd.testing.assert_frame_equal(tables.read(folder, "tables")["single_grain"], table)
+    again = tables.read(folder, "tables")["single_grain"]
+    pd.testing.assert_frame_equal(again, table)
     meanings = pd.read_csv(tmp_path / "tables" / "columns.csv").set_index("column")["meaning"]
     assert meanings.to_dict() == {column: COLUMNS[column] for column in sorted(map(str, table))}
     with pytest.raises(OrchestratorError, match="no tables"):
         tables.read(folder, "elsewhere")
+
+
+def test_a_column_can_be_added_to_a_wide_table(tmp_path: Path) -> None:
+    """Pandas warned of each that was added to tables of more than a hundred columns."""
+    folder = Folder(tmp_path)
+    wide = pd.DataFrame({f"c{number}": [1.0] for number in range(150)})
+    folder.put("tables/scenes.csv", tables.csv(wide))
+    assert tables.read(folder, "tables")["scenes"].assign(more=1.0).shape == (1, 151)

@@ -1,0 +1,250 @@
+"""Numbers as users write them: how they are spelt, and in which unit they are likely.
+
+A study file and the command `threshold` ask the same questions. No library of numbers is
+imported here, so that the command line starts at once.
+"""
+
+import math
+import re
+from collections.abc import Container, Mapping, Sequence
+from typing import NamedTuple
+
+from orchestrator.errors import InputError
+from orchestrator.physics.constants import GAS_BELOW
+from orchestrator.physics.fluids import PAPER
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?inf|nan", re.ASCII | re.I)
+DECIMAL_COMMA = re.compile(r"([+-]?\d+),(\d+(?:e[+-]?\d+)?)", re.ASCII | re.I)
+WITH_UNIT = re.compile(r"([+-]?[\d.]+(?:e[+-]?\d+)?)\s*([^\d\s.+-].*)", re.ASCII | re.I)
+TO_SI: Mapping[str, float] = {
+    "m": 1.0,
+    "km": 1e3,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "µm": 1e-6,
+    "μm": 1e-6,
+    "kg/m3": 1.0,
+    "kg/m³": 1.0,
+    "g/cm3": 1e3,
+    "g/cm³": 1e3,
+    "m/s": 1.0,
+    "cm/s": 1e-2,
+    "m2/s": 1.0,
+    "m²/s": 1.0,
+    "deg": 1.0,
+    "°": 1.0,
+    "rad": 180 / math.pi,
+}
+"""Factors of units to those of a study file: SI units, and degrees."""
+
+
+class Unit(NamedTuple):
+    """A range of a field in which a number is likelier in another unit."""
+
+    field: str
+    low: float
+    high: float
+    question: str
+    factor: float  # to the unit of the field
+
+
+UNITS = (
+    Unit("grain.diameter", 0.05, 20.0, "{0:g} m: did you mean {0:g} mm", 1e-3),
+    Unit("grain.diameter", 20.0, math.inf, "{0:g} m: did you mean {0:g} um", 1e-6),
+    Unit("grain.density", 1e-300, 30.0, "{0:g} kg/m3: did you mean {0:g} g/cm3", 1e3),
+    Unit("bed.slope_deg", 0.05, 0.55, "{0:g} deg: did you mean {0:g} rad", TO_SI["rad"]),
+    Unit(
+        "bed.entrainment_angle_deg",
+        1e-300,
+        1.571,
+        "{0:g} deg: did you mean {0:g} rad",
+        TO_SI["rad"],
+    ),
+    Unit(
+        "forces.lift_coefficient",
+        6.0,
+        7.0,
+        "{0:g}: did you mean Saffman's for the radius",
+        0.25,
+    ),
+    Unit("fluid.gravity", 50.0, math.inf, "{0:g} m/s2: did you mean {0:g} cm/s2", 0.01),
+)
+COHESIVE_BELOW = (6e-5, 1e-4)
+"""Diameter below which cohesion is no longer small against the weight, in liquids and in
+gases, m."""
+USUAL_PA_S = ((1e-4, 0.1), (3e-6, 1e-4))
+"""Usual dynamic viscosities of liquids and of gases, Pa s."""
+HIGHEST, LONGEST = 500.0, 1e4
+"""Height and length of a profile above which it is likelier in millimetres, m: the largest
+dunes are 500 m high."""
+
+WIDEST = 0.5  # diameter in a sieve table from which it is likelier in millimetres, m
+
+
+def number(text: str) -> float:
+    """The number that a text is, in the digits 0 to 9 with a decimal point.
+
+    Python takes more for a number: digits of other scripts, and 1_0 for 10.
+
+    Raises
+    ------
+    ValueError
+        With what the text may mean.
+
+    Examples
+    --------
+    >>> number(" 2.5e-4 ")
+    0.00025
+    >>> number("0,25 ")
+    Traceback (most recent call last):
+        ...
+    ValueError: '0,25' is no number: write 0.25
+    """
+    stripped = text.strip()
+    if NUMBER.fullmatch(stripped):
+        return float(stripped)
+    if not stripped:
+        raise ValueError("there is no number")
+    hint = meant(stripped)
+    raise ValueError(f"{stripped!r} is no number{f': {hint}' if hint else ''}")
+
+
+def whole_number(text: str) -> int:
+    """The whole number that a text is; a ValueError for any other text."""
+    if not re.fullmatch(r"[+-]?\d+", text.strip(), re.ASCII):
+        raise ValueError(f"{text!r} is no whole number")
+    return int(text)
+
+
+def meant(text: str) -> str:
+    """How to write a number that has a decimal comma or a unit; empty for any other text.
+
+    Examples
+    --------
+    >>> meant("0.25 mm")
+    'write 0.00025, without a unit: numbers are in SI units, angles in degrees'
+    """
+    comma = DECIMAL_COMMA.fullmatch(text.strip())
+    if comma:
+        return f"write {comma[1]}.{comma[2]}"
+    parts = WITH_UNIT.fullmatch(text.strip())
+    if parts is None or not NUMBER.fullmatch(parts[1]) or parts[2] not in TO_SI:
+        return ""
+    value = float(parts[1]) * TO_SI[parts[2]]
+    rule = "numbers are in SI units, angles in degrees"
+    return f"write {value:.9g}, without a unit: {rule}"
+
+
+def questions(
+    values: Mapping[str, Sequence[float]],
+    names: Mapping[str, str],
+    form: str = "{} = {:.4g}",
+) -> list[str]:
+    """Questions on numbers that are usual in another unit, or that no fluid has.
+
+    Parameters
+    ----------
+    values
+        The values of fields at some points, by the fields' names in a study file. Fields
+        of the fluid and of the grain have one value for each point.
+    names
+        What the questions call the fields; one that is missing has its own name.
+    form
+        How a field is given a value: a format of its name and the value.
+
+    Examples
+    --------
+    >>> questions({"grain.diameter": [0.25]}, {})
+    ['0.25 m: did you mean 0.25 mm, grain.diameter = 0.00025?']
+    """
+    asked = []
+    for unit in UNITS:
+        largest = max(values.get(unit.field, ()), default=0.0)
+        if unit.low <= largest < unit.high:
+            name = names.get(unit.field, unit.field)
+            question = unit.question.format(largest)
+            asked.append(f"{question}, {form.format(name, largest * unit.factor)}?")
+    return asked + _of_cohesion(values) + _of_fluid(values, names)
+
+
+def _of_cohesion(values: Mapping[str, Sequence[float]]) -> list[str]:
+    """A remark on the smallest of the grains that their cohesion holds, if there is one."""
+    names = ("grain.diameter", "fluid.density", "grain.cohesion")
+    grains = {*zip(*(values.get(name, ()) for name in names), strict=False)}
+    held = []
+    for diameter, density, cohesion in grains:
+        end = COHESIVE_BELOW[density < GAS_BELOW]
+        if 0 < diameter < end and not cohesion:
+            held.append(diameter)
+    if not held:
+        return []
+    what = "cohesion, which the force laws leave out, holds grains this small"
+    return [f"{min(held):g} m: {what}; they need a stronger flow"]
+
+
+def _of_fluid(values: Mapping[str, Sequence[float]], names: Mapping[str, str]) -> list[str]:
+    """A question on the first fluid with a viscosity that none of its density has."""
+    densities = values.get("fluid.density", ())
+    pairs = zip(densities, values.get("fluid.viscosity", ()), strict=False)
+    for density, viscosity in dict.fromkeys(pairs):
+        low, high = USUAL_PA_S[density < GAS_BELOW]
+        is_of_air = density >= GAS_BELOW and viscosity == PAPER[1]
+        is_usual = low <= density * viscosity <= high and not is_of_air
+        if density > 0 and viscosity > 0 and not is_usual:
+            dynamic = f"{viscosity:g} m2/s, or {density * viscosity:.3g} Pa s"
+            name = names.get("fluid.kind", "fluid.kind")
+            question = f"is it right? {name} names water, seawater, air"
+            return [f"{dynamic}, is unusual for {density:g} kg/m3: {question}"]
+    return []
+
+
+def of_profile(name: str, length: float, height: float) -> list[str]:
+    """A question on a bed line of a length and a height (m) that no bed has."""
+    if length <= LONGEST and height <= HIGHEST:
+        return []
+    meant = f"{length / 1e3:.4g} m long and {height / 1e3:.4g} m high"
+    what = f"{length:.4g} m long and {height:.4g} m high"
+    return [f"{name} is {what}: did you mean mm, {meant}? Divide x_m and z_m by 1000"]
+
+
+def of_sieve(diameters: Sequence[float]) -> list[str]:
+    """A question on a sieve table with diameters (m) that no sieve has."""
+    if not diameters or max(diameters) < WIDEST:
+        return []
+    sizes = f"{min(diameters):g} to {max(diameters):g}"
+    return [f"grain.sizes are {sizes} m: did you mean mm? Divide the diameters by 1000"]
+
+
+def first(
+    asked: Sequence[str], refusal: InputError, where: str, names: Container[str]
+) -> InputError:
+    """A refusal behind the questions on the numbers that it may come from.
+
+    Parameters
+    ----------
+    asked
+        The questions.
+    refusal
+        Its place is `where` and the field that breaks a rule.
+    where
+        The study file, or the command.
+    names
+        What the fields that are asked about are called. A refusal of one of them stands
+        behind the question on that field alone.
+
+    Returns
+    -------
+    The refusal as it is where there is no such question.
+    """
+    field = refusal.where.removeprefix(where).removeprefix(": ")
+    kept = [one for one in asked if "?" in one]  # the others are remarks
+    place, else_ = where, f"{field}: {refusal.what}"
+    if field in names:
+        kept = [one for one in kept if field in one]
+        place, else_ = refusal.where, refusal.what
+    if not kept:
+        return refusal
+    if refusal.remedy:
+        else_ = f"{else_}; {refusal.remedy}"
+    return InputError("; ".join(kept), place, f"else: {else_.removeprefix(': ')}")
