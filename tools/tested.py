@@ -9,7 +9,8 @@ import sys
 import numpy as np
 import pandas as pd
 
-from orchestrator.experiments.validate import EVENTS, INTENSITY, MODELS, MOVED, single
+from orchestrator.experiments.strips import MOVED
+from orchestrator.experiments.validate import EVENTS, INTENSITY, MODELS, single
 from orchestrator.fidelity.levels import changed
 from orchestrator.physics.beside import kind_of
 from orchestrator.physics.laws import LAWS

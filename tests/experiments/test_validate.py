@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.bed.packing import Packing
 from orchestrator.errors import InputError
-from orchestrator.experiments import validate
+from orchestrator.experiments import strips, validate
 from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics import beside
@@ -29,7 +29,7 @@ def test_grains_laid_on_a_close_packed_layer_lie_in_its_pockets() -> None:
     y = (y + np.where(np.arange(rows)[:, None] % 2, 0.5, 0.0)).ravel()
     every, flat = np.ones(len(y), bool), np.column_stack([x.ravel(), np.zeros_like(y)])
     packing = Packing(flat, np.ones(len(y)), every, every, ~every, x.ravel(), y, float(columns))
-    angles = validate.laid(packing, 20)
+    angles = strips.laid(packing, 20)
     exact = np.degrees(np.arctan([math.sqrt(1 / 8), math.sqrt(1 / 2)]))
     assert np.abs(angles[:, None] - exact).min(axis=1).max() < 0.1
     # downstream of a pocket is either the saddle between two grains or the top of one

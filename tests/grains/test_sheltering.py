@@ -10,6 +10,7 @@ import pytest
 
 from orchestrator.bed.packing import Packing, Places
 from orchestrator.experiments import validate
+from orchestrator.experiments.sphere import sphere
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.loads import Geometry
 from orchestrator.grains.peeling import ForceTable, Loading
@@ -72,9 +73,9 @@ def test_a_grain_alone_on_a_plane_keeps_its_drag() -> None:
 def test_a_sphere_that_stands_clear_and_one_level_with_its_neighbours() -> None:
     """Fenton and Abbott 1977: theta 0.010 on a close-packed layer; 0.1 to 0.3 level with it."""
     *_, model = validate.MODELS
-    clear = validate.sphere(model.fields, 3000.0, clear=True) / model.gust
+    clear = sphere(model.fields, 3000.0, clear=True) / model.gust
     assert clear == pytest.approx(0.010, rel=0.3)
-    assert 0.1 < validate.sphere(model.fields, 3000.0, clear=False) / model.gust < 0.3
+    assert 0.1 < sphere(model.fields, 3000.0, clear=False) / model.gust < 0.3
 
 
 @pytest.mark.parametrize(
