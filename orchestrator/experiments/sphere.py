@@ -151,7 +151,7 @@ def speed_of(density: float, tangent: float) -> float:
     Examples
     --------
     >>> round(speed_of(2500.0, 0.354), 3)
-    0.3
+    0.379
     """
     # the roughness does not matter to a drag at a given speed
     at = Exposure(DIAMETER_M, 1e-4, WATER_DENSITY, WATER_VISCOSITY)

@@ -51,7 +51,17 @@ NOTICED = ("exploded", "noisy", "stalled")
 
 
 class Look(NamedTuple):
-    """How a verdict is drawn: colour of the cell, colour and letter of its text."""
+    """How a verdict is drawn.
+
+    Attributes
+    ----------
+    colour
+        Colour of the cell.
+    ink
+        Colour of its text.
+    letter
+        Letter that stands in the cell for the verdict.
+    """
 
     colour: str
     ink: str
