@@ -32,7 +32,7 @@ from orchestrator.physics.gusts import gust_stresses
 from orchestrator.runs.case import Case
 from orchestrator.solvers import liggghts
 from orchestrator.study.parts import Gusts
-from orchestrator.study.scene import Scene
+from orchestrator.study.scene import BEYOND_ASKED, Scene
 from orchestrator.types import BoolArray, FloatArray
 
 MARGIN = 3.0
@@ -174,12 +174,24 @@ def rounds(scene: Scene) -> int:
     return ceil(max(scene.protocol.fractions) / update - 1e-9) if update else 1
 
 
-def goal(geometry: Geometry, flow: Flow | None) -> int:
-    """How many counted grains have moved when the round of a flow ends."""
+def goal_part(scene: Scene, flow: Flow | None) -> float:
+    """The part of the counted grains that has moved when the round of a flow ends.
+
+    The last round goes on a little beyond the largest fraction that is asked for, whose interval
+    ends where half a grain more has moved.
+    """
     number = 1
     while isinstance(flow, WornFlow):
         flow, number = flow.before, number + 1
-    return ceil(number * geometry.scene.protocol.update * geometry.packing.count - 1e-9)
+    part = number * scene.protocol.update
+    if number == rounds(scene):
+        part = max(part, min(max(scene.protocol.fractions) + BEYOND_ASKED, 1.0))
+    return round(part, 9)
+
+
+def goal(geometry: Geometry, flow: Flow | None) -> int:
+    """How many counted grains have moved when the round of a flow ends."""
+    return ceil(goal_part(geometry.scene, flow) * geometry.packing.count - 1e-9)
 
 
 def grains(geometry: Geometry, flow: Flow, cases: Path) -> Worn:
@@ -287,6 +299,9 @@ class PileCase(GrainCase):
     def parameters(self) -> dict[str, Any]:
         """The scene, but for what only the reading of the results depends on."""
         asked = self.scene.model_dump(mode="json", exclude={"protocol": {"fractions"}})
+        asked["protocol"]["final_fraction"] = self.scene.last_fraction
+        if self.scene.protocol.update:
+            asked["protocol"]["goal"] = goal_part(self.scene, self.flow)
         # rules for which grains there are that came after other beds were run
         new = {"turned": self.geometry.turned, "part": self.geometry.is_part}
         return {**asked, **{rule: True for rule, holds in new.items() if holds}}
@@ -341,7 +356,7 @@ class PileCase(GrainCase):
                 # poured without a flow, it rests without one: some go at once that were hidden
                 rising[0] = 0.0
         packed = geometry.packing
-        enough = int((1 - rules.final_fraction) * packed.count + 1e-9)
+        enough = int((1 - scene.last_fraction) * packed.count + 1e-9)
         if rules.update:
             enough = packed.count - goal(geometry, self.flow)
         grains, (slope, ridge) = table(loads, worn), geometry.packed_line.roof(MARGIN + 0.5)
@@ -402,7 +417,7 @@ def flows(loads: Loads) -> FloatArray:
         # no peeling in space says which grain frees which
         thresholds = pivots[(pivots > 0) & np.isfinite(pivots)]
         first = _first(thresholds, geometry)
-        place = min(int(rules.final_fraction * len(pivots)), len(thresholds) - 1)
+        place = min(int(geometry.scene.last_fraction * len(pivots)), len(thresholds) - 1)
     else:
         thresholds = np.sort(loads.leaving())
         first = _first(thresholds, geometry)
@@ -412,7 +427,7 @@ def flows(loads: Loads) -> FloatArray:
         elif not geometry.bed.is_wedge:
             # on a bed without a free end no grain can be peeled first
             first = min(first, _first(pivots, geometry))
-        place = int(np.ceil(rules.final_fraction * geometry.packing.count)) - 1
+        place = int(np.ceil(geometry.scene.last_fraction * geometry.packing.count)) - 1
     if not 0 < first < np.inf:
         what = "no exposed grain lies in a pocket that lets it go"
         remedy = "a longer or wider bed, or another bed.seed"

@@ -238,8 +238,11 @@ class Protocol(Part):
     """time without a passage of the displacement criterion that ends a load step without rest"""
     displacement_criterion: float = _dem(0.3, "", "d", scope="DEM and peeling", ge=1e-3, le=0.5)
     """displacement along the bed from which a grain counts as moved"""
-    final_fraction: Fraction = _dem(0.9, label="last fraction", scope="DEM of piles")
-    """fraction of the exposed grains that should have moved by the last load step"""
+    final_fraction: Fraction = _dem(
+        0.9, label="last fraction", scope="DEM of piles", read="last_fraction"
+    )
+    """fraction of the exposed grains that should have moved by the last load step, or 0.05 more
+    than the largest of `fractions` if that is more"""
     fractions: Annotated[tuple[Fraction, ...], List] = _pile(
         (0.1, 0.3, 0.5, 0.7), "n/N", column="-", min_length=1
     )

@@ -35,6 +35,9 @@ NARROWEST_OVER_D, NARROWEST_OVER_CELL = 0.1, 0.05
 cell. Nearer ones make columns of cells in which the flow does not converge: on a triangle of 15 deg
 a second point at 0.05 of the first cell moves thresholds by 1 to 2 %, at 0.0002 by half."""
 ROUGHEST = 1 / 3  # largest z0 over the diameter of the bed's grains; measured are up to 1/7
+BEYOND_ASKED = 0.05
+"""Part of the grains beyond the largest fraction asked for that a run of DEM goes on: half a grain
+of ten."""
 LEAST_UPDATE = 0.02  # least part of the grains between two solves of the flow
 LARGEST_RATIO = 10.0  # of a mixture's grains: the time of DEM rises with its square
 OFF_MEDIAN = 0.01
@@ -261,6 +264,18 @@ class Scene(parts.Part):
         """Angle at which a grain leaves its pocket, degrees: beta, of equal grains."""
         equal = self.bed.relative_size == 1.0
         return self.bed.entrainment_angle_deg if equal else degrees(acos(self.pocket_cosine))
+
+    @property
+    def last_fraction(self) -> float:
+        """Fraction of a pile's grains at which a run of DEM ends.
+
+        It goes on beyond the largest fraction that is asked for: there the interval ends where half
+        a grain more has moved, of ten grains or more.
+        """
+        asked = min(max(self.protocol.fractions) + BEYOND_ASKED, 1.0)
+        if asked <= self.protocol.final_fraction + 1e-9:
+            return self.protocol.final_fraction
+        return round(asked, 9)
 
     @property
     def solve_roughness(self) -> float:

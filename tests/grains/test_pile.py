@@ -56,6 +56,41 @@ def test_a_slow_pile_follows_the_pivot_law_at_each_grains_own_stress(tmp_path: P
     assert (grains["moved_in_load_step"] > 0).sum() == curve["moved"].iloc[-1]
 
 
+def test_a_run_goes_on_beyond_the_largest_fraction_that_is_asked_for(tmp_path: Path) -> None:
+    """It is reached, and half a grain more too, whatever `final_fraction` is."""
+    text = SMALL.format(step=0.05) + "waiting_time = 6.0\nfractions = [0.95]\n"
+    text = text.replace("final_fraction = 0.75", "")
+    text = text.replace("cells_per_face = 20", 'model = "waves"')
+    text += 'method = "dem"\n'
+    results = small_study.run(tmp_path, text)
+    (row,) = results.tables["pile_threshold"].to_dict("records")
+    assert row["highest_fraction"] >= 0.95
+    assert "not reached" not in row["why_not"]
+    (pile,) = results.plan.piles.values()
+    found = pile.thresholds(results.cases, [0.95])[0]
+    assert found.tau_low <= found.tau
+
+
+@pytest.mark.parametrize(
+    ("final", "fractions", "last"),
+    [(0.9, "0.1, 0.7", 0.9), (0.9, "0.95", 1.0), (0.5, "0.5", 0.55), (0.5, "0.45", 0.5)],
+)
+def test_runs_that_end_at_one_fraction_are_one_case(
+    final: float, fractions: str, last: float
+) -> None:
+    def pile(final: float, fractions: str) -> Pile:
+        text = SMALL.format(step=0.05).replace("final_fraction = 0.75", "")
+        text += f'final_fraction = {final}\nfractions = [{fractions}]\nmethod = "dem"\n'
+        (scene,) = study.parse(text, name="last", where="test").scenes
+        return Pile(scene)
+
+    asked = pile(final, fractions)
+    assert asked.scene.last_fraction == last
+    assert asked.case.name == pile(last, "0.1").case.name
+    other = pile(0.8, "0.1").case.name
+    assert asked.case.name != other
+
+
 ROWS = [
     ("slope_deg = 20.0", 1.0, 1.0),
     ('shape = "dune"\nslope_deg = 15.0\nforms = 2', 1.0, 1.01),
