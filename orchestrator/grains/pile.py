@@ -281,7 +281,7 @@ class PileCase(GrainCase):
     flow: WornFlow | None = None
     before: "PileCase | None" = None
     kind: ClassVar[str] = "pile"
-    recipe: ClassVar[int] = 14
+    recipe: ClassVar[int] = 15
     derived: ClassVar[tuple[str, ...]] = (*GrainCase.derived, GRAINS)
 
     @cached_property
@@ -465,11 +465,16 @@ def _size(loads: Loads, flows: FloatArray) -> FloatArray:
 
 
 def _first(thresholds: FloatArray, geometry: Geometry) -> float:
-    """The first of sorted flows; of a poured bed that of the first grain but a few."""
+    """The first of sorted flows above that of grains that lie loose, 0; 0 if there is none.
+
+    Of a poured bed it is that of the first grain but a few.
+    """
     held = thresholds[thresholds > 0]
-    if geometry.pouring and len(held):
+    if not len(held):
+        return 0.0
+    if geometry.pouring:
         return float(held[int(EARLY * len(held))])
-    return float(thresholds[0]) if len(thresholds) else 0.0
+    return float(held[0])
 
 
 def table(loads: Loads, worn: Worn) -> GrainTable:

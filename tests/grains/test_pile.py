@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.grains.motion import Motion
-from orchestrator.grains.pile import Pile
+from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import sampled, within
 from orchestrator.report import piles
 from orchestrator.report.results import Results
@@ -124,6 +124,21 @@ def test_the_grains_of_a_row_without_a_free_end_hold_one_another(
     text = text.replace("cells_per_face = 20", f"model = {model}") + f'method = "{method}"\n'
     (scene,) = study.parse(text, name="row", where="test").scenes
     assert least <= Pile(scene).row_hold(tmp_path) <= most
+
+
+def test_load_steps_begin_below_the_first_grain_that_is_held(tmp_path: Path) -> None:
+    """On a step down grains lie loose at the limiting slope: no flow is below theirs."""
+    text = SMALL.format(step=0.05).replace("slope_deg = 20.0", 'shape = "step down"')
+    text = text.replace("cells_per_face = 20", 'model = "waves"') + 'method = "dem"\n'
+    (scene,) = study.parse(text, name="loose", where="test").scenes
+    loads = Pile(scene).loads(tmp_path)
+    alone = loads.alone()
+    assert (alone == 0).any()
+    first = alone[alone > 0].min()
+    rising = flows(loads)
+    assert 0.8 * first < rising[1] < first < rising[-1]
+    _, ustar0 = Pile(scene).first(Motion.of_flows(alone))
+    assert ustar0 == pytest.approx(first)
 
 
 @pytest.mark.parametrize("law", ["bridged", "zeng-torque"])
