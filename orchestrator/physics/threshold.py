@@ -19,7 +19,10 @@ LAWS_OF: dict[Regime, tuple[str, ...]] = {
 }
 """Names of the laws that the paper's rule picks in each regime."""
 AUTO = "auto"
-"""The default force law: `bridged`, or `bridged-gravel` where the drag law of that ends."""
+"""The default force law.
+
+It is `bridged`, or `bridged-gravel` where the drag law of that ends.
+"""
 PAPER = "paper"
 """The paper's rule as a force law: Eq. 2 or Eq. 4 where each holds, else both."""
 RUNGS = np.geomspace(1e-9, 1e9, 37)
@@ -590,7 +593,7 @@ def shields_at(
 
 
 def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
-    """Which law answers a grain for which none is asked.
+    """Choose the law that answers a grain for which none is asked.
 
     Parameters
     ----------
@@ -601,8 +604,10 @@ def default_laws(ustar: ArrayLike, exposure: Exposure) -> NDArray[np.str_]:
 
     Returns
     -------
-    ``bridged``, or ``bridged-gravel`` where the particle Reynolds number is not below the
-    end of the drag law of `bridged`. The two differ by 5 % in the drag there.
+    NDArray[np.str_]
+        ``bridged``, or ``bridged-gravel`` where the particle Reynolds number is not
+        below the end of the drag law of `bridged`, of the broadcast shape. The two
+        differ by 5 % in the drag there.
 
     Examples
     --------

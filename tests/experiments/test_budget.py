@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from orchestrator.errors import InputError
 from orchestrator.experiments import budget
 from orchestrator.experiments.budget import CHOICES
 from orchestrator.fidelity.levels import changed
@@ -107,3 +108,9 @@ def test_every_choice_has_its_share_on_a_poured_pile(tmp_path: Path) -> None:
     page = (tmp_path / "out" / "report.html").read_text()
     assert all(name in page for name in names)
     assert experiment.run(tmp_path / "out", workers=2).started == 0
+
+
+def test_a_study_without_piles_is_refused(tmp_path: Path) -> None:
+    asked = study.parse("grain = { diameter = 1e-3 }", name="one", where="one")
+    with pytest.raises(InputError, match="there is no pile"):
+        budget.experiment(asked, tmp_path / "out")

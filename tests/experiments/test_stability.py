@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from matplotlib.patches import Rectangle
 
 from orchestrator.experiments import stability
-from orchestrator.experiments.stability import FOLDER, NOTICED
+from orchestrator.experiments.stability import FOLDER, NOTICED, Map
 from orchestrator.fidelity import levels, limits
 
 SMALL = """
@@ -67,3 +68,25 @@ def test_the_limits_were_read_off_the_maps() -> None:
     touching = pockets["x"].astype(float) >= limits.CLOSE_PACKED_DEG + 0.5
     assert (pockets[touching]["verdict"] == "good").all()
     assert (pockets[~touching]["verdict"] != "good").mean() > 0.5
+
+
+def test_each_cell_shows_its_worst_run() -> None:
+    rows = [
+        ("m", 2.0, 10.0, "exploded", True, math.nan, ""),
+        ("m", 0.5, 10.0, "good", False, -0.012, ""),
+        ("m", 0.5, 1e6, "wrong", False, 12.0, ""),
+        ("m", 0.5, 1e6, "good", False, 0.0, ""),
+        ("words", "a", 1.0, "good", False, 0.004, ""),
+    ]
+    columns = ["map", "x", "y", "verdict", "caught", "error", "note"]
+    table = pd.DataFrame(rows, columns=columns)
+    axes = {"x": {"label": "x"}, "y": {"label": "y"}}
+    maps = [Map(name, {"title": name, **axes}, ()) for name in ("m", "words")]
+    for shown in (maps, maps[:1]):
+        ax = stability.draw(shown, table).axes[0]
+        cells = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
+        drawn = {cell.get_xy(): cell.get_gid() for cell in cells}
+        assert drawn == {(0, 0): "good", (0, 1): "wrong", (1, 0): "exploded"}
+        texts = {text.get_text() for text in ax.texts}
+        assert texts == {"G\n−1.2 %", "W\n+1.2e+03 %", "X"}
+        assert [mark.get_text() for mark in ax.get_xticklabels()] == ["0.5", "2"]

@@ -15,6 +15,7 @@ from orchestrator.experiments import strips, validate
 from orchestrator.fidelity.levels import changed
 from orchestrator.flow.stress import WallStress
 from orchestrator.physics import beside
+from orchestrator.physics.curves import Air, iversen_white
 from orchestrator.study import fields, study
 from orchestrator.study.scene import Scene
 
@@ -129,3 +130,28 @@ def test_a_stress_that_is_the_measured_one_over_a_hump_is_met_at_every_row() -> 
     stress = WallStress(x * 0.42, x * 0.42, ones, ones, ones, 300 * cf, ones, ones)
     measured, value, *_ = validate.over_hump(stress).to_numpy().T
     assert value.astype(float) == pytest.approx(measured.astype(float), rel=1e-9)
+
+
+def test_the_paper_has_no_answer_in_the_transition() -> None:
+    water = {"rho_sol_kg_m3": 2650.0, "rho_f_kg_m3": 1000.0, "nu_m2_s": 1e-6}
+    beds = pd.DataFrame({"d_m": [1e-5, 1e-3, 1e-2], **water})
+    beds = beds.assign(slope=0.0, cohesion_n_m=0.0)
+    assert np.isnan(validate.by_paper(beds)).tolist() == [False, True, False]
+
+
+def test_the_measured_rows_are_whole() -> None:
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    counts = beds.groupby("set").size()
+    assert counts["flumes, visual"] == 245
+    assert counts["flumes, fixed intensity"] == 28
+    assert beds["shields"].between(0.0, 0.4).all()
+
+
+def test_the_rows_of_the_wind_tunnel_are_on_their_curve() -> None:
+    air = Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    beds = pd.read_csv(validate.FOLDER / "beds.csv")
+    tunnel = beds[beds["set"] == "wind tunnel, curve"]
+    d = tunnel["d_m"].to_numpy()
+    assert len(d) > 0
+    _, curve = air.shields_diagram(d, iversen_white(d, air))
+    assert tunnel["shields"].to_numpy() == pytest.approx(curve, rel=1e-3)

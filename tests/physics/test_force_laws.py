@@ -8,8 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestrator.errors import InputError
 from orchestrator.physics.constants import LIFT_COEFFICIENT
-from orchestrator.physics.laws import CLIFT_GAUVIN, LAWS, SCHILLER_NAUMANN, Exposure, reasons
+from orchestrator.physics.laws import (
+    CLIFT_GAUVIN,
+    LAWS,
+    SCHILLER_NAUMANN,
+    Exposure,
+    law,
+    reasons,
+)
 from orchestrator.physics.threshold import shields_at
 
 FORCES = ("drag", "lift", "torque")
@@ -182,3 +190,18 @@ def test_the_table_of_the_model_page_has_what_a_law_gives(name: str) -> None:
     assert [f"{value:.4f}" for value in theta] == [cell.strip("()") for cell in rows[name]]
     holds = LAWS[name].valid(reynolds, unit())
     assert [not cell.startswith("(") for cell in rows[name]] == holds.tolist()
+
+
+def test_the_registry_holds_each_law_under_its_own_name() -> None:
+    assert all(law(name).name == name for name in LAWS)
+    assert len({each.label for each in LAWS.values()}) == len(LAWS)
+    assert all(each.reference for each in LAWS.values())
+
+
+@pytest.mark.parametrize(("name", "is_near"), [("brigded", True), ("newton", False)])
+def test_an_unknown_law_is_answered_with_the_known_ones(name: str, is_near: bool) -> None:
+    with pytest.raises(InputError) as caught:
+        law(name)
+    text = str(caught.value)
+    assert all(known in text for known in LAWS)
+    assert ("did you mean bridged?" in text) == is_near

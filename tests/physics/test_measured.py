@@ -100,3 +100,18 @@ def test_iversen_white_solves_its_implicit_equation_on_both_branches() -> None:
     slow = 0.129 * scale / np.sqrt(1.928 * reynolds**0.092 - 1)
     fast = 0.12 * scale * (1 - 0.0858 * np.exp(-0.0617 * (reynolds - 10)))
     np.testing.assert_allclose(ustar, np.where(reynolds <= 10, slow, fast), rtol=1e-9)
+
+
+def test_points_turn_the_dimensionless_diameter_into_a_reynolds_number() -> None:
+    (curve,) = [each for each in curves.WATER if each.name.startswith("van Rijn")]
+    reynolds, theta = curve.points(50)
+    dstar = np.geomspace(curve.low, curve.high, 50)
+    np.testing.assert_allclose(theta, curves.van_rijn(dstar))
+    np.testing.assert_allclose(reynolds, np.sqrt(theta) * dstar**1.5)
+
+
+def test_curves_for_air_agree_in_order_of_magnitude_for_sand() -> None:
+    air = curves.Air(density=2650.0, fluid_density=1.2, viscosity=1.5e-5)
+    d = np.array([2.5e-4])
+    found = [float(curve(d, air)[0]) for curve in curves.AIR.values()]
+    assert 0.2 < min(found) < max(found) < 0.35

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from orchestrator.physics import curves
 from orchestrator.physics import threshold as physics
+from orchestrator.physics.constants import LIFT_COEFFICIENT
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import Threshold, friction_velocity_at, shields_at, threshold
 
@@ -208,3 +209,38 @@ def test_the_regime_is_that_of_the_ranges_of_eqs_2_and_4_and_gravel_is_high() ->
     np.testing.assert_array_equal(found == "low", low.reynolds < 3)
     np.testing.assert_array_equal(found == "high", high.reynolds >= 30)
     assert (found[1, -1], bool(high.valid[1, -1])) == ("high", False)
+
+
+def test_eq_3_in_its_printed_form() -> None:
+    ratio = 0.1
+    alpha = np.radians(20)
+    beta = np.radians(50)
+    found = of_air("low", 1e-4, ratio, 20.0, 50.0, 1e-3)
+    geometry = 1 + 2 * ratio
+    lift = LIFT_COEFFICIENT / 2 * found.reynolds * geometry
+    weight = np.pi / 6 * (np.sin(alpha) * np.tan(beta) + np.cos(alpha))
+    printed = weight / (1.5 * np.pi * geometry * np.tan(beta) + lift)
+    assert float(found.shields) == pytest.approx(float(printed), rel=1e-12)
+
+
+@given(beta=betas, lean=st.floats(0, 60))
+def test_the_resistance_of_a_pivot_is_symmetric_about_the_entrainment_angle(
+    beta: float, lean: float
+) -> None:
+    up = physics.pivot_resistance(beta + lean, beta)
+    down = physics.pivot_resistance(beta - lean, beta)
+    assert float(up) == pytest.approx(float(down), rel=1e-12)
+
+
+def test_a_torque_and_a_lift_both_lower_the_threshold() -> None:
+    bare = water(3e-4, law="zeng").friction_velocity
+    assert float(water(3e-4, law="zeng-torque").friction_velocity) < float(bare)
+    without_lift = threshold(
+        LAWS["bridged"],
+        Exposure(3e-4, 1e-5, 1000.0, 1e-6, lift_coefficient=0.0),
+        density=2650.0,
+        slope_deg=0,
+        entrainment_angle_deg=50,
+    )
+    lifted = water(3e-4).friction_velocity
+    assert float(lifted) < float(without_lift.friction_velocity)

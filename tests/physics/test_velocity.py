@@ -19,6 +19,7 @@ from orchestrator.physics.velocity import (
     outer_roughness,
     rough_gradient,
     rough_speed,
+    shear,
     shift,
     viscous_length,
 )
@@ -97,3 +98,20 @@ def test_the_profile_is_the_integral_of_its_shear(reynolds: float, ratio: float)
     moved = shift(30 * base)
     exact = _by_quadrature(float(base), float(base + reynolds), float(moved))
     np.testing.assert_allclose(layer(base, base + reynolds, moved), exact, rtol=1e-9)
+
+
+def test_far_from_the_wall_the_shear_is_that_of_the_logarithm() -> None:
+    assert float(shear(np.array(1e4))) == pytest.approx(1 / (KARMAN * 1e4), rel=2e-4)
+
+
+def test_the_shift_of_a_smooth_wall_is_none_and_it_sets_in_continuously() -> None:
+    assert not np.any(shift(np.linspace(0, 4.5, 50)))
+    assert 0 < float(shift(np.array(4.54))) < 0.01
+    assert float(shift(np.array(70.0))) == pytest.approx(0.9 * np.sqrt(70), rel=1e-3)
+
+
+def test_a_threshold_of_sand_is_a_wind_of_known_strength() -> None:
+    # sand of 0.25 mm moves at about u* = 0.22 m/s; z0 = d/30
+    wind = log_law_speed(0.22, np.array([1.0, 10.0]), 2.5e-4 / 30)
+    np.testing.assert_allclose(wind, 0.22 / 0.41 * np.log([120001, 1200001]))
+    assert np.all((wind > 6) & (wind < 8))

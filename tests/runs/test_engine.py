@@ -151,3 +151,31 @@ def test_a_large_solver_is_served_before_those_that_ask_later() -> None:
     for thread in threads:
         thread.join()
     assert served == ["large", "small"]
+
+
+def test_a_failure_gives_its_cores_back() -> None:
+    cores = Cores(1)
+    with pytest.raises(ValueError, match="lost"), cores.held(1):
+        raise ValueError("lost")
+    with cores.held(1):
+        pass
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_never_more_cores_are_held_than_there_are(count: int) -> None:
+    cores, lock = Cores(count), threading.Lock()
+    taken = most = 0
+
+    def solve(wanted: int) -> None:
+        nonlocal taken, most
+        with cores.held(wanted):
+            with lock:
+                taken += min(wanted, count)
+                most = max(most, taken)
+            with lock:
+                taken -= min(wanted, count)
+
+    with ThreadPoolExecutor(6) as threads:
+        list(threads.map(solve, [1, 2, 5, 1, 3, 2] * 20))
+    assert taken == 0
+    assert 0 < most <= count

@@ -1,5 +1,6 @@
 """Directories of results: files of this program, files of others, and links."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -100,3 +101,50 @@ def test_a_directory_belongs_to_one_kind_and_one_name(tmp_path: Path, outside: P
             with pytest.raises(InputError, match=named), workspace.claimed(place, kind, "mine"):
                 pass
     assert [path.name for path in outside.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
+@pytest.mark.parametrize("harm", [b"", b"\xff\xfe not a record\n"])
+def test_without_its_record_nothing_is_lost(folder: Folder, harm: bytes) -> None:
+    folder.put("tables/a.csv", "one")
+    (folder.root / RECORD).write_bytes(harm)
+    folder.put("tables/a.csv", "two")
+    assert (folder.root / KEPT / "tables" / "a.csv").read_text() == "one"
+    assert folder.is_whole()
+
+
+@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
+def test_a_cleared_directory_leaves_what_is_not_ours(folder: Folder, outside: Path) -> None:
+    scene = folder.root / "scene"
+    (scene / "deep").mkdir(parents=True)
+    (scene / "answer.csv").write_text("ours")
+    (scene / "deep" / "log.txt").write_text("ours")
+    (scene / "deep" / "notes.txt").write_text("mine")
+    (scene / "link").symlink_to(outside)
+    ours = {"answer.csv", "deep/log.txt"}
+    assert folder.clear("scene", ours.__contains__) == scene
+    assert not scene.exists()
+    kept = folder.root / KEPT / "scene"
+    found = {path.relative_to(kept).as_posix() for path in kept.rglob("*")}
+    assert found == {"deep", "deep/notes.txt", "link"}
+    assert (outside / "a.csv").read_text() == "precious"
+
+
+def test_another_name_of_a_file_keeps_its_content(folder: Folder, outside: Path) -> None:
+    folder.put("tables/a.csv", "one")
+    second = outside / "second"
+    for name in ("tables/a.csv", RECORD):
+        os.link(folder.root / name, second)
+        before = second.read_bytes()
+        folder.put("tables/a.csv", f"two {name}")
+        assert second.read_bytes() == before
+        second.unlink()
+    assert not (folder.root / KEPT).exists()
+
+
+@pytest.mark.filterwarnings("ignore:.*not what this program wrote")
+def test_a_pipe_in_the_place_of_a_file_is_kept(folder: Folder) -> None:
+    os.mkfifo(folder.root / "pipe")
+    folder.put("pipe", "ours")
+    assert (folder.root / "pipe").read_text() == "ours"
+    assert (folder.root / KEPT / "pipe").is_fifo()

@@ -15,7 +15,7 @@ from orchestrator import solvers
 from orchestrator.errors import Interrupted, SolverError
 from orchestrator.runs import process
 from orchestrator.runs.process import Ended
-from orchestrator.solvers import liggghts, openfoam
+from orchestrator.solvers import doctor, liggghts, openfoam
 
 ROOT = Path(__file__).parents[2]
 Put = Callable[[str], Path]
@@ -166,3 +166,17 @@ def test_the_home_of_another_openfoam(tmp_path: Path, monkeypatch: Patch) -> Non
         VERSIONS["simpleFoam"]()
     monkeypatch.setenv("WM_PROJECT_DIR", "")
     assert VERSIONS["simpleFoam"]() == openfoam.TRIED
+
+
+def test_the_doctor_names_a_solver_that_is_broken(put: Put, name: str, monkeypatch: Patch) -> None:
+    path = put("exit 1")
+    monkeypatch.setattr(doctor, "LIBRARIES", ("numpy",))
+    uncached = {"OpenFOAM": VERSIONS["simpleFoam"], "LIGGGHTS": VERSIONS["liggghts"]}
+    monkeypatch.setattr(doctor, "SOLVERS", uncached)
+    findings = list(doctor.examine())
+    solver = "OpenFOAM" if name == "simpleFoam" else "LIGGGHTS"
+    (bad,) = [finding for finding in findings if not finding.good]
+    assert bad.what == solver
+    assert str(path) in bad.text
+    lines = doctor.text(findings).splitlines()
+    assert [line for line in lines if line.startswith("NOT")] == [f"NOT  {solver:<12} {bad.text}"]
