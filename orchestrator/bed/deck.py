@@ -30,7 +30,9 @@ MEANING = {
     "sampling_interval": "time between two samples of the grains, sqrt(d/g')",
     "events": "gusts in each load step, whose forces are in gusts.txt; 0: none",
     "event_samples": "samples of the grains in each of them",
-    "settle": "time before the first load step, sqrt(d/g')",
+    "settle": "time before the first load step, at least, sqrt(d/g')",
+    "most_settle": "longest such time: as long as it takes the bed to lie, sqrt(d/g')",
+    "noise": "kinetic energy of a mean grain below which a bed lies, W^2/K; 0: it need not",
     "settle_drag": "drag of a still fluid in that time, m sqrt(g/d)",
     "displacement_criterion": "displacement along the bed that counts as motion, d",
     "stir": "displacement from which on passage.dump lists a grain, d",
@@ -58,7 +60,14 @@ REST_ENERGY = 1e-6
 which a load step ends, if it falls. Of 1476 thresholds of 369 piles, 1438 lie in the same load step
 as with the waiting time alone, 23 in one beside it, 15 further off: most on level and disordered
 rows, where round-off decides. Of 1079 single grains none moves in another load step."""
-SETTLE = 10.0  # time in which the bed settles before the first load step, sqrt(d/g')
+SETTLE = 10.0
+"""Time in which the bed settles before the first load step, at least, sqrt(d/g')."""
+MOST_SETTLE = 400.0
+"""Time after which a bed that does not lie yet is given up, sqrt(d/g')."""
+NOISE = 0.01
+"""Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its weight stores
+in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time step gave other
+thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
 POURED_DRAG = 2.0
 """Drag of a still fluid in which a poured bed settles, m sqrt(g'/d): its springs may be softer than
 those of the pouring, and without a drag a pile of 25 degrees was not at rest at the end."""
@@ -98,6 +107,8 @@ def protocol(
         "events": gusts.events if gusts else 0,
         "event_samples": samples,
         "settle": SETTLE,
+        "most_settle": MOST_SETTLE,
+        "noise": NOISE,
         "settle_drag": 0.0,
         "displacement_criterion": rules.displacement_criterion,
         "stir": min(STIR, rules.displacement_criterion * smallest / 2),

@@ -200,17 +200,27 @@ def pile(line: BedLine, lattice: Lattice) -> Packing:
     inside = (depth >= -(STRAY if lattice.uneven else TIE)) & shell
     below = (level < -TIE) & (depth > 0.5 * row_height) & (level > -1.3)
     kept = inside & ((level >= -TIE) | below)
-    body, depth = points[kept], deep[0, kept]
+    top = points[np.argmax(np.where(kept, points[:, 1], -np.inf))]
+    kept |= _behind(top, points) & (deep[1] < -TIE)
+    body, depth, behind = points[kept], deep[0, kept], deep[1, kept]
     buried = level[kept] < -TIE
     ahead = body[:, 0] <= line.crest[0] + TIE
     free = exposed(body, line.tangents[np.where(ahead, *faces)], slack=lattice.disorder) & ~buried
     windward, lee = free & ahead, free & ~ahead
-    mobile = ((depth < (mobile_layers - 0.5) * row_height) & ~buried) | windward
+    # on a steep lee side no grain lies by itself
+    fallen = (behind < 1) & ~_rests(body)
+    mobile = ((depth < (mobile_layers - 0.5) * row_height) & ~buried & ~fallen) | windward
     needed = ~buried | _touching(body, mobile)
     apron = _apron(body[needed], surface)
     fixed = np.zeros(len(apron), bool)
     kinds = (np.append(chosen[needed], fixed) for chosen in (mobile, windward, lee))
     return lattice.packed(line, np.vstack([body[needed], apron]), kinds)
+
+
+def _behind(top: FloatArray, points: FloatArray) -> BoolArray:
+    """Which of some places bear a grain from downstream; beyond a steep lee side else none does."""
+    x, z = (points - top).T
+    return np.asarray((np.hypot(x, z) < 1 + TOUCH) & (x > 0) & (z < -LOWER))
 
 
 def _filling(

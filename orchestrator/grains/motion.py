@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from orchestrator.bed.deck import SETTLE_FLOW, GrainTable, read_dump, read_table, read_texts
+from orchestrator.bed.deck import NOISE, SETTLE_FLOW, GrainTable, read_dump, read_table, read_texts
 from orchestrator.bed.packing import across
 from orchestrator.digits import FORMAT
 from orchestrator.errors import Exploded, Noisy, SolverError
@@ -30,13 +30,10 @@ LIFTED = 0.3
 an entrainment angle of 60 degrees."""
 ROLLED = 0.5  # a grain rolls when its spin makes at least this part of its speed, else it slides
 WINDOW = 5  # samples from the passage of the criterion on in which a grain may lift: 2 sqrt(d/g')
-NOISE = 0.01
-"""Most kinetic energy of a mobile grain at rest, over W^2/K, which is twice what its weight stores
-in a spring. Beyond it trials at 0 to 0.9 of damping and 0.05 to 1.2 of time step gave other
-thresholds; at a damping of 0.1 and a time step of 0.3 it is 1e-5."""
-DECAY = 0.5
-"""The energy still falls when the last quarter of the settling has less than this part of the
-second quarter's, and grows when it has more than 1/DECAY of it."""
+LAST = 5  # samples in a row in which a bed at rest has less energy than `NOISE`
+GROWS = 2.0
+"""The energy of a bed that does not come to rest grows when the last quarter of the settling has
+more than this times that of the second."""
 BURST = 10.0  # kinetic energy per grain, over W d, that no fall of a grain can give it
 REMEDY = "a smaller protocol.time_step or grain.damping, or look for grains that overlap"
 
@@ -340,13 +337,15 @@ def check_rest(
     if lost:
         what = f"{lost} of {grains.mobile_count} grains were lost before the flow rose"
         raise Exploded(what, where=where, remedy=REMEDY)
-    quarters = np.array_split(energy * stiffness, 4)
-    before, last = float(quarters[1].mean()), float(quarters[3].mean())
-    if last < NOISE or last < DECAY * before:
+    energy *= stiffness
+    last = float(energy[-LAST:].max())
+    if last < NOISE:
         return
     text = f"{last:.2g} W^2/K of kinetic energy per grain after settling"
-    if last > before / DECAY:
-        what = f"the energy of the bed at rest grows: {text}, {last / before:.1f} times the earlier"
+    quarters = [float(quarter.mean()) for quarter in np.array_split(energy, 4)]
+    if quarters[3] > GROWS * quarters[1]:
+        ratio = quarters[3] / quarters[1]
+        what = f"the energy of the bed at rest grows: {text}, {ratio:.1f} times the earlier"
         raise Exploded(what, where=where, remedy=REMEDY)
     what = f"the bed does not come to rest: {text}; {NOISE:g} is the most of a bed at rest"
     raise Noisy(what, where=where, remedy=REMEDY)

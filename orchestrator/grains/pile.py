@@ -435,6 +435,8 @@ def flows(loads: Loads) -> FloatArray:
     last = thresholds[place]
     if not np.isfinite(last):
         last = thresholds[np.isfinite(thresholds)].max(initial=2 * first)
+    # so few grains may be asked for that all of them lie loose
+    last = max(last, first)
     # gusts that are too short do nothing: then the mean stress moves the grains
     beyond = deck.BEYOND * np.sqrt(geometry.scene.gust)
     return deck.flows(deck.START * first, beyond * last, rules.load_increment)

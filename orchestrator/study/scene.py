@@ -10,7 +10,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from orchestrator.digits import rounded
+from orchestrator.digits import SLACK, rounded
 from orchestrator.physics.constants import KARMAN
 from orchestrator.physics.gusts import peak_over_mean
 from orchestrator.physics.laws import LAWS
@@ -145,7 +145,7 @@ class Scene(parts.Part):
         yield off, "grain.diameter", what, "write that, or change the cut-offs"
         what = f"the largest grain is {high / low:.3g} times the smallest"
         most = f"merge classes until it is at most {LARGEST_RATIO:g} times"
-        yield high / low > LARGEST_RATIO, "grain.sizes", what, most
+        yield high / low > LARGEST_RATIO + SLACK, "grain.sizes", what, most
 
     def _rules_of_bed(self, bed: PileBed) -> Iterator[Rule]:
         d, profile, slope, shape = self.grain.diameter, bed.profile, bed.slope_deg, bed.shape

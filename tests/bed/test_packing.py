@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.bed import packing
-from orchestrator.bed.line import of_bed, triangle
+from orchestrator.bed.line import between_flats, of_bed, triangle
 from orchestrator.bed.packing import Lattice, Packing, Places, cover, pile
 from orchestrator.study.parts import Packing as Pattern
 from orchestrator.study.parts import UnfitError
@@ -179,3 +179,14 @@ def test_no_last_digit_decides_which_grains_a_range_counts() -> None:
     start, end = float(x[5]), float(x[20])
     for ends in ((np.nextafter(start, 99), np.nextafter(end, 0)), (start, end)):
         assert cover(line, line, ends, _lattice()).count == 16
+
+
+@pytest.mark.parametrize("slope", [10.0, 15.0, 25.0, 30.0])
+@pytest.mark.parametrize("lee", [30.0, 35.0, 45.0, 55.0, 60.0])
+def test_no_grain_falls_down_a_steep_lee_side(slope: float, lee: float) -> None:
+    up, down = (12.0 / np.tan(np.radians(each)) for each in (slope, lee))
+    line = between_flats(np.array([[0.0, 0.0], [up, 12.0], [up + down, 0.0]]), 12.0)
+    for pattern in ("aligned", "horizontal"):
+        bed = pile(line, _lattice(pattern))
+        _check(bed)
+        assert bed.mobile[bed.centres[:, 1].argmax()]

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator.fidelity.levels import changed
 from orchestrator.grains.motion import Motion
 from orchestrator.grains.pile import Pile, flows
 from orchestrator.grains.threshold import sampled, within
@@ -267,6 +268,17 @@ def test_each_size_class_has_its_threshold(mixed: Results) -> None:
     loose = pd.DataFrame(size_class(answer))
     assert set(loose["shields_own"] > 0) == {False, True}
     assert loose["hiding"].isna().all()
+
+
+@pytest.mark.parametrize("name", ["mixed", "strip"])
+def test_load_steps_rise_where_the_last_grain_asked_for_lies_loose(
+    request: pytest.FixtureRequest, name: str
+) -> None:
+    results: Results = request.getfixturevalue(name)
+    pile = _pile(results, "dem")
+    scene = changed(pile.scene, {"protocol.final_fraction": 1e-6})
+    rising = flows(Pile(scene, results.cases).loads(results.cases))
+    assert (np.diff(rising) > 0).all()
 
 
 @pytest.mark.parametrize("name", ["mixed", "strip"])
