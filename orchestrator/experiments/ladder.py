@@ -26,6 +26,8 @@ from orchestrator.experiments.experiment import TEXTS, Experiment, Results, Runs
 from orchestrator.fidelity import levels, limits
 from orchestrator.fidelity.decision import Decision, on_levels
 from orchestrator.fidelity.levels import FLAT, LEVELS, PEELING, Pair, level
+from orchestrator.grains.loads import forget
+from orchestrator.grains.pile import Pile
 from orchestrator.grains.threshold import of_pile
 from orchestrator.report import style
 from orchestrator.report.page import Section
@@ -123,9 +125,8 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
         pile, scene, pair = runs.planned.piles[key], decision.asked, decision.levels
         if not pair or not runs.are_done(key):
             continue
-        started = time.process_time()
         motion = pile.motion(runs.cases)
-        here_s = time.process_time() - started if pair.grains.name in METHODS else 0.0
+        here_s = time_alone_s(pile, runs.cases) if pair.grains.name in METHODS else 0.0
         names = {f"tau_{at:g}": at for at in scene.protocol.fractions}
         names |= {f"curve_{at:.2f}": at for at in CURVE.tolist()}
         speed, density = pile.speed(runs.cases), scene.fluid.density
@@ -147,6 +148,19 @@ def points(pairs: Mapping[str, Decision], runs: Runs) -> pd.DataFrame:
         taus = {name: of_pile(motion, speed, at, density).tau for name, at in names.items()}
         rows.append({**row, **taus})
     return pd.DataFrame(rows)
+
+
+def time_alone_s(pile: Pile, cases: Path) -> float:
+    """Time of one core in which the grains of a pile move without a run of DEM, s.
+
+    It is the time of this pile alone: a packing or a threshold that another pile needed before is
+    found again.
+    """
+    forget()
+    alone = Pile(pile.scene, pile.cases)
+    started = time.process_time()
+    alone.motion(cases)
+    return time.process_time() - started
 
 
 def errors(points: pd.DataFrame) -> pd.DataFrame:

@@ -21,6 +21,7 @@ from orchestrator.flow.stress import WallStress
 from orchestrator.grains import peeling, sheltering
 from orchestrator.grains.peeling import FEWER, PLACES, RANGE, Force, ForceTable, Loading
 from orchestrator.grains.sheltering import Shelter
+from orchestrator.physics import threshold
 from orchestrator.physics.laws import LAWS, Exposure
 from orchestrator.physics.threshold import LIFT_OFF, root, thresholds_of
 from orchestrator.runs.files import state_of
@@ -68,6 +69,16 @@ def _packed(ground: BedLine, lattice: Lattice, line: BedLine) -> Packing:
     """A pile of two faces on a bed line: obstacles before it make the way along that longer."""
     packed = packing.pile(ground, lattice)
     return replace(packed, arc_length=line.nearest(packed.centres)[1])
+
+
+def forget() -> None:
+    """Forget what beds and grains share within a process.
+
+    The time that a bed takes afterwards is what it takes alone, whatever was asked before.
+    """
+    for shared in (_covered, _packed, _poured):
+        shared.cache_clear()
+    threshold.forget()
 
 
 def forces(

@@ -725,6 +725,11 @@ def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Thresh
     return [_ANSWERS[key] for key in keys]
 
 
+def forget() -> None:
+    """Forget the thresholds that were found: the time of the next is its own."""
+    _ANSWERS.clear()
+
+
 def _threshold_of_table(name: str, table: FloatArray) -> Threshold:
     """The thresholds of a table with a row for each grain, of shape (rows,)."""
     column = dict(zip(SingleGrain._fields, table.T, strict=True))

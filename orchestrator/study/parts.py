@@ -322,7 +322,8 @@ class Flow(Part):
     - closed channel: a wall as rough as the bed
     - boundary layer: the log layer goes on above"""
     depth: Length | None = field(None, "D", "m", "depth_m", since=True)
-    """depth of open water or of a closed channel over the flat bed"""
+    """depth of open water or of a closed channel over the flat bed, at least three heights of forms
+    and obstacles, over a level bed three of the largest grains"""
     lid: float = _solved(100.0, unit="h", since=True, ge=3, le=1000)
     """height of a boundary layer's lid above the flat bed, in undisturbed flow"""
     upstream: float = _solved(80.0, "", "h", "", "flat bed upstream", since=True, ge=3, le=1000)
@@ -387,8 +388,8 @@ class PileBed(Bed):
     - grain: one grain on its two fixed neighbours, in an undisturbed boundary layer
     - pile: grains under any bed line: a form, a train of forms, a profile"""
     height: Height = _pile(0.02, "h", "m", "h_m")
-    """height of the forms; that of a profile follows; over a flat bed with obstacles lengths in h
-    are heights of the tallest"""
+    """height of the forms; that of a profile follows. A flat bed has none: with obstacles lengths
+    in h are heights of the tallest, without any they are of 20 diameters, whatever is given"""
     shape: ShapeName = _pile("triangle", column="bed_shape", since=True, choices=SHAPE_MEANINGS)
     """shape of a form, which `kind` may name too; `slope_deg` is that of its windward side, of a
     curve where it is steepest"""
@@ -403,7 +404,7 @@ class PileBed(Bed):
     """radius with which a dune's brink is rounded; 0 leaves it sharp"""
     length: Length | None = field(None, "", "m", scope="beds with level parts", since=True)
     """length of level bed with grains: a trapezoid's top, a flat bed, before or behind a step; by
-    default 4 h"""
+    default 4 h, of a flat bed 80 diameters"""
     forms: int = _pile(1, since=True, ge=1, le=100)
     """number of forms in a train"""
     spacing: Length | None = _pile(None, unit="m", since=True)

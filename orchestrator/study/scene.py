@@ -25,7 +25,10 @@ BUILDABLE_DEG = (1.0, 60.0)  # slopes of piles that can be meshed and packed
 SOLVE_VISCOSITY = 1e-5  # at which flows are solved, m2/s, where it is low enough for their cells
 VISCOUS_CELLS = 2.5  # first cell over nu/(kappa u*_0): at its centre the flow is turbulent
 CELLS_OVER_Z0 = 2.5  # first cell over z0: its centre is not within the roughness
-LEAST_DEPTH = 3.0  # of a flow, over forms and obstacles: mesh rows are level at half of it
+LEAST_HEIGHT = 5.0  # of forms, in grains
+LEAST_DEPTH = 3.0
+"""Least depth of a flow, in heights of forms and obstacles: mesh rows are level at half of it. Over
+a level bed, where no flow is solved, it is in the largest grains."""
 MOST_POURED_STIFFNESS = 1e5
 """K d/W of a deck on a poured bed, ten times that of the pouring: grains that lie in one another by
 1e-3 d are thrown apart by stiffer springs."""
@@ -156,7 +159,10 @@ class Scene(parts.Part):
         yield 0 < bed.width < least, "bed.width", what, "raise it, or 0: a bed in a plane"
         yield bed.relative_size != 1, "bed.relative_size", "it is of single grains", OUT
         yield bed.spacing and bed.forms == 1, "bed.spacing", "one form has no neighbour", OUT
-        yield bed.height < 5 * d, "bed.height", f"less than five grains of {d:g} m", "raise it"
+        has_height = profile is not None or shape != "flat"
+        fails = has_height and bed.height < LEAST_HEIGHT * d
+        least_m = f"at least {LEAST_HEIGHT * d:.4g} m"
+        yield fails, "bed.height", f"less than five grains of {d:g} m", least_m
         for obstacle, other in pairwise(sorted(bed.obstacles, key=lambda each: each.x)):
             overlap = other.x - obstacle.x < obstacle.reach + other.reach
             yield overlap, "bed.obstacles", f"{obstacle} and {other} overlap", "move one"
@@ -183,10 +189,19 @@ class Scene(parts.Part):
         flow, update, height = self.flow, self.protocol.update, bed.relief
         cell = self.first_cell_height
         solved, is_open = flow.model == "solve", flow.top != "boundary layer"
-        depth = flow.depth or flow.lid * height
-        shallow = depth < LEAST_DEPTH * max([height, *(each.height for each in bed.obstacles)])
-        what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
-        yield shallow, "flow.depth" if is_open else "flow.lid", what, "raise it"
+        if bed.is_level:
+            largest = self.grain.diameter * parts.extremes(self.grain.sizes, self.grain.diameter)[1]
+            shallow = flow.depth is not None and flow.depth < LEAST_DEPTH * largest
+            what = f"{flow.depth} m is less than {LEAST_DEPTH:g} of the largest grains"
+            least_m = f"at least {LEAST_DEPTH * largest:.4g} m"
+            yield shallow, "flow.depth", what, least_m
+        else:
+            depth = flow.depth or flow.lid * height
+            highest = max([height, *(each.height for each in bed.obstacles)])
+            shallow = depth < LEAST_DEPTH * highest
+            name = "flow.depth" if is_open else "flow.lid"
+            what = f"{depth:g} m is less than {LEAST_DEPTH:g} heights of the forms or obstacles"
+            yield shallow, name, what, "raise it"
         topped = is_open and flow.model == "waves"
         yield topped, "flow.model", "linear theory has no top", 'choose "solve" or "flat"'
         coarse = solved and cell > height / 4

@@ -35,6 +35,9 @@ from orchestrator.study.source import Source, find, presets
 
 TIME_LIMIT_S = 3600.0
 BED = {"kind": "grain", "roughness": "d/30"}  # fields of a bed that a file may leave out
+LEVEL_HEIGHT = 20.0
+"""Diameters that stand for the height of a level bed. Its length is four heights by default: level
+beds of all grains are alike."""
 NO_TOLERANCE = 'leave it out; protocol.method = "dem" answers by DEM'
 MOST_SCENES, MOST_BYTES = 100_000, 2**24  # a file that lists so many scenes is smaller
 GONE_KEYS = {
@@ -357,7 +360,8 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
     elif kind not in ("grain", "pile"):
         remedy = f"write grain, pile, or a shape: {', '.join(SHAPES)}"
         raise InputError(f"{kind!r} is no bed", f"{where}: bed.kind", remedy)
-    if bed.get("shape") == "flat" and not (bed.get("profile") or bed.get("obstacles")):
+    is_level = bed.get("shape") == "flat" and not (bed.get("profile") or bed.get("obstacles"))
+    if is_level:
         flow.setdefault("model", "flat")  # over a level bed there is nothing to solve
     if bed.get("packing") == "poured":
         bed.setdefault("mobile_layers", 4)  # the cheapest near the reference: docs/poured.md
@@ -375,6 +379,9 @@ def make_scene(parts: Mapping[str, Table], where: str, files: Files | None = Non
             mixture = MIXTURE.validate_python(grain.get("sizes"))
             if isinstance(mixture, tuple):
                 grain.setdefault("diameter", percentile(mixture, 1.0, 0.5))
+            if is_level and bed.get("height", 1.0) > 0:
+                # it has no height of its own; digits as those that a file has
+                bed["height"] = float(f"{LEVEL_HEIGHT * grain['diameter']:.12g}")
             if isinstance(bed["roughness"], str):
                 relative = bed.get("relative_size", 1.0)
                 is_size = isinstance(relative, int | float) and 1e-3 < relative < 1e3

@@ -9,10 +9,12 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan
+from orchestrator.bed import packing
 from orchestrator.experiments import ladder
 from orchestrator.experiments.experiment import Runs, piles
 from orchestrator.experiments.ladder import REFERENCES
 from orchestrator.fidelity.levels import FLAT, LEVEL_BED, LEVELS
+from orchestrator.physics import threshold
 from orchestrator.study import study
 from orchestrator.study.parts import PileBed
 
@@ -44,6 +46,36 @@ def test_what_has_not_run_has_no_point_and_what_needs_no_run_no_error(tmp_path: 
     points = ladder.points(pairs, Runs(plan.of(pairs), tmp_path, {}))
     assert set(points["grain_level"]) == {"pivot", "peeling"}
     assert ladder.errors(points).empty
+
+
+def test_the_cost_of_a_pile_does_not_depend_on_what_was_asked_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A packing that another pile had asked for once cost nothing."""
+    bed = 'kind = "pile", height = 0.01, slope_deg = 20.0, roughness = "d/30"'
+    text = f'grain = {{ diameter = 1e-3 }}\nbed = {{ {bed} }}\nflow = {{ model = "flat" }}'
+    text += '\nprotocol = { method = "pivot" }'
+    (pile,) = plan.make(study.parse(text, name="one", where="one")).piles.values()
+    done: list[str] = []
+
+    def counted(name: str, function: Any) -> Any:
+        def count(*given: Any, **more: Any) -> Any:
+            done.append(name)
+            return function(*given, **more)
+
+        return count
+
+    packed, found = packing.pile, threshold._threshold_of_table
+    monkeypatch.setattr(packing, "pile", counted("packed", packed))
+    monkeypatch.setattr(threshold, "_threshold_of_table", counted("found", found))
+    work = []
+    for _ in range(3):
+        done.clear()
+        assert ladder.time_alone_s(pile, tmp_path) > 0
+        work.append([*done])
+    assert work[0] == work[1] == work[2]
+    assert work[0].count("packed") == 1
+    assert "found" in work[0]
 
 
 def _point(pair: tuple[str, str], factor: float = 1.0, **other: Any) -> dict[str, Any]:

@@ -8,9 +8,11 @@ import pytest
 
 from orchestrator import plan
 from orchestrator.errors import InputError
+from orchestrator.fidelity import limits
+from orchestrator.grains.loads import Geometry
 from orchestrator.physics.laws import LAWS
 from orchestrator.runs.files import canonical_json
-from orchestrator.study import closed_form, study
+from orchestrator.study import closed_form, parts, study
 from orchestrator.study.parts import Forces, Grain, GrainBed
 from orchestrator.study.scene import Scene
 
@@ -128,7 +130,7 @@ BAD = [
     (f"{PILE}[flow]\nnodes = true\n", "flow.nodes", "flow.roughness"),
     (f"{PILE}[flow]\nnodes = false\n", "flow.nodes", "leave it out"),
     (f'{PILE}[axes]\n"flow.model" = ["hill"]\n', "flow.model", 'write "waves"'),
-    (PILE + "height = 2e-3\n", "bed.height", "raise"),
+    (PILE + "height = 2e-3\n", "bed.height", "at least 0.005 m"),
     (PILE + FENCE % 0.1 + "[flow]\ntop = 'open water'\ndepth = 0.2\n", "flow.depth", "obstacles"),
     (PILE + FENCE % 1.0, "flow.lid", "2 m is less than 3 heights of the forms or obstacles"),
     (GRAIN + "[flow]\ngusts = { intensity = 0.4 }\n", "flow.gusts.events", "missing"),
@@ -198,3 +200,34 @@ def test_the_closed_form_bears_the_ends_of_all_ranges_together() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert all(closed_form.closed_form(scene).friction_velocity > 0 for scene in scenes)
+
+
+GRAVEL = """
+fluid.kind = "water"
+grain = {{ diameter = 0.03, density = 2650.0{sizes} }}
+bed = {{ kind = "flat"{bed} }}
+flow = {{ top = "open water", depth = {depth} }}
+"""
+LEVEL = {
+    "lattice": ("", ""),
+    "poured in a plane": (', packing = "poured"', ", sizes = { sigma_g = 1.3 }"),
+    "poured strip": (', packing = "poured", width = 6.0', ", sizes = { sigma_g = 1.3 }"),
+}
+
+
+@pytest.mark.parametrize("bed", LEVEL)
+def test_a_level_bed_has_no_height(bed: str) -> None:
+    """Gravel of 30 mm in 0.4 m of water was refused for its height, and then for its depth."""
+    fields, sizes = LEVEL[bed]
+    asked = _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=0.4))
+    limits.check_study(asked)
+    given = _parse(GRAVEL.format(bed=f"{fields}, height = 0.15", sizes=sizes, depth=0.4))
+    assert [scene.id for scene in asked.scenes] == [scene.id for scene in given.scenes]
+    (gravel,) = asked.scenes
+    small = GRAVEL.replace("0.03", "3e-4").format(bed=fields, sizes=sizes, depth=0.4)
+    pourings = [Geometry(scene).pouring for scene in (gravel, _parse(small).scenes[0])]
+    assert pourings[0] == pourings[1]  # in diameters
+    least = 3 * 0.03 * parts.extremes(gravel.grain.sizes, 0.03)[1]
+    with pytest.raises(InputError, match=rf"flow.depth: 0.08 m .* \(at least {least:.4g} m\)"):
+        _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=0.08))
+    _parse(GRAVEL.format(bed=fields, sizes=sizes, depth=round(least, 4)))
