@@ -92,7 +92,7 @@ def test_grains_of_two_contact_laws_share_no_deck() -> None:
 
 
 STOPPED = """pid=$$
-(until [ -s samples.csv ]; do sleep 0.01; done; kill -KILL $pid) &"""
+(until [ -s samples.csv ]; do :; done; kill -KILL $pid) &"""
 
 
 @pytest.mark.parametrize(
