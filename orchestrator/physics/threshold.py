@@ -726,7 +726,12 @@ def thresholds_of(name: str, grains: Sequence[tuple[float, ...]]) -> list[Thresh
 
 
 def forget() -> None:
-    """Forget the thresholds that were found: the time of the next is its own."""
+    """Forget the thresholds that were found: the time of the next is its own.
+
+    Examples
+    --------
+    >>> forget()
+    """
     _ANSWERS.clear()
 
 
