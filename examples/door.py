@@ -18,8 +18,10 @@ SETTLE = 10.0
 """Time of load step 0."""
 REST_ENERGY = 1e-6
 """Kinetic energy of the mobile grains that have not passed, below which the bed is at rest, W d."""
-MARGIN = 3.0
-"""From a face to the height at which a grain in flight is gone, d."""
+ROOF = 3.5
+"""From a face of the bed to the height at which a grain in flight is gone, d."""
+BOX = 3.0
+"""From the outermost centres to the sides beyond which a grain is gone, d."""
 AWAY = 10.0
 """Displacement from which on a counted grain is gone, and how far behind the bed any is, d."""
 
@@ -115,14 +117,16 @@ class Bed:
     @property
     def roof(self):
         """Slope (radians) and ridge (m) of the roof above which a grain in flight is gone."""
-        d, slope = self.scene["d_m"], math.radians(self.scene["alpha_deg"])
-        top = max(self.grains[: self.counted], key=lambda row: float(row["z_m"]))
+        scene, d = self.scene, self.scene["d_m"]
         if self.is_pivot:
-            return slope, float(top["x_m"]), float(top["z_m"]) + 1e3 * d
-        if "roof_slope_deg" in self.scene:
-            slope = math.radians(self.scene["roof_slope_deg"])
-            return slope, self.scene["roof_x_m"], self.scene["roof_z_m"]
-        return slope, float(top["x_m"]), float(top["z_m"]) + MARGIN * d / math.cos(slope)
+            highest = max(float(row["z_m"]) for row in self.grains)
+            return 0.0, 0.0, highest + 1e3 * d
+        if "roof_slope_deg" in scene:
+            slope = math.radians(scene["roof_slope_deg"])
+            return slope, scene["roof_x_m"], scene["roof_z_m"]
+        slope = math.radians(scene["alpha_deg"])
+        ridge = scene["h_m"] + ROOF * d / math.cos(slope)
+        return slope, scene["h_m"] / math.tan(slope), ridge
 
     def answer(self, moved_in, carried):
         """Write nothing; give the answer to a question, from what each counted grain did.

@@ -80,7 +80,7 @@ def write_bed(bed, folder):
     d, rho = bed.scene["d_m"], bed.scene["rho_sol_kg_m3"]
     kinds = {"fixed": 1, "mobile": 2, "counted": 3, "pushed": 3}
     places = [(float(row["x_m"]), float(row["z_m"])) for row in bed.grains]
-    margin = (door.MARGIN + 1) * d
+    margin = door.BOX * d
     lines = ["grains", "", f"{len(places)} atoms", "3 atom types", ""]
     for axis, values in zip("xz", zip(*places, strict=True), strict=True):
         lines.append(f"{min(values) - margin!r} {max(values) + margin!r} {axis}lo {axis}hi")

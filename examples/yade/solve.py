@@ -184,7 +184,7 @@ class Protocol:
         self.waiting_samples = int(scene["waiting_time"] / door.SAMPLING_INTERVAL + 0.5)
         self.roof = asked.roof
         places = [(float(row["x_m"]), float(row["z_m"])) for row in grains]
-        margin = (door.MARGIN + 1) * scene["d_m"]
+        margin = door.BOX * scene["d_m"]
         self.low = [min(values) - margin for values in zip(*places, strict=True)]
         self.high = [max(values) + margin for values in zip(*places, strict=True)]
         self.start = {}
@@ -216,7 +216,10 @@ class Protocol:
                 self.fluid.dead = True
                 self._begin(1)
             return
-        has_passed, before, self.energy = self._note(), self.energy, self._unpassed_energy()
+        # the energy at a sample has those that pass at it, by rule 7 of docs/benchmark.md
+        before = self.energy
+        self.energy = self._unpassed_energy()
+        has_passed = self._note()
         self.calm = 0 if has_passed else self.calm + 1
         if not has_passed and self.energy < min(before, self.asked.rest_energy):
             self.calm = self.waiting_samples  # at rest

@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.errors import InputError
 from orchestrator.runs import workspace
+from orchestrator.runs.case import PACKAGE
 from orchestrator.runs.files import canonical_json, digest_files, digest_text, text_of
 from orchestrator.types import Row
 
@@ -41,6 +42,8 @@ KINDS = {
     **{"flow": 3, "pile": 4, "line": 5},
 }
 """Kinds of scenes, and the level of each."""
+CONTRACT = "## Write a solver\n"
+"""Heading in docs/benchmark.md with which the contract for solvers begins."""
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 """A number as programs print it; Python would also take 1_000 and digits of other scripts."""
 _IN_SCENES = re.compile(r"[1-5]-[a-z0-9]+([.+-][a-z0-9]+)*/[a-z0-9]+([_-][a-z0-9]+)*\.(csv|json)")
@@ -262,13 +265,12 @@ def write(
             one.write(scenes / one.scene)
         expected = pd.concat([one.expected.assign(scene=one.scene) for one in listed])
         times = pd.DataFrame({"scene": one.scene, "seconds": one.seconds} for one in listed)
-        versions = "".join(f"- {program} {v}\n" for program, v in sorted(programs.items()))
         files = {
             EXPECTED: csv(expected[["scene", *COLUMNS]]),
             "scenes.csv": csv(pd.DataFrame(one.entries for one in listed)),
             TIMES: csv(times.dropna()),
             STUDY: text,
-            "README.md": README + versions,
+            "README.md": _readme(programs),
         }
         for file, content in files.items():
             folder.put(file, content)
@@ -288,7 +290,26 @@ def write(
 README = """# A benchmark pack
 
 Scenes of the model of Bravo, Ortiz and Pérez-Aparicio with their questions (`scenes/`) and expected
-answers (`expected.csv`), for a native code of the same model. The format, schema 2, is
-docs/benchmark.md of the project. Programs that gave the answers of our runs:
+answers (`expected.csv`), for a native code of the same model. What follows is all that a solver has
+to know, schema 2; the program `orchestrator` runs and judges one: `orchestrator benchmark run PACK
+--solver 'my-solver {case} {out}'`.
 
 """
+
+
+def contract() -> str:
+    """The contract for solvers: the page docs/benchmark.md from its section "Write a solver" on.
+
+    The page lies beside the package, or in it in a wheel.
+    """
+    inside = PACKAGE / "docs"
+    folder = inside if inside.is_dir() else PACKAGE.parent / "docs"
+    page = (folder / "benchmark.md").read_text(encoding="utf-8")
+    return page[page.index(CONTRACT) :]
+
+
+def _readme(programs: Mapping[str, str]) -> str:
+    """The text of a pack's README, with the programs of our answers and their versions."""
+    lines = [f"- {program} {version}\n" for program, version in sorted(programs.items())]
+    by = "\n## Programs that gave the answers of our runs\n\n" + "".join(lines) if lines else ""
+    return README + contract() + by

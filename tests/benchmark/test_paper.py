@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from orchestrator import plan, tables
-from orchestrator.benchmark import scenes
+from orchestrator.benchmark import pack, scenes
 from orchestrator.benchmark.export import scene_names
+from orchestrator.errors import InputError
 from orchestrator.runs import case, engine
 from orchestrator.study import study
 from orchestrator.study.closed_form import regime_of
@@ -72,3 +73,14 @@ def test_fresh_piles_are_as_expected(expected: pd.DataFrame, paper: Study, tmp_p
             margin = 1e-4 * stated["value"].abs()
             is_held = fresh["ours"].between(stated["low"] - margin, stated["high"] + margin)
             assert is_held[stated["tolerance"].notna()].all(), problem.scene
+
+
+def test_it_is_called_a_table_and_no_pack() -> None:
+    """Whoever tries to run it is told what it is, by the program and by each link to it."""
+    with pytest.raises(InputError, match=r"a table of expected answers, and no pack.*README"):
+        pack.read(FOLDER)
+    for page in ("README.md", "docs/README.md", "docs/benchmark.md"):
+        text = (ROOT / page).read_text(encoding="utf-8")
+        (line,) = (line for line in text.splitlines() if "benchmark/paper/README.md" in line)
+        assert "paper's pack" not in line
+    assert (FOLDER / "README.md").read_text(encoding="utf-8").startswith("# The expected answers")
